@@ -195,7 +195,7 @@ def _tilting(eight: Vehicle) -> Table:
     found = _table("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))
     cases = {
         "Heavy": eight,
-        "Heavy, buoyancy 5 cm above": eight.replaced({"z_B": -0.05}),
+        "Heavy, buoyancy 5 cm above": eight.with_(z_B=-0.05),
     }
     for title, rov in cases.items():
         cells = []

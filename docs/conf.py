@@ -93,8 +93,8 @@ def _fly(app: Sphinx, error: Exception | None) -> None:
         (folder / "compact").mkdir(parents=True, exist_ok=True)
         for one in FLOWN:
             flown, name = [Flown(one, web_module(one.layout))], f"{one.identifier}.html"
-            write_whole(Output(folder / name, fly_page(flown).encode()))
-            write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()))
+            write_whole(Output(folder / name, fly_page(flown).encode()), force=True)
+            write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()), force=True)
 
 
 def _plain(*arguments: list[str]) -> None:

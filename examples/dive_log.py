@@ -16,6 +16,7 @@ import click
 import numpy as np
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.pool import Array, swim
@@ -64,7 +65,7 @@ class Dive:
 def bluerov2() -> Vehicle:
     """Return the simulated vehicle."""
     k = load_vehicle(SHIPPED["bluerov2"])
-    return k.replaced({"T_t200": LAG})
+    return k.with_(T_t200=LAG)
 
 
 def dive(seconds: float = 90.0, seed: int = 0) -> Dive:
@@ -93,12 +94,14 @@ def _stick(random: np.random.Generator, n: int, ahead: float, back: float, hold:
     return found[:n]
 
 
-def write_log(path: Path, dived: Dive, seed: int = 0) -> None:
+def write_log(path: Path, dived: Dive, seed: int = 0, *, force: bool = False) -> None:
     """Write the messages, each after the time at which it arrived."""
     packer, random = mavlink.MAVLink(None, srcSystem=1, srcComponent=1), np.random.default_rng(seed)
-    with path.open("wb") as file:
-        for time, message in _messages(dived, random):
-            file.write(struct.pack(">Q", round(1e6 * (_BEGUN + time))) + message.pack(packer))
+    packed = (
+        struct.pack(">Q", round(1e6 * (_BEGUN + time))) + message.pack(packer)
+        for time, message in _messages(dived, random)
+    )
+    write_whole(Output(path, b"".join(packed)), force=force)
 
 
 def _messages(dived: Dive, random: np.random.Generator) -> Iterator[tuple[float, Any]]:
@@ -136,9 +139,12 @@ def _messages(dived: Dive, random: np.random.Generator) -> Iterator[tuple[float,
 
 @click.command(help=__doc__)
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
-def main(file: Path) -> None:
+@click.option(
+    "--force", is_flag=True, help="Replace a file that this example did not write, or that has changed since."
+)
+def main(file: Path, *, force: bool) -> None:
     """Write the log."""
-    write_log(file, dive())
+    write_log(file, dive(), force=force)
 
 
 if __name__ == "__main__":

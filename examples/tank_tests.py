@@ -6,6 +6,7 @@ own, SciPy's DOP853, and none of the mathematics that identifies the vehicle fro
 """
 
 from collections.abc import Mapping, Sequence
+from io import StringIO
 from math import radians
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
+from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim
 
@@ -106,18 +108,21 @@ gamma = { value = 0.45, unit = "rad", source = "From the drawing" }
 """
 
 
-def write_tests(folder: Path, seed: int = 0) -> None:
+def write_tests(folder: Path, seed: int = 0, *, force: bool = False) -> None:
     """Write rov.toml, force tests of both curves and three logs of each axis."""
     random = np.random.default_rng(seed)
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "rov.toml").write_text(_ROV, encoding="utf-8")
+    outputs = [Output(folder / "rov.toml", _ROV.encode())]
     for curve, spread in (("rear", 0.25), ("top", 0.08)):
         pulls = [(c, bollard_pull(curve, c / 100.0) + spread * random.standard_normal()) for c in _PULLS * 2]
-        _write(folder / f"thrust_{curve}.csv", "command [%],force [N]", np.array(sorted(pulls)), "%d,%.2f")
+        header = "command [%],force [N]"
+        outputs.append(_table(folder / f"thrust_{curve}.csv", header, np.array(sorted(pulls)), "%d,%.2f"))
     for name, plans in _PLANS.items():
         for number, plan in enumerate(plans, 1):
             header = f"time [s],command [%],{_SENSORS[name][3]}"
-            _write(folder / f"log_{name}_{number}.csv", header, _log(name, plan, random), "%.2f,%d,%.4f")
+            log = _log(name, plan, random)
+            outputs.append(_table(folder / f"log_{name}_{number}.csv", header, log, "%.2f,%d,%.4f"))
+    write_whole(*outputs, force=force)
 
 
 def bollard_pull(curve: str, command: float) -> float:
@@ -137,15 +142,20 @@ def _log(name: str, plan: Sequence[tuple[int, float]], random: np.random.Generat
     return np.column_stack([time, percent, measured % 360.0 if axis is YAW else measured])
 
 
-def _write(path: Path, header: str, rows: Array, digits: str) -> None:
-    np.savetxt(path, rows, digits, header=header, comments="", encoding="utf-8")
+def _table(path: Path, header: str, rows: Array, digits: str) -> Output:
+    text = StringIO()
+    np.savetxt(text, rows, digits, header=header, comments="")
+    return Output(path, text.getvalue().encode())
 
 
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
-def main(folder: Path) -> None:
+@click.option(
+    "--force", is_flag=True, help="Replace files that this example did not write, or that have changed since."
+)
+def main(folder: Path, *, force: bool) -> None:
     """Write the folder."""
-    write_tests(folder)
+    write_tests(folder, force=force)
 
 
 if __name__ == "__main__":

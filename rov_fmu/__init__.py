@@ -11,15 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from rov_fmu.interface.model import VehicleModel
+    from rov_fmu.interface.model import Vehicle, VehicleModel
 
 __all__ = ["load"]
 __version__ = "0.2.0"
 
 
-def load(vehicle: str | Path) -> "VehicleModel":
+def load(vehicle: "str | Path | Vehicle") -> "VehicleModel":
     """Load a vehicle that ships, by its name, or a vehicle file, by its path.
 
+    A vehicle from elsewhere, such as that of an identification, is returned with the functions of the result.
     Raises FileError, a ValueError, with one line for each mistake.
     """
     from rov_fmu.interface.model import load as load_model  # imported here, so that `import rov_fmu` is quick

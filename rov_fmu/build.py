@@ -3,6 +3,7 @@
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from os import SEEK_END
 from pathlib import Path
 from time import perf_counter
 
@@ -16,6 +17,7 @@ from rov_fmu.c.compile import (
     host_platform,
 )
 from rov_fmu.fmu.archive import Content, archive, native_content, python_content, web_module
+from rov_fmu.fmu.evidence.check import check_evidence
 from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
 from rov_fmu.fmu.evidence.signature import private_key, signature_path, signed
 from rov_fmu.fmu.model_description import FMI_VERSIONS
@@ -23,12 +25,15 @@ from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU, check_written
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, InputError, did_you_mean, shown
-from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
+from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.io.reading import open_file
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 BACKENDS = ("native", "pythonfmu")
+_BEGINNING, _END, _END_SIZE = b"PK\x03\x04", b"PK\x05\x06", 22
+"""How a ZIP archive begins, and how the last bytes of one without a comment begin."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +68,7 @@ def build(
     interface: str | None = None,
     osp: bool = False,
     sign: Path | None = None,
+    force: bool = False,
     inputs: Sequence[Path] = (),
     on_content: Callable[[], None] = lambda: None,
     on_compiled: Callable[[str], None] = lambda _: None,
@@ -75,7 +81,8 @@ def build(
     FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or `both`,
     which is the default; the FMU in pure Python has only `cs`. `osp` also writes <identifier>_OspModelDescription.xml
     to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `sign` is the file of a private key by Ed25519, which
-    signs the FMU in <output>.sig; it needs the extra `sign`. `inputs` are further files that must not be
+    signs the FMU in <output>.sig; it needs the extra `sign`. `force` allows replacing files that this program did not
+    write, or that have changed since. `inputs` are further files that must not be
     overwritten, like those that the vehicle names. `on_content` is called once the content is made and the compilers
     begin, and `on_compiled` with the name of each platform that has been compiled.
 
@@ -95,6 +102,7 @@ def build(
     check_written(output, FMU)
     if output.suffix.lower() != ".fmu":
         raise FileError(f"{output}: the name must end with .fmu")
+    check_replaced(targets, force=force, is_ours=_is_as_built)
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, native=native, fmi=fmi, interface=interface)
     on_content()
@@ -115,7 +123,7 @@ def build(
         beside.append(Output(signature_path(output), signed(packed, key)))
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
-    write_whole(draft, *beside)
+    write_whole(draft, *beside, force=force, is_ours=_is_as_built)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], targets[1:], lost)
 
@@ -166,10 +174,22 @@ def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[st
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
 
 
+def _is_as_built(path: Path) -> bool:
+    """Return True if a file is an FMU of this program that nobody has changed since."""
+    try:
+        with open_file(path) as file:
+            beginning = file.read(len(_BEGINNING))
+            file.seek(-_END_SIZE, SEEK_END)
+            is_whole = beginning == _BEGINNING and file.read().startswith(_END)  # nothing stands before or behind
+        return is_whole and bool(check_evidence(path).files)
+    except (FileError, InputError, ProofError):
+        return False
+
+
 def _platforms_in(fmu: Path) -> set[str]:
     """Return the platforms that an FMU has binaries for; none if there is no FMU at the path."""
     try:
-        with zipfile.ZipFile(fmu) as old:
+        with open_file(fmu) as file, zipfile.ZipFile(file) as old:
             return _folders(old.namelist())
     except Exception:  # zipfile raises many kinds on damaged archives
         return set()

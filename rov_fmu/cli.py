@@ -33,7 +33,7 @@ from rov_fmu.io.messages import (
     print_message,
     shown,
 )
-from rov_fmu.io.output import check_targets, write_whole
+from rov_fmu.io.output import check_replaced, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
@@ -136,6 +136,12 @@ def _setting(text: str) -> str:
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
 _file_option = partial(click.option, type=_FILE)
 _output_option = partial(_file_option, "-o", "--output")
+_force_option = partial(
+    click.option,
+    "--force",
+    is_flag=True,
+    help="Replace files that rov-fmu did not write, or that have changed since.",
+)
 _set_option = partial(click.option, "--set", "settings", multiple=True, type=_setting, metavar="NAME=VALUE")
 
 
@@ -212,6 +218,7 @@ def _commands(context: click.Context) -> None:
     metavar="KEY",
     help="Private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
 )
+@_force_option()
 def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **options: Any) -> None:
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
@@ -292,6 +299,7 @@ def _print_built(built: "Built", seconds: float) -> None:
     metavar="[FILE.png]",
     help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
+@_force_option()
 def _simulate(
     vehicle: Path,
     settings: tuple[str, ...],
@@ -300,6 +308,8 @@ def _simulate(
     step: float | None,
     output: Path | None,
     plot: Path | None,
+    *,
+    force: bool,
 ) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
@@ -321,10 +331,10 @@ def _simulate(
     opens = plot == Path()
     loaded = load(vehicle)
     inputs = [vehicle, *loaded.files, *([commands] if commands else [])]
-    check_outputs(output, None if opens else plot, inputs)
+    check_outputs(output, None if opens else plot, inputs, force=force)
     result = run(loaded, settings, commands, stop, step, with_inputs=is_mcap(output))
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    write_results(loaded, result, output, picture, title(loaded, settings, commands))
+    write_results(loaded, result, output, picture, title(loaded, settings, commands), force=force)
     if opens and picture:
         _open(picture, "--plot FILE.svg")
     following = "open the plot" if plot and not opens else "add --plot to see the curves" if not opens else ""
@@ -376,12 +386,19 @@ def _warn(message: str) -> None:
     help="What `identify --mcap` wrote: bands of the errors and unknown forces are shown.",
 )
 @_output_option(metavar="PAGE.html", help="Page to write; no browser is opened.")
+@_force_option()
 def _fly(
-    vehicle: Path, against: Path | None, recording: Path | None, identified: Path | None, output: Path | None
+    vehicle: Path,
+    against: Path | None,
+    recording: Path | None,
+    identified: Path | None,
+    output: Path | None,
+    *,
+    force: bool,
 ) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
     from rov_fmu.fmu.archive import web_module
-    from rov_fmu.io.output import Output
+    from rov_fmu.io.output import Output, sealed
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
     from rov_fmu.report.page.recording import recording_of
@@ -395,14 +412,15 @@ def _fly(
         given = [path for path in (recording, identified) if path]
         check_targets([output], [*paths, *given, *(file for one in loaded for file in one.files)])
         check_written(output, PAGE)
+        check_replaced([output], force=force)
     with _warnings_printed():
         flown = recording_of(recording, loaded[0], identified) if recording else None
     names = [path.name for path in paths]
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
     shown_ones = [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, names, strict=True)]
-    page = fly_page(shown_ones, recording=flown).encode()
+    page = sealed(fly_page(shown_ones, recording=flown), "<!-- {} -->", "fly").encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
-    write_whole(Output(path, page))
+    write_whole(Output(path, page), force=force)
     if output:
         print_end([path], "open it in a browser")
     else:
@@ -503,12 +521,13 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
     show_default=True,
     help="Added mass in the link (engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
 )
-def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) -> None:
+@_force_option()
+def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str, *, force: bool) -> None:
     """Write a vehicle as a model for Gazebo (gz-sim). The default is the VideoRay Pro 4."""
     from rov_fmu.interface.sdf_command import write_model
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
 
-    path, model = write_model(vehicle, output, in_world=in_world, explicit=added_mass == "plugin")
+    path, model = write_model(vehicle, output, in_world=in_world, explicit=added_mass == "plugin", force=force)
     if model.notes:
         paragraph(console(), "What is different in Gazebo:")
     for note in model.notes:
@@ -551,8 +570,16 @@ def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str) ->
     metavar="FILE",
     help="Page (HTML) to write, with more evidence.",
 )
+@_force_option()
 def _prove(
-    fmu: Path, interface: str | None, tolerance: float | None, time_limit: float, key: Path | None, report: Path | None
+    fmu: Path,
+    interface: str | None,
+    tolerance: float | None,
+    time_limit: float,
+    key: Path | None,
+    report: Path | None,
+    *,
+    force: bool,
 ) -> None:
     """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results.
 
@@ -569,9 +596,10 @@ def _prove(
 
         check_targets([report], [fmu])
         check_written(report, PAGE)
+        check_replaced([report], force=force)
         with parts() as shown:
             proof = prove_claims(fmu, interface, tolerance, time_limit, key, shown.begin("checking the claims"))
-        write_whole(proof_output(proof, report))
+        write_whole(proof_output(proof, report), force=force)
         print_claims(proof)
         print_end([report], "open it in a browser")
         if failed := proof.with_result("fails"):
@@ -612,7 +640,10 @@ def _prove(
     metavar="RUN",
     help="Run to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a vehicle.",
 )
-def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None) -> None:
+@_force_option()
+def _study(
+    plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None, *, force: bool
+) -> None:
     """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
@@ -623,7 +654,8 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     try:
         from rov_fmu.study.plan.plan import load_plan
         from rov_fmu.study.plan.prepared import vehicle_file
-        from rov_fmu.study.results.page import check_place, page_output
+        from rov_fmu.study.results.page import PAGE as STUDY_PAGE
+        from rov_fmu.study.results.page import page_output
         from rov_fmu.study.results.summary import print_summary
         from rov_fmu.study.run.run_study import run_study
     except ModuleNotFoundError as error:
@@ -634,7 +666,9 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     from rov_fmu.report.progress import StudyParts, parts
 
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
-    check_place(output)
+    motion_file = [output / f"run-{run}.mcap"] if run is not None else []
+    if output.is_dir():
+        check_replaced([output / STUDY_PAGE, *motion_file], force=force)
     vehicle = load_plan(plan).vehicle if run is not None else None
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
@@ -649,14 +683,14 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
         )
     page = page_output(results)
     written = [page]
-    write_whole(page)
+    write_whole(page, force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
         if not results.outputs or (motion := results.trajectories([run])).empty:
             raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
         content = load(vehicle_file("vehicle", vehicle, plan)).to_mcap(motion)
-        written.append(Output(output / f"run-{run}.mcap", content))
-        write_whole(written[-1])
+        written.append(Output(motion_file[0], content))
+        write_whole(written[-1], force=force)
     print_end([one.path for one in written], "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
@@ -685,7 +719,7 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
     help="Vehicle to begin from, in place of the `base` of rov.toml: a vehicle file anywhere, or one that ships.",
     shell_complete=_complete_vehicle,
 )
-@click.option("--force", is_flag=True, help="Replace files that identify did not write, or that have changed since.")
+@_force_option()
 @click.option(
     "--inspect",
     "inspects",
@@ -810,6 +844,7 @@ def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
     help="Table of many wanted points instead, with columns for command, velocity and time constant.",
 )
 @_output_option(metavar="TUNED.toml", help="Vehicle file to write.")
+@_force_option()
 def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     """Find alpha and beta of an axis that give a wanted response."""
     from rov_fmu.identify.findings import sentences

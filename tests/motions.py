@@ -1,6 +1,7 @@
 """Random motions of one axis over the whole range of doubles, and bounds of their rounding errors."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import copysign
 from typing import Any
 
@@ -120,9 +121,8 @@ BOUNDARIES: list[Case] = [
 def step_alone(A: float, B: float, C: float, v0: float, h: float) -> tuple[float, float]:
     """Return the velocity and the distance after h seconds by a step in C of a vehicle that has only this axis."""
     rov = VEHICLES["heave only"]
-    rov = rov.replaced(
-        dict.fromkeys(rov.coefficients, 1.0) | {"a_d_w": A, "b_d_w": B, "a_d_w_reverse": A, "b_d_w_reverse": B}
-    )
+    drag = {"a_d_w": A, "b_d_w": B, "a_d_w_reverse": A, "b_d_w_reverse": B}
+    rov = replace(rov, coefficients=dict.fromkeys(rov.coefficients, 1.0) | drag)
     stepper = Stepper(rov, still(rov) | {"Z_ext": C, "w": v0}, ["w", "z"])
     velocity, distance = stepper.step([0.0] * len(rov.layout.commands), h)[-2:]
     return velocity, distance

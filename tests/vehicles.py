@@ -240,10 +240,15 @@ def with_axes(axes: str) -> Vehicle:
     return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
 
 
+def extended(rov: Vehicle, **values: float) -> Vehicle:
+    """Return a vehicle with other or additional coefficients."""
+    return rov.with_(rov.layout.extended(values), **values)
+
+
 def frictionless(rov: Vehicle) -> Vehicle:
     """Return a vehicle without drag, lift and constant loads."""
     lift = {cross_name(*of) for of in rov.layout.cross if of[0] == "lift"}
-    return rov.replaced({name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
+    return rov.with_(**{name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
 
 
 def a_vehicle(rov: Vehicle) -> Vehicle:

@@ -32,7 +32,7 @@ def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     values = parameter_sets()[parameters]
     rov = load_vehicle(VIDEORAY)
     layout, given = rov.layout, values["rov"]
-    rov = rov.replaced({name: given[name] for name in layout.coefficients})
+    rov = rov.with_(**{name: given[name] for name in layout.coefficients})
     inputs = dict.fromkeys(layout.inputs, 0.0) | {name: given[name] for name in layout.inputs if name in given}
     stepper, state = Stepper(rov, inputs, [*layout.state]), dict.fromkeys(layout.state, 0.0)
     autopilot = Autopilot(instance_name="autopilot")

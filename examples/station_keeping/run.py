@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
+from rov_fmu.io.output import Output, write_whole
 from rov_fmu.report.plots.svg import LIGHT, name_axes, svg_file
 
 from .engines import ENGINES, Trajectory, plain
@@ -36,6 +37,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="where the files of the system go (default: %(default)s)",
     )
     parser.add_argument("--figure", type=Path, metavar="FILE.svg", help="the picture (default: in that folder)")
+    parser.add_argument("--force", action="store_true", help="replace a picture that this command did not write")
     options = parser.parse_args(arguments)
     folder: Path = options.folder
     build_system(folder)
@@ -55,7 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             f"{1000 * hasty['rov.z']:.1f} mm and {degrees(hasty['rov.psi']):.2f} deg"
         )
     figure = options.figure or folder / "station_keeping.svg"
-    draw(drawn, figure)
+    draw(drawn, figure, force=options.force)
     print(f"\n{figure}")
     return 0 if good else 1
 
@@ -85,7 +87,7 @@ def held(result: Trajectory) -> tuple[float, float]:
     return float(depth.max()), degrees(float(heading.max()))
 
 
-def draw(results: Mapping[str, Trajectory], path: Path) -> None:
+def draw(results: Mapping[str, Trajectory], path: Path, *, force: bool) -> None:
     """Depth, heading, track and commands, to an SVG file."""
 
     def drawn(figure: Figure) -> None:
@@ -120,7 +122,8 @@ def draw(results: Mapping[str, Trajectory], path: Path) -> None:
             ax.legend()
         depth.invert_yaxis()
 
-    path.write_text(svg_file(drawn, (8.6, 6.4), salt="station keeping", background=LIGHT["page"]), encoding="utf-8")
+    svg = svg_file(drawn, (8.6, 6.4), salt="station keeping", background=LIGHT["page"])
+    write_whole(Output(path, svg.encode()), force=force)
 
 
 if __name__ == "__main__":

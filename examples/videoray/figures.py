@@ -87,6 +87,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("folder", type=Path, help="where the figures go; it is created if it does not exist")
     parser.add_argument("--format", choices=FORMATS, default="svg", help="default: %(default)s")
     parser.add_argument("--column", choices=COLUMNS, default="single", help="the width; default: %(default)s")
+    parser.add_argument("--force", action="store_true", help="replace files that this command did not write")
     options = parser.parse_args(arguments)
     folder: Path = options.folder
     folder.mkdir(parents=True, exist_ok=True)
@@ -95,7 +96,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         picture = figure.content(options.format, options.column)
         outputs.append(Output(folder / f"{figure.name}.{options.format}", picture))
         outputs.append(Output(folder / f"{figure.name}.txt", f"{figure.caption}\n".encode()))
-    write_whole(*outputs)
+    write_whole(*outputs, force=options.force)
     print(f"Wrote {len(outputs) // 2} figures to {folder}, each with its caption in a text file beside it.")
     return 0
 

@@ -119,13 +119,13 @@ class Log:
     def write(self, path: Path) -> None:
         """Write all complete rows. Raises WriteError, and InputError where foxglove-sdk is not installed."""
         if is_mcap(path):
-            write_whole(Output(path, self._mcap()))
+            write_whole(Output(path, self._mcap()), force=True)
             return
         text, width = StringIO(), len(self._titles)
         print(*self._titles, sep=",", file=text)
         for first in range(0, len(self._rows), width):
             print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
-        write_whole(Output(path, text.getvalue().encode()))
+        write_whole(Output(path, text.getvalue().encode()), force=True)
 
     def _mcap(self) -> bytes:
         """Return all complete rows as the content of an MCAP file."""

@@ -104,7 +104,7 @@ def _write(folder: Path, key: str, content: bytes) -> Path:
     path = folder / _name(key, content)
     if path.is_symlink() or (path.exists() and not is_own_file(path)):
         path.unlink()
-    write_whole(Output(path, content))
+    write_whole(Output(path, content), force=True)
     path.chmod(0o600)  # whatever the umask is
     return path
 

@@ -15,7 +15,7 @@ from rov_fmu.io.messages import listed
 from rov_fmu.vehicle.description import UNIT_OF_RANGE
 from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.uncertainty import significant
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
 _WIDTH = 100
@@ -40,6 +40,9 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         trust = [*made.verdicts, *(f"Unseen data: {error}." for error in made.errors)]
         trust += [f"Open: {warning}." for warning in made.warnings] or ["There are no warnings."]
         holds += [f"Tested: {quantity}." for quantity in made.tested]
+    if tuned := [*_tuned(vehicle)]:
+        data += tuned
+        trust += ["The predictions are those of the vehicle before it was tuned."] if made else []
     if vehicle.data and (off := _off_measured(vehicle)):
         trust[-1] += f" V_ss is up to {max(off):.0%} off what was measured."
     if vehicle.layout.identified:
@@ -55,6 +58,14 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         "How far to trust it": trust,
         "What it leaves out": [*_left_out(vehicle.layout), *vehicle.limits],
     }
+
+
+def _tuned(vehicle: Vehicle) -> Iterator[str]:
+    """Yield a sentence for each set of points to which coefficients were tuned."""
+    sources = {name: source for name, source in vehicle.sources.items() if source.startswith(TUNED)}
+    for source in dict.fromkeys(sources.values()):
+        names = listed(name for name, other in sources.items() if other == source)
+        yield f"{names}: {source[0].lower()}{source[1:]}."
 
 
 def _in_words(known: Range) -> str:

@@ -5,7 +5,7 @@ import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from io import StringIO
+from io import BytesIO, StringIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
@@ -13,8 +13,8 @@ from urllib.parse import unquote, urlsplit
 from lxml import etree
 
 from rov_fmu.io.csv_table import Series, finite, read_series
-from rov_fmu.io.messages import NO_FILE, FileError, shown
-from rov_fmu.io.reading import root_of_xml
+from rov_fmu.io.messages import FileError, shown
+from rov_fmu.io.reading import read_bytes, root_of_xml
 
 NAME = "org.fmi-standard.fmi-ls-ref"
 FOLDER = f"extra/{NAME}"
@@ -89,9 +89,7 @@ class ReferenceResults:
         self._read_series: dict[str, Series] = {}
         """The CSV files by their path, because many experiments may have the same one."""
         try:
-            self._archive = zipfile.ZipFile(fmu)
-        except FileNotFoundError as error:
-            raise FileError(f"{fmu}: {NO_FILE}") from error
+            self._archive = zipfile.ZipFile(BytesIO(read_bytes(fmu)))
         except zipfile.BadZipFile as error:
             raise FileError(f"{fmu}: is not an FMU, or is damaged: {error}") from error
         if MANIFEST not in self._archive.namelist():

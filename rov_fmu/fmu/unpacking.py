@@ -15,6 +15,7 @@ from typing import IO, Any
 from lxml import etree
 
 from rov_fmu.io.messages import FileError, brief, shown
+from rov_fmu.io.reading import open_file
 
 _MOST_UNPACKED = 2_000_000_000
 """The size of all files."""
@@ -72,6 +73,9 @@ def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> Any:
     """
     import fmpy
 
+    if isinstance(archive, Path):
+        with open_file(archive) as file:
+            return unpack_fmu(file, fmu, folder)
     try:
         with zipfile.ZipFile(archive) as zipped:
             if reason := refusal(zipped):

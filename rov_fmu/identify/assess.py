@@ -110,7 +110,7 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
     """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
     if not against or against.layout.gains != table.layout.gains:
         return None
-    values = against.in_layout(table.layout).coefficients
+    values = against.with_(table.layout).coefficients
     if len(values) < len(against.coefficients):
         return None
     return replace(table, base={**table.base, **values}, exact=frozenset(values), shape_deviation=0.0)
@@ -323,7 +323,7 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     """
     known = vehicle.uncertainty
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
-    rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
+    rovs = [vehicle, *(vehicle.with_(**dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
     rests = [NO_SHAPES.motion(rov, axis, 0.0) for rov in rovs]
     found = []
     for command in ANSWERED:

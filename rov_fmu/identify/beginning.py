@@ -300,7 +300,7 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> V
             if not (layout.has_wrench or curve.tables):
                 more[curve.coefficient("d")] = 0.0
     more = {name: base.get(name, value) for name, value in more.items()}
-    return vehicle.extended(more | values)
+    return _with(vehicle.layout, vehicle.coefficients, more | values)
 
 
 def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
@@ -320,7 +320,12 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
             more[curve.name_of("V_0")] = base.get(curve.name_of("V_0"), measured_at)
             more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
     layout = replace(vehicle.layout, voltage=round(mean, 3), voltage_source="Mean voltage of the logs")
-    return Vehicle(layout, vehicle.coefficients).extended(more)
+    return _with(layout, vehicle.coefficients, more)
+
+
+def _with(layout: Layout, coefficients: Mapping[str, float], more: Mapping[str, float]) -> Vehicle:
+    """Return a vehicle with other or additional coefficients. They may be beyond the bounds of a vehicle file."""
+    return Vehicle(layout.extended(more), {**coefficients, **more})
 
 
 def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:

@@ -430,7 +430,7 @@ def _ranges(identification: Identification) -> Iterator[Range]:
             found.setdefault(result.axis.velocity, []).extend(measured)
     ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found.items()}
     if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
-        yield Range(EVERY_COMMAND, 0.0, float(f"{identification.vehicle.command_range[1]:.6g}"))
+        yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
         yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
 
 

@@ -24,6 +24,9 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 """The keys of dead bands."""
+_DIGITS = 6
+"""The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1.
+They are more than any test gives, but few enough to be equal on every machine."""
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 EXACT_BAND = 0.01
@@ -82,7 +85,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
             }
             estimates[name] = Estimated(
                 error=float(errors[n]) * QUANTILE / NORMAL,
-                correlation={k: round(v, 6) for k, v in others.items() if abs(v) > 1e-6},
+                correlation=others,
             )
     validity = given.description.tables.validity
     made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.inputs))
@@ -98,7 +101,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
-    ).in_layout(own)
+    ).with_(own)
     renamed = dict(zip(layout.coefficients, own.coefficients, strict=True))
     return vehicle, {renamed[name]: replace(one, name=renamed[name]) for name, one in coefficients.items()}
 
@@ -119,7 +122,7 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
         for name, quantity in tables.quantities(layout).items()
         if quantity and places[name][0] in ("arm", "curves")
     }
-    vehicle = vehicle.in_layout(layout)
+    vehicle = vehicle.with_(layout)
     numbers = {**dict.fromkeys(kept, UNTUNED), **vehicle.coefficients}
     sources = {**dict.fromkeys(kept, NOT_GIVEN), **vehicle.sources}
     return replace(
@@ -128,6 +131,28 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
         sources=sources | {name: quantity.source for name, quantity in thrust.items()},
         intervals={**vehicle.intervals, **{name: q.interval for name, q in thrust.items() if q.interval}},
         command_range=vehicle.command_range if tables.validity else (0.0, 1.0),
+    )
+
+
+def rounded(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle with meaningful digits. Rounding keeps each value within its interval."""
+
+    def short(value: float) -> float:
+        return float(f"{value:.{_DIGITS}g}")
+
+    low, high = vehicle.command_range
+    return replace(
+        vehicle,
+        coefficients={name: short(value) for name, value in vehicle.coefficients.items()},
+        command_range=(short(low), short(high)),
+        intervals={name: (short(low), short(high)) for name, (low, high) in vehicle.intervals.items()},
+        estimates={
+            name: Estimated(
+                error=short(row.error),
+                correlation={other: r for other, value in row.correlation.items() if (r := round(value, _DIGITS))},
+            )
+            for name, row in vehicle.estimates.items()
+        },
     )
 
 

@@ -14,7 +14,7 @@ from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import beyond_thrusters, told
-from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs
+from rov_fmu.identify.identified_vehicle import identified_vehicle, rounded, with_own_inputs
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Effect, Identification, Prediction, Slip
@@ -73,7 +73,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
-        vehicle=of_file,
+        vehicle=rounded(of_file),
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},

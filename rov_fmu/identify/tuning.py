@@ -67,10 +67,12 @@ def tune(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
     start = _closed_form(vehicle, axis, points)
     kinds = ("alpha", "beta") if any(p.quantity == "Tau" for p in points) else ("alpha",)
     names = [axis.coefficient(kind) for kind in kinds]
-    highest = [log(vehicle.layout.coefficients[name].maximum) for name in names]
+    declared = [vehicle.layout.coefficients[name] for name in names]
+    lowest, largest = [one.minimum for one in declared], [one.maximum for one in declared]
+    highest = [log(most) for most in largest]
 
     def tuned(logs: Array) -> Vehicle:
-        return start.replaced(dict(zip(names, np.exp(logs).tolist(), strict=True)))
+        return start.with_(**dict(zip(names, np.clip(np.exp(logs), lowest, largest).tolist(), strict=True)))
 
     def errors(logs: Array) -> list[float]:
         return [p.by(tuned(logs), axis) / p.value - 1.0 for p in points]
@@ -100,7 +102,7 @@ def _closed_form(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehi
     if not alphas:
         raise TuningError(f"{axis.name}: there is no V_ss, and alpha is tuned to V_ss")
     tuned, beta = _with(vehicle, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
-    plain = tuned.replaced({beta: 1.0})  # Tau is proportional to 1/β
+    plain = tuned.with_(**{beta: 1.0})  # Tau is proportional to 1/β
     betas = [p.by(plain, axis) / p.value for p in points if p.quantity == "Tau"]
     return _with(tuned, beta, betas) if betas else tuned
 
@@ -111,12 +113,12 @@ def _with(vehicle: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
     for value in wanted:
         if not 0.0 < value <= maximum:
             raise TuningError(f"{name} would have to be {value:g}, but it must be above 0 and at most {maximum:g}")
-    return vehicle.replaced({name: float(np.median(wanted))})
+    return vehicle.with_(**{name: float(np.median(wanted))})
 
 
 def _holding(vehicle: Vehicle, axis: Axis, V: float) -> float:
     """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
-    plain, form = vehicle.replaced({axis.coefficient("beta"): 1.0}), vehicle.layout.kinds[axis.name]
+    plain, form = vehicle.with_(**{axis.coefficient("beta"): 1.0}), vehicle.layout.kinds[axis.name]
     return -plain.effective_inertia(form) * plain.held(axis, 0.0).acceleration(V)
 
 

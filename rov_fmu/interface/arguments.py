@@ -93,12 +93,25 @@ def checked_values(
     return arrays
 
 
+def name_at_start(name: str, layout: Layout) -> str:
+    """Return the name of what sets a variable at the start: psi_0 for psi of a vehicle with roll or pitch.
+
+    There, phi, theta and psi follow from the quaternion. Any other name is returned as it is.
+    """
+    return f"{name}_0" if f"{name}_0" in layout.initial else name
+
+
 def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> dict[str, Array]:
     """Return the states, the Euler angles and the delayed commands at the start as arrays, by name.
 
     Raises InputError if one cannot be used, or if the attitude is given both as a quaternion and as angles.
     """
-    states = checked_values("start", given, layout.state | layout.initial | layout.delayed, many=many)
+    renamed: dict[str, Any] = {}
+    for name in _names("start", given):
+        if (at_start := name_at_start(name, layout)) in renamed:
+            raise InputError(f"start[{name!r}]: {at_start} is given, too, which is the same")
+        renamed[at_start] = given[name]
+    states = checked_values("start", renamed, layout.state | layout.initial | layout.delayed, many=many)
     if quaternion := [states[name] for name in QUATERNION if name in states]:
         if angles := states.keys() & layout.initial.keys() - {"psi_0"}:
             raise InputError(

@@ -66,5 +66,5 @@ def identify_folder(
         from rov_fmu.bridges.mcap_logs import identification_mcap
 
         outputs.append(Output(mcap, identification_mcap(identification)))
-    write_whole(*outputs)
+    write_whole(*outputs, force=force)
     return identification, replaced

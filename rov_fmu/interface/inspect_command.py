@@ -69,7 +69,7 @@ def inspect_logs(path: Path) -> Inspected:
         raise DataFileError(f"{path}: {NOT_OPENED}")
     folder = path if path.is_dir() else path.parent
     folder = folder.parent if (folder / BAG).is_file() else folder
-    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).is_file() else NO_ROV_FILE
+    described = read_description(folder / ROV_FILE) if (folder / ROV_FILE).exists() else NO_ROV_FILE
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
     listing = list_files(path) if path.is_dir() else Listing(folder, [path])
     inspections: list[Inspection] = []

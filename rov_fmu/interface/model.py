@@ -40,19 +40,23 @@ if TYPE_CHECKING:
 
     from rov_fmu.build import Built
 
+__all__ = ["Vehicle", "VehicleModel", "load"]
+
 _NONE: Mapping[str, float] = MappingProxyType({})
 
 
-def load(vehicle: str | Path) -> "VehicleModel":
-    """Load a vehicle that ships, by its name, or a vehicle file, by its path. Raises FileError, a ValueError."""
-    if not isinstance(vehicle, str | Path):
+def load(vehicle: str | Path | Vehicle) -> "VehicleModel":
+    """Load a vehicle, as `rov_fmu.load` says."""
+    if not isinstance(vehicle, str | Path | Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be the name of a vehicle that ships, or the path of a file")
-    loaded = load_vehicle(find_vehicle(vehicle))
+    loaded = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(find_vehicle(vehicle))
     return VehicleModel(**{field.name: getattr(loaded, field.name) for field in fields(loaded)})
 
 
 class VehicleModel(Vehicle):
     """A vehicle that can be simulated, changed and built. `rov_fmu.load` returns one.
+
+    To the vehicle itself, `Vehicle`, it adds no data, only functions that need the layers above. Both are equal.
 
     All values are in SI units, angles in rad, and commands are fractions of the full command from -1 to 1
     (pulse widths in µs if the vehicle file says so). The variables are
@@ -82,10 +86,10 @@ class VehicleModel(Vehicle):
         Before the first time the inputs have their usual values.
 
         `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
-        pitch begins at the Euler angles phi_0, theta_0 and psi_0 (rad), which `start` may contain, too. They are 0 by
-        default: level and heading north. Instead of them, `start` may contain the quaternion, and psi_0, which selects
-        the number of full turns of the heading. With a dead time, it may contain the delayed commands, which act at the
-        first time; by default, no command acts yet.
+        pitch begins at the Euler angles phi, theta and psi (rad), which are parameters of the FMU with the names phi_0,
+        theta_0 and psi_0; `start` may contain either name. They are 0 by default: level and heading north. Instead of
+        them, `start` may contain the quaternion, and psi, which selects the number of full turns of the heading. With a
+        dead time, it may contain the delayed commands, which act at the first time; by default, no command acts yet.
 
         `record` names the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the
         outputs of the FMU: states and thrust.
@@ -265,12 +269,21 @@ class VehicleModel(Vehicle):
         interface: str | None = None,
         osp: bool = False,
         sign: Path | None = None,
+        force: bool = False,
     ) -> "Built":
         """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
         from rov_fmu.build import build
 
         return build(
-            self, output, platforms=platforms, backend=backend, fmi=fmi, interface=interface, osp=osp, sign=sign
+            self,
+            output,
+            platforms=platforms,
+            backend=backend,
+            fmi=fmi,
+            interface=interface,
+            osp=osp,
+            sign=sign,
+            force=force,
         )
 
     def _simulated(

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.equation.layout import Layout
-from rov_fmu.interface.arguments import STEP, TIME, result_times
+from rov_fmu.interface.arguments import STEP, TIME, name_at_start, result_times
 from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
-from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
 
 _STOP = 10.0
@@ -25,7 +25,7 @@ _MOST_RESULTS = 1_000_000
 _TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet", ".mcap"), (".png", ".svg", ".pdf")
 
 
-def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]) -> None:
+def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path], *, force: bool = False) -> None:
     """Check the paths of the table and of the plot before the simulation.
 
     Raises InputError if the suffix of a path is not that of a known format, and WriteError if it cannot be written.
@@ -35,7 +35,9 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
             last = "; put --plot without a file after VEHICLE" if option == "--plot" and not path.suffix else ""
             endings = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
             raise InputError(f"{option} {path}: the name must end with {endings}{last}")
-    check_targets(filter(None, (output, plot)), inputs)
+    targets = [path for path in (output, plot) if path]
+    check_targets(targets, inputs)
+    check_replaced(targets, force=force)
 
 
 def run(
@@ -100,7 +102,8 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     names = [*layout.kinds, *variables]
     values: dict[str, float] = {}
     for text in settings:
-        name, _, value = (part.strip() for part in text.partition("="))
+        given, _, value = (part.strip() for part in text.partition("="))
+        name = name_at_start(given, layout)
         if name not in names and name in layout.calculated:
             raise InputError(f"--set {text}: {name} is an output, which cannot be set")
         if name not in names:
@@ -139,7 +142,9 @@ def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None)
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
 
 
-def write_results(vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str) -> None:
+def write_results(
+    vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str, *, force: bool = False
+) -> None:
     """Write a result as a table or as MCAP, and as a plot, if there are paths. Raises InputError, WriteError."""
     outputs = []
     if table and is_mcap(table):
@@ -148,7 +153,7 @@ def write_results(vehicle: VehicleModel, result: Result, table: Path | None, plo
         outputs.append(_table_output(result, table))
     if plot:
         outputs.append(_plot_output(result, plot, title))
-    write_whole(*outputs)
+    write_whole(*outputs, force=force)
 
 
 def _table_output(result: Result, path: Path) -> Output:

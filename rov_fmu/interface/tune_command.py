@@ -10,9 +10,9 @@ from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tun
 from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
-from rov_fmu.io.output import check_targets
+from rov_fmu.io.output import check_replaced, check_targets, is_same
 from rov_fmu.tank.columns import columns_of, refuse_slips
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
 
 
@@ -24,6 +24,8 @@ def tune_vehicle(
     Tau: float | None,
     points: Path | None,
     output: Path | None,
+    *,
+    force: bool = False,
 ) -> Tuning:
     """Tune an axis as the options say, and write the tuned vehicle if there is a path for it.
 
@@ -39,6 +41,7 @@ def tune_vehicle(
     if output:
         check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)
+        check_replaced([output], force=force or is_same(path, output))
     if points is not None:
         wanted = read_points(points, vehicle, axis)
     elif command is None or V_ss is None:
@@ -50,16 +53,15 @@ def tune_vehicle(
     except TuningError as error:
         raise InputError(f"tune: {f'{points}: ' if points else ''}{error}") from error
     if output:
-        write_tuned(
-            path, output, {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}, source(wanted)
-        )
+        values = {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}
+        write_tuned(path, output, values, source(wanted), force=force)
     return tuning
 
 
 def source(wanted: Sequence[Target]) -> str:
     """Return the source of coefficients that are tuned to some points."""
     points = ", ".join(f"{p.quantity} = {p.value:g} at {p.command:.0%}" for p in wanted[:2])
-    return f"Tuned to {points}{', ...' if len(wanted) > 2 else ''}"
+    return f"{TUNED} {points}{', ...' if len(wanted) > 2 else ''}"
 
 
 def read_points(path: Path, vehicle: Vehicle, axis: Axis) -> list[Target]:

@@ -6,14 +6,16 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from platformdirs import user_state_path
+
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.reading import read_text
+from rov_fmu.io.reading import hash_of, open_file, read_text
 
 
 class WriteError(OSError):
@@ -63,19 +65,22 @@ def _check_folder(path: Path) -> None:
         raise WriteError(error.errno, reason, str(path)) from error
 
 
-def write_whole(*outputs: Output) -> None:
+def write_whole(*outputs: Output, force: bool = False, is_ours: Callable[[Path], bool] = lambda _: False) -> None:
     """Write all files, once their drafts have passed the checks, or none of them.
 
-    Existing files are replaced. If a path is a link, the link is replaced and its target stays. Raises WriteError about
-    a path that cannot be written, and whatever a check raises.
+    Existing files are replaced by the rule of `check_replaced`. If a path is a link, the link is replaced and its
+    target stays. Raises WriteError about a path that cannot be written, and whatever a check raises.
     """
-    check_targets(output.path for output in outputs)
+    paths = [output.path for output in outputs]
+    check_targets(paths)
+    check_replaced(paths, force=force, is_ours=is_ours)
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
         with UNINTERRUPTED:
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
+            _note(outputs)
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:
@@ -114,43 +119,89 @@ def _errors_about(path: Path) -> Iterator[None]:
         raise WriteError(error.errno, error.strerror, str(path)) from error
 
 
-# ---- A digest in the first line shows whether anybody has changed a file since ---------------------------------------
+# ---- Whose file it is ------------------------------------------------------------------------------------------------
+#
+# A file may be replaced if this program wrote it and nobody has changed it since. A list in the user's folder has the
+# digests of what was written, which does for every format. Some files prove it themselves, on any machine: those with a
+# digest in their first line, and FMUs, which have the digests of their parts.
 
-_WORDS = "rov-fmu identify wrote this file. SHA-256 of the lines below:"
-_SEAL = re.compile(rf"(?:#|<!--) {re.escape(_WORDS)} ([0-9a-f]{{64}})(?: -->)?")
+_SEAL = re.compile(r"(?:#|<!--) rov-fmu \w+ wrote this file\. SHA-256 of the lines below: ([0-9a-f]{64})(?: -->)?")
+_LARGEST_LIST = 4_000_000
+"""The largest list of digests, in bytes. Beyond it, the older half is forgotten."""
 
 
-def sealed(text: str, comment: str) -> str:
+def sealed(text: str, comment: str, command: str) -> str:
     """Return the text with a first line that has its digest. `comment` is how this kind of file writes one: `# {}`."""
-    return f"{comment.format(f'{_WORDS} {_digest(text)}')}\n{text}"
+    words = f"rov-fmu {command} wrote this file. SHA-256 of the lines below: {_digest(text)}"
+    return f"{comment.format(words)}\n{text}"
 
 
-def check_replaced(paths: Iterable[Path], *, force: bool) -> list[str]:
+def without_seal(text: str) -> str:
+    """Return the text without the first line that `sealed` adds, because it is about to be changed."""
+    first, _, rest = text.partition("\n")
+    return rest if _SEAL.fullmatch(first) else text
+
+
+def check_replaced(
+    targets: Iterable[Path], *, force: bool, is_ours: Callable[[Path], bool] = lambda _: False
+) -> list[str]:
     """Return a line for each existing file that will be replaced.
 
-    Raises WriteError about the first file that `identify` did not write, or that has changed since, unless `force`.
+    Raises WriteError about the first file that this program did not write, or that has changed since, unless `force`.
+    `is_ours` tells whether a file proves itself that it is as it was written. Of a link, only the link is replaced.
     """
     lines = []
-    for path in paths:
-        if not path.exists():
+    for path in targets:
+        if not path.exists() or path.is_symlink():
             continue
-        if (reason := _not_as_written(path)) and not force:
-            raise WriteError(errno.EEXIST, f"the file there {reason}; --force replaces it", str(path))
-        replaced = f"a file that {reason}" if reason else "the result of an earlier run"
-        lines.append(f"{path}: replaced {replaced}")
+        foreign = "" if (reason := _foreign(path)) and is_ours(path) else reason
+        if foreign and not force:
+            raise WriteError(errno.EEXIST, f"the file there {foreign}; --force replaces it", str(path))
+        lines.append(f"{path}: replaced {f'a file that {foreign}' if foreign else 'the result of an earlier run'}")
     return lines
 
 
-def _not_as_written(path: Path) -> str:
-    """Return why a file is not as `identify` wrote it, or an empty text if it is."""
+def _foreign(path: Path) -> str:
+    """Return why a file may be the work of somebody else, or an empty text if it is as this program wrote it."""
     try:
-        first, _, rest = read_text(path).partition("\n")
-    except FileError:
-        first = rest = ""
-    seal = _SEAL.fullmatch(first)
-    if not seal:
-        return "does not begin with a digest by identify, so it may have been made by hand"
-    return "" if seal[1] == _digest(rest) else "has changed since identify wrote it"
+        with open_file(path) as file:
+            digest = hash_of(file, "sha256").hex()
+            if digest in _written():
+                return ""
+            file.seek(0)
+            seal = _SEAL.match(file.readline(300).decode(errors="replace").removeprefix("\ufeff"))
+        if not seal:
+            return "is not as rov-fmu wrote it: it may have been made or changed by hand"
+        return "" if seal[1] == _digest(read_text(path).partition("\n")[2]) else "has changed since rov-fmu wrote it"
+    except FileError as error:
+        return str(error).removeprefix(f"{path}: ")
+
+
+def _list() -> Path:
+    """Return the path of the list of digests, one in each line."""
+    return user_state_path("rov-fmu", appauthor=False) / "written"
+
+
+def _written() -> str:
+    """Return the list of digests, which is empty where there is none."""
+    with suppress(FileError, RuntimeError):  # RuntimeError: the user has no folder
+        return read_text(_list())
+    return ""
+
+
+def _note(outputs: Iterable[Output]) -> None:
+    """Add the digests of files to the list. Without a folder for it, the next command asks for --force."""
+    with suppress(OSError, RuntimeError):
+        path = _list()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        lines = "".join(f"{hashlib.sha256(output.content).hexdigest()}\n" for output in outputs)
+        if path.exists() and path.stat().st_size > _LARGEST_LIST:
+            old = _written()
+            shorter = path.with_name(f"{path.name}-{os.getpid()}")
+            shorter.write_text(old[old.index("\n", len(old) // 2) + 1 :], encoding="utf-8")
+            shorter.replace(path)
+        with path.open("a", encoding="utf-8") as file:
+            file.write(lines)
 
 
 def _digest(text: str) -> str:

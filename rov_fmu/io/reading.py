@@ -1,11 +1,18 @@
-"""Reading and hashing whole files; if one cannot be read, the error names it and says why."""
+"""Opening, reading and hashing files; if one cannot be read, the error names it and says why."""
 
+import errno
 import hashlib
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
 from rov_fmu.io.messages import NO_FILE, FileError
 
+MOST_BYTES = 1_000_000_000
+"""The largest file that is read as a whole, in bytes, where nothing else is said."""
 _PIECE = 2**20
 """The number of bytes that are hashed at a time: a file may be larger than the memory."""
 
@@ -18,26 +25,59 @@ def hash_of(file: IO[bytes], kind: str) -> bytes:
     return digest.digest()
 
 
-def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> bytes:
-    """Return the content of a file. Raises `kind` if it cannot be read, or has more bytes than `most`."""
+@contextmanager
+def open_file(path: Path, kind: type[FileError] = FileError) -> Iterator[IO[bytes]]:
+    """Open a file to read bytes. Raises `kind` if it cannot be opened or read, or is a device or a pipe.
+
+    A stranger's folder may have a link to a device, which never ends, or a pipe, which would wait for a writer. Every
+    file that a user names is opened here.
+    """
     try:
-        if most is not None and (size := path.stat().st_size) > most:
-            raise kind(f"{path}: is too large, with {size / 1e6:.0f} MB: at most {most / 1e6:.0f} MB are read")
-        return path.read_bytes()
+        with open(path, "rb", opener=_without_waiting) as file:
+            yield file
     except FileNotFoundError as error:
         raise kind(f"{path}: {NO_FILE}") from error
-    except OSError as error:
-        raise kind(f"{path}: cannot be read: {error.strerror or error}") from error
+    except (OSError, ValueError) as error:
+        if isinstance(error, ValueError) and "null byte" not in str(error):  # a name from a file may have a NUL
+            raise
+        raise kind(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from error
 
 
-def read_text(path: Path, kind: type[FileError] = FileError, *, most: int | None = None) -> str:
+def _without_waiting(path: str, flags: int) -> int:
+    """Open a file, and not a device or a pipe, for which the caller could wait. Raises OSError."""
+    descriptor = os.open(path, flags | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+    mode = os.fstat(descriptor).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(descriptor)
+        if stat.S_ISDIR(mode):
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), path)
+        raise OSError(errno.EINVAL, "is a device or a pipe, and must be a file", path)
+    return descriptor
+
+
+def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = MOST_BYTES) -> bytes:
+    """Return the content of a file. Raises `kind` if it cannot be read, or has more bytes than `most`."""
+    with open_file(path, kind) as file:
+        size = os.fstat(file.fileno()).st_size
+        if size > most:
+            raise kind(f"{path}: is too large, with {size / 1e6:.0f} MB: at most {most / 1e6:.0f} MB are read")
+        content = file.read(size + 1)
+        if len(content) > size:
+            raise kind(f"{path}: cannot be read: it has more bytes than its size, {size}")
+        return content
+
+
+def read_text(path: Path, kind: type[FileError] = FileError, *, most: int = MOST_BYTES) -> str:
     """Return the text of a file in UTF-8 with \\n as line end and without a byte order mark. Raises `kind`."""
-    content = read_bytes(path, kind, most=most)
+    return text_of(path, read_bytes(path, kind, most=most), kind).replace("\r\n", "\n").replace("\r", "\n")
+
+
+def text_of(path: Path, content: bytes, kind: type[FileError] = FileError) -> str:
+    """Return the content of a file as text, with its line ends, without a byte order mark. Raises `kind`."""
     try:
-        text = content.decode("utf-8-sig")
+        return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise kind(f"{path}: not UTF-8 text, at byte {error.start}") from error
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def root_of_xml(content: bytes) -> Any:

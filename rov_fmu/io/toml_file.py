@@ -14,7 +14,7 @@ from pydantic_core import ErrorDetails
 
 from rov_fmu.io.file_kinds import check_keys
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
-from rov_fmu.io.reading import read_text
+from rov_fmu.io.reading import read_bytes, text_of
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -50,8 +50,12 @@ def table_of(
     return create_model(name, __base__=base, __doc__=words, __cls_kwargs__=settings, **fields)
 
 
-_LARGEST = 20_000_000
-"""The largest TOML file that is read, in bytes."""
+LARGEST = 2_000_000
+"""The largest TOML file that is read, in bytes. All correlations of 200 coefficients take less."""
+_DEEPEST = 20
+"""The most parts of a dotted key. The time and the memory of the parsers grow with their square."""
+_MOST_SIGNS = 200_000
+"""The most keys, parts of keys and values, for which the parsers take up to 1 kB each."""
 Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
 _Place = tuple[int | str, ...]
@@ -71,7 +75,46 @@ def read_checked(path: Path, kind: str, model: type[Checked], failure: type[File
 
 def read_toml(path: Path, failure: type[FileError]) -> Toml:
     """Read any TOML file. Raises `failure`."""
-    text = read_text(path, failure, most=_LARGEST)
+    return parse_toml(path, read_bytes(path, failure, most=LARGEST), failure)
+
+
+def toml_text(path: Path, content: bytes, failure: type[FileError]) -> str:
+    """Return the content of a TOML file as text that a parser may be given. Raises `failure` if it would exhaust one.
+
+    A stranger may have written the file.
+    """
+    text = text_of(path, content, failure).replace("\r\n", "\n").replace("\r", "\n")
+    outside = '""'.join(_outside_strings(text))
+    for key in re.finditer(r"[^=,\[\]{}\n]+", outside):
+        if (parts := key[0].count(".") + 1) > _DEEPEST:
+            raise failure(f"{path}: {brief(key[0].strip(), 40)}: has {parts} parts: a key has at most {_DEEPEST}")
+    if (signs := len(re.findall(r"[=,.\[{]", outside))) > _MOST_SIGNS:
+        raise failure(f"{path}: has {signs} keys, dots and values: at most {_MOST_SIGNS} are read")
+    return text
+
+
+_STRING = re.compile("\"\"\"|'''|[\"'#]")
+_ENDS = {
+    start: re.compile(end, re.DOTALL)
+    for start, end in {'"""': r'\\.|"{3,5}', "'''": "'{3,5}", '"': r'\\.|["\n]', "'": "['\n]", "#": "\n"}.items()
+}
+"""What ends a string or a comment, by what begins it, or an escaped character in it."""
+
+
+def _outside_strings(text: str) -> Iterator[str]:
+    """Yield the parts of a TOML file between its strings and comments."""
+    place = 0
+    while start := _STRING.search(text, place):
+        yield text[place : start.start()]
+        ends = _ENDS[start[0]].finditer(text, start.end())
+        end = next((one for one in ends if not one[0].startswith("\\")), None)
+        place = len(text) if end is None else end.end() - (end[0] == "\n")
+    yield text[place:]
+
+
+def parse_toml(path: Path, content: bytes, failure: type[FileError]) -> Toml:
+    """Return the content of a TOML file, which was read from a path. Raises `failure`."""
+    text = toml_text(path, content, failure)
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:

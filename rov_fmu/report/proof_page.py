@@ -14,7 +14,7 @@ from markupsafe import Markup
 from rov_fmu import __version__
 from rov_fmu.fmu.claims.claims import Claim, Proof
 from rov_fmu.fmu.claims.measures import Evidence
-from rov_fmu.io.output import Output
+from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.console import shell_words
 from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
@@ -34,7 +34,7 @@ _POWER = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+")
 
 def proof_output(proof: Proof, path: Path) -> Output:
     """Return the file of the page about an FMU's evidence."""
-    return Output(path, proof_page(proof).encode())
+    return Output(path, sealed(proof_page(proof), "<!-- {} -->", "prove").encode())
 
 
 def proof_page(proof: Proof, *, made: date | None = None) -> str:

@@ -34,7 +34,7 @@ _BROAD = 7.2
 
 def report_output(results: Identification, path: Path, on_progress: Progress = silent) -> Output:
     """Return the file of the report of an identification."""
-    return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->").encode())
+    return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->", "identify").encode())
 
 
 def today() -> date:

@@ -402,7 +402,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
-        base_quantities=_quantities(base.in_layout(layout)) if base else {},
+        base_quantities=_quantities(base.with_(layout)) if base else {},
         requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=file.validity.limits if file.validity else base.limits if base else (),

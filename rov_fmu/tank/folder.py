@@ -22,7 +22,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
-from rov_fmu.io.reading import hash_of
+from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
@@ -401,8 +401,5 @@ def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
 
 def file_hash(path: Path, kind: str = "sha3_256") -> str:
     """Return the hash of a file, of a kind that hashlib has. Raises DataFileError."""
-    try:
-        with path.open("rb") as file:
-            return hash_of(file, kind).hex()
-    except OSError as error:
-        raise DataFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    with open_file(path, DataFileError) as file:
+        return hash_of(file, kind).hex()

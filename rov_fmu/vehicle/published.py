@@ -103,7 +103,7 @@ STEP_TESTS = (
 
 def untuned(vehicle: Vehicle) -> Vehicle:
     """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
-    return vehicle.replaced(dict.fromkeys(vehicle.layout.tuning, 1.0))
+    return vehicle.with_(**dict.fromkeys(vehicle.layout.tuning, 1.0))
 
 
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:

@@ -22,7 +22,8 @@ from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
 from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, one_line, shown
-from rov_fmu.io.toml_file import key_line, problem_lines, read_toml
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.toml_file import LARGEST, key_line, parse_toml, problem_lines
 from rov_fmu.vehicle.checks import check_parts, no_thrust
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 BY_HAND = "set by hand"
 """The source of a coefficient that was set by `Vehicle.with_`."""
+TUNED = "Tuned to"
+"""How the source of a coefficient begins that `rov-fmu tune` set."""
 
 
 class VehicleFileError(FileError):
@@ -67,12 +70,23 @@ _thrust_of = cache(
 )
 
 
-@dataclass(frozen=True, repr=False)
+@dataclass(frozen=True)
+class VehicleFile:
+    """The file that a vehicle was read from."""
+
+    path: Path
+    content: bytes
+    vehicle: "Vehicle" = field(repr=False)
+    """The vehicle that the content describes."""
+
+
+@dataclass(frozen=True, repr=False, eq=False)
 class Vehicle:
-    """A vehicle: its layout, its coefficients, where these come from, and its motion.
+    """A vehicle: its layout, its coefficients, where these come from, its file, and its motion.
 
     `vehicle["a_d_u"]` is a coefficient, and `vehicle.layout` has the axes, curves, thrusters and variables. A vehicle
-    that is not from a file, `Vehicle(layout, coefficients)`, needs no texts and no sources.
+    that is not from a file, `Vehicle(layout, coefficients)`, needs no texts and no sources. `with_` gives a changed
+    vehicle. Two vehicles are equal if everything that their files would say is equal; a subclass adds only functions.
     """
 
     layout: Layout
@@ -104,8 +118,8 @@ class Vehicle:
     provenance: Provenance | None = None
     measured_from: str = field(default="measurements", compare=False)
     """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
-    path: Path | None = field(default=None, compare=False)
-    """The vehicle file that was read. Coefficients may have changed since."""
+    file: VehicleFile | None = field(default=None, compare=False)
+    """The file that was read. The vehicle may have changed since."""
 
     def __getitem__(self, name: str) -> float:
         """Return a coefficient."""
@@ -115,19 +129,45 @@ class Vehicle:
         """Return what a copy has: the fields, without the compiled formulas."""
         return {one.name: getattr(self, one.name) for one in fields(self)}
 
-    def replaced(self, values: Values) -> Self:
-        """Return the vehicle with other values of some coefficients, without checking the values. It is cheap."""
-        return replace(self, coefficients={**self.coefficients, **values})
+    def __eq__(self, other: object) -> bool:
+        """Return True if the other vehicle has the same layout, numbers and texts. Their files may differ."""
+        compared = (one.name for one in fields(Vehicle) if one.compare)
+        return isinstance(other, Vehicle) and all(getattr(self, name) == getattr(other, name) for name in compared)
 
-    def extended(self, values: Values) -> Self:
-        """Return the vehicle with other or additional coefficients."""
-        return replace(self, layout=self.layout.extended(values), coefficients={**self.coefficients, **values})
+    __hash__ = None  # type: ignore[assignment]  # it has mappings, whose order does not matter
 
-    def in_layout(self, layout: Layout) -> Self:
-        """Return the vehicle with another layout, and with those of its coefficients that this layout has too.
+    @property
+    def file_content(self) -> bytes | None:
+        """The content of the file that was read, if the vehicle is still the one that it describes."""
+        return self.file.content if self.file and self.file.vehicle == self else None
 
-        A coefficient may have another name there: its tables and its key in the vehicle file tell which one it is.
+    def with_(self, layout: Layout | None = None, /, **coefficients: float) -> Self:
+        """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
+
+        Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
+        intervals. `vehicle.layout.coefficients` has the names, units and bounds.
+
+        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too. A
+        coefficient may have another name there: its place in the vehicle file tells which one it is.
+
+        Raises InputError if the vehicle has no such coefficient, or cannot have the value.
         """
+        vehicle = self._in_layout(layout) if layout else self
+        values = {name: _number(name, value) for name, value in coefficients.items()}
+        check_coefficients(vehicle.layout, values)
+        changed = {**vehicle.coefficients, **values}
+        if values and (mistake := next(_contradictions(vehicle.layout, changed), None)):
+            raise InputError(mistake)
+        return replace(
+            vehicle,
+            coefficients=changed,
+            sources={**vehicle.sources, **dict.fromkeys(values, BY_HAND)},
+            intervals={name: interval for name, interval in vehicle.intervals.items() if name not in values},
+            estimates=some_estimates(vehicle.estimates, vehicle.coefficients.keys() - values.keys()),
+        )
+
+    def _in_layout(self, layout: Layout) -> Self:
+        """Return the vehicle with another layout, and with those of its coefficients that this layout has, too."""
         there = {keys: name for name, keys in layout.keys_in_file.items()}
         names = {name: there[keys] for name, keys in self.layout.keys_in_file.items() if keys in there}
 
@@ -151,25 +191,6 @@ class Vehicle:
         axes, inputs = ", ".join(self.layout.kinds), ", ".join(self.layout.commands)
         title = f"{type(self).__name__} {self.identifier}: {self.name}"
         return f"<{title}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
-
-    def with_(self, **coefficients: float) -> Self:
-        """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
-
-        Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
-        intervals. `vehicle.layout.coefficients` has the names, units and bounds.
-
-        Raises InputError if the vehicle has no such coefficient, or cannot have the value.
-        """
-        values = {name: _number(name, value) for name, value in coefficients.items()}
-        check_coefficients(self.layout, values)
-        if mistake := next(_contradictions(self.layout, {**self.coefficients, **values}), None):
-            raise InputError(mistake)
-        return replace(
-            self.replaced(values),
-            sources={**self.sources, **dict.fromkeys(values, BY_HAND)},
-            intervals={name: interval for name, interval in self.intervals.items() if name not in values},
-            estimates=some_estimates(self.estimates, self.coefficients.keys() - values.keys()),
-        )
 
     @property
     def summary(self) -> str:
@@ -386,7 +407,8 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     `coming` is the path of a report that is about to be written, so it need not exist yet.
     """
     path = Path(path)
-    data = read_toml(path, VehicleFileError)
+    content = read_bytes(path, VehicleFileError, most=LARGEST)
+    data = parse_toml(path, content, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
     if "format" not in data:
         raise VehicleFileError(f"{path}: format: this key is missing: write format = {FORMAT}")
@@ -406,7 +428,7 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         raise VehicleFileError(*lines_on(path, mistakes))
     for doubt in doubts(layout, coefficients):
         warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
-    return Vehicle(
+    vehicle = Vehicle(
         layout,
         coefficients,
         **dict(head),
@@ -417,5 +439,5 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
         intervals={name: q.interval for name, q in quantities.items() if q and q.interval},
         estimates=file.estimates,
         provenance=file.provenance,
-        path=path,
     )
+    return replace(vehicle, file=VehicleFile(path, content, vehicle))

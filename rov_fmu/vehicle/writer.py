@@ -1,5 +1,6 @@
 """Writing vehicle files (TOML), completely or not at all."""
 
+import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -11,25 +12,22 @@ from tomlkit.items import InlineTable
 
 from rov_fmu.equation.layout import EVERY_COMMAND, Curve, Layout
 from rov_fmu.io.messages import brief, shown
-from rov_fmu.io.output import Output, sealed, write_whole
+from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
-from rov_fmu.io.reading import read_text
-from rov_fmu.io.toml_file import key_line
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.toml_file import LARGEST, key_line, toml_text
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
-_DECIMALS = 6
-"""The number of decimals of a correlation. It is large because a correlation may be very close to 1."""
-_DIGITS = 6
-"""The significant digits of a number: more than any tank test gives, but few enough to be equal on every machine."""
 _DEPTHS = {"curves": 2, "axes": 2, "alternatives": 2, "provenance": 2, "validity": 2}
 """How deep the tables in some tables of a file are written with headings; in the others, one deep. Those inside are
 written in one line."""
 
 
 def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
-    """Return the text of a vehicle file in a folder.
+    """Return the text of a vehicle file in a folder. Its numbers have all digits: they are read back to the last bit.
 
     Raises ValueError if a file or folder of the vehicle is outside the folder, so that the vehicle file cannot name it.
     """
@@ -42,13 +40,13 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         if table:
             document[name] = _item(table, folder, _DEPTHS.get(name, 1))
     text: str = tomlkit.dumps(document)
-    return sealed(text, "# {}") if made else text
+    return sealed(text, "# {}", "identify") if made else text
 
 
 def _tables(vehicle: Vehicle) -> dict[str, Any]:
     """Return the tables of the file. Those that the vehicle does not have are empty."""
     layout, made = vehicle.layout, vehicle.provenance
-    low, high = map(_rounded, vehicle.command_range)
+    low, high = vehicle.command_range
     voltage = {"value": layout.voltage, "unit": "V", "source": layout.voltage_source}
     tables: dict[str, Any] = {
         "vehicle": {key: getattr(vehicle, key) for key in FileHead.model_fields},
@@ -140,20 +138,25 @@ def check_report(path: Path, report: Path) -> None:
         raise VehicleFileError(f"{report}: must be inside the folder of {path}, which names it") from error
 
 
-def write_vehicle(vehicle: Vehicle, path: Path) -> None:
-    """Write the vehicle file. Raises VehicleFileError if it could not be read again, or OSError."""
-    write_whole(vehicle_output(vehicle, path))
+def write_vehicle(vehicle: Vehicle, path: Path, *, force: bool = False) -> None:
+    """Write the vehicle file. Raises VehicleFileError if it could not be read again, or OSError.
+
+    `force` allows replacing a file that this program did not write, or that has changed since.
+    """
+    write_whole(vehicle_output(vehicle, path), force=force)
 
 
-def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str) -> None:
+def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str, *, force: bool = False) -> None:
     """Write a copy of the vehicle file `source` with other values of some coefficients.
 
-    `reason` becomes the source of the coefficients that change. Everything else in the file stays as it is. Raises
-    VehicleFileError or OSError, as write_vehicle does.
+    `reason` becomes the source of the coefficients that change. A new file is a vehicle of its own: its name, its
+    identifier and so its FMU have other names than those of `source`. Everything else stays as it is. `source` itself
+    may be replaced, and `force` allows replacing others that this program did not write. Raises VehicleFileError or
+    OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
-    for name, exact in values.items():
-        if (value := _rounded(exact)) == _rounded(vehicle[name]):
+    for name, value in values.items():
+        if value == vehicle[name]:
             continue
         *above, key = vehicle.layout.keys_in_file[name]
         table = _table_at(document, above)
@@ -164,7 +167,23 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
             unit = vehicle.layout.coefficients[name].unit
             table[key] = _inline_table({"value": value, "unit": unit, "source": reason})
         _remove_estimate(document, name)
-    write_whole(_moved(document, source, path))
+    in_place = is_same(source, path)
+    if not in_place:
+        document["vehicle"]["identifier"] = _own_identifier(path.stem, vehicle)
+        stem = "".join(c if c.isprintable() else "_" for c in path.stem)
+        document["vehicle"]["name"] = f"{vehicle.name.partition(_TUNED_AS)[0][:50]}{_TUNED_AS}{stem[:30]}"
+    write_whole(_moved(document, source, path), force=force or in_place)
+
+
+_TUNED_AS = ", tuned: "
+"""What stands between the name of a vehicle and that of the file with a tuned copy."""
+
+
+def _own_identifier(stem: str, vehicle: Vehicle) -> str:
+    """Return an identifier for a copy of a vehicle from the name of its file, which no vehicle has that ships."""
+    identifier = re.sub(r"\W|^(?=\d)", "_", stem, flags=re.ASCII)[:90]
+    taken = {name.lower() for name in (vehicle.identifier, *SHIPPED)}
+    return f"{identifier}_tuned" if identifier.lower() in taken else identifier
 
 
 def _remove_estimate(document: Any, name: str) -> None:
@@ -182,8 +201,9 @@ def _remove_estimate(document: Any, name: str) -> None:
 def _read_document(source: Path) -> Any:
     """Read a vehicle file with its comments, in order to change it. Raises VehicleFileError."""
     try:
-        document: Any = tomlkit.parse(read_text(source, VehicleFileError))
-    except TOMLKitError as error:
+        content = read_bytes(source, VehicleFileError, most=LARGEST)
+        document: Any = tomlkit.parse(without_seal(toml_text(source, content, VehicleFileError)))
+    except (TOMLKitError, RecursionError) as error:
         raise VehicleFileError(f"{source}: cannot be written again as it is: {brief(str(error))}") from error
     if "vehicle" not in document:
         raise VehicleFileError(f"{source}: cannot be read a second time, as it must be to write it anew")
@@ -239,16 +259,14 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
 
 
 def _quantity(vehicle: Vehicle, name: str) -> dict[str, Any]:
-    """Return the table of a coefficient, with rounded numbers. Rounding keeps the value within its interval."""
+    """Return the table of a coefficient."""
     interval, unit = vehicle.intervals.get(name, ()), vehicle.layout.coefficients[name].unit
-    ends = tuple(map(_rounded, interval))
-    return {"value": _rounded(vehicle[name]), "unit": unit, "interval": ends, "source": vehicle.sources[name]}
+    return {"value": vehicle[name], "unit": unit, "interval": interval, "source": vehicle.sources[name]}
 
 
 def _estimated(row: Estimated) -> dict[str, Any]:
-    """Return the table of a standard error and those correlations that are not rounded to 0."""
-    rounded = {name: round(value, _DECIMALS) for name, value in row.correlation.items()}
-    return {"error": _rounded(row.error), "correlation": {name: r for name, r in rounded.items() if r} or None}
+    """Return the table of a standard error and of the correlations."""
+    return {"error": row.error, "correlation": row.correlation or None}
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
@@ -256,8 +274,3 @@ def _inline_table(entries: Mapping[str, Any]) -> InlineTable:
     table = tomlkit.inline_table()
     table |= dict(entries)
     return cast(InlineTable, tomlkit.value(f"{{ {table.as_string()[1:-1]} }}"))
-
-
-def _rounded(value: float) -> float:
-    """Return a number rounded to _DIGITS significant digits."""
-    return float(f"{value:.{_DIGITS}g}")

@@ -102,7 +102,7 @@ def test_the_coefficients_may_be_symbols() -> None:
     x, forces = np.stack([*states.values()])[:, 0], arrays.forces(rov, inputs, {})[:, 0]
     drag = casadi.SX.sym("a_d_u")
     function = casadi.Function("rates", [drag], [arrays.rates(rov, x, forces, {"a_d_u": drag})])
-    expected = arrays.rates(rov.replaced({"a_d_u": 77.0}), x, forces, {})
+    expected = arrays.rates(rov.with_(a_d_u=77.0), x, forces, {})
     assert np.allclose(np.asarray(function(77.0))[:, 0], expected, rtol=1e-14, atol=1e-14)
 
 

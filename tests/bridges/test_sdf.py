@@ -27,7 +27,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, pulsed
+from tests.vehicles import VEHICLES, extended, pulsed
 from verification.references.rigid_body import coriolis, quaternion_of, rigid_body_mass, rotation, skew
 
 Array = NDArray[np.float64]
@@ -297,7 +297,7 @@ def fly(vehicle: Vehicle, state: dict[str, float], pieces: int, seed: int) -> tu
 
 def tuned(name: str, **coefficients: float) -> Vehicle:
     vehicle = LOADED[name]
-    return vehicle.extended(coefficients)
+    return extended(vehicle, **coefficients)
 
 
 def with_cross(vehicle: Vehicle, **coefficients: float) -> Vehicle:

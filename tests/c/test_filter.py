@@ -16,7 +16,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axis_alone
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import VIDEORAY
+from tests.vehicles import VIDEORAY, extended
 from verification.references.kalman import Belief, Sample, run
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ ERRORS = {"w": 0.1, "z": 0.02, "F_t": 0.05}
 
 def heave(**more: float) -> Vehicle:
     """Return the heave of the VideoRay alone, with other or more coefficients."""
-    k = VIDEORAY.extended(more)
+    k = extended(VIDEORAY, **more)
     layout = with_axis_alone(k.layout, HEAVE)
     return Vehicle(layout, {name: k[name] for name in layout.coefficients})
 

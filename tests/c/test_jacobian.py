@@ -80,7 +80,7 @@ def _of(rov: Vehicle, values: Values) -> tuple[Vehicle, Values, Values]:
     """Return a vehicle with coefficients of these values, its inputs and its states."""
     parts = (rov.coefficients, rov.layout.inputs, rov.layout.state)
     coefficients, inputs, state = ({name: values[name] for name in part} for part in parts)
-    return rov.replaced(coefficients), inputs, state
+    return rov.with_(**coefficients), inputs, state
 
 
 def _exact(rov: Vehicle, values: Values, name: str, side: int) -> list[float]:

@@ -58,7 +58,7 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Cache:
 def test_it_is_compiled_once_for_all_numbers_of_a_kind_of_vehicle(cache: Cache) -> None:
     load_library(ROV)
     cache.restart()
-    load_library(ROV.replaced({name: 2.0 * value for name, value in ROV.coefficients.items()}))
+    load_library(ROV.with_(**{name: 2.0 * value for name, value in ROV.coefficients.items()}))
     assert cache.compiled == 1
     assert len(cache.files()) == 1
     load_library(VEHICLES["yaw only"])

@@ -77,7 +77,7 @@ class Run:
     def own(self, vehicle: int) -> tuple[Vehicle, dict[str, float]]:
         """Return a vehicle with its coefficients, and its states at the start."""
         mine = {name: float(column[vehicle, 0]) for name, column in self.start.items()}
-        return self.rov.replaced({name: mine[name] for name in self.rov.coefficients}), {
+        return self.rov.with_(**{name: mine[name] for name in self.rov.coefficients}), {
             name: mine[name] for name in self.layout.state
         }
 

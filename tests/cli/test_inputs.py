@@ -2,9 +2,11 @@
 
 import os
 import shutil
+import zipfile
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -35,6 +37,13 @@ READING: dict[str, tuple[str, str]] = {
     "rov.toml": ("tests/rov.toml", "identify {f}/tests"),
     "a tank test": ("tests/steady_surge.csv", "identify {f}/tests"),
     "the vehicle to compare with": ("tests/beside.toml", "identify {f}/tests"),
+    "the plan": ("plan.toml", "study {f}/plan.toml -o {f}/results"),
+    "the FMU of a plan": ("rov.fmu", "study {f}/of_fmu.toml -o {f}/results"),
+    "the commands": ("commands.csv", "simulate {f}/videoray.toml --input {f}/commands.csv"),
+    "the recording": ("log.csv", "fly {f}/videoray.toml --recording {f}/log.csv -o {f}/fly.html"),
+    "the key": ("key", "build {f}/videoray.toml --sign {f}/key"),
+    "the FMU": ("rov.fmu", "prove {f}/rov.fmu"),
+    "the signature": ("rov.fmu.sig", "prove {f}/rov.fmu"),
 }
 PICTURES = {"a drawing", "a drawing of the FMU in Python", "the icon"}
 """The cases whose file may be missing, because a neutral picture replaces it."""
@@ -55,6 +64,14 @@ def copied(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     write_vehicle(load_vehicle(VIDEORAY), folder / "tests" / "beside.toml")
     (folder / "points.csv").write_text("command [%],velocity [m/s]\n20,0.1\n", encoding="utf-8")
     (folder / "report.html").write_text("a report", encoding="utf-8")
+    (folder / "plan.toml").write_text('vehicle = "videoray.toml"\nstop_time = 1.0\n', encoding="utf-8")
+    (folder / "of_fmu.toml").write_text('fmu = "rov.fmu"\nstop_time = 1.0\nstep = 0.1\n', encoding="utf-8")
+    (folder / "commands.csv").write_text("time,u_l\n0,0.3\n", encoding="utf-8")
+    (folder / "log.csv").write_text("time [s],depth [m]\n0,1\n", encoding="utf-8")
+    for name in ("key", "rov.fmu.sig"):
+        (folder / name).write_text("no key", encoding="utf-8")
+    with zipfile.ZipFile(folder / "rov.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
     refit = SHIPPED["videoray_refit"].read_text(encoding="utf-8")
     reported = refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"')
     (folder / "refit.toml").write_text(reported, encoding="utf-8")
@@ -81,27 +98,37 @@ def _folder(path: Path, _: pytest.MonkeyPatch) -> None:
     path.mkdir()
 
 
+def _pipe(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.unlink()
+    os.mkfifo(path)
+
+
+def _device(path: Path, _: pytest.MonkeyPatch) -> None:
+    path.unlink()
+    path.symlink_to("/dev/zero")
+
+
 def _gone(path: Path, _: pytest.MonkeyPatch) -> None:
     path.unlink()
 
 
 def _gone_as_it_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read = Path.read_bytes
+    opened = os.open
 
-    def gone(self: Path) -> bytes:
-        if path.exists() and self.samefile(path):
+    def gone(name: str, *how: Any, **more: Any) -> int:
+        if path.exists() and os.path.realpath(name) == os.path.realpath(path):
             path.unlink()
-        return read(self)
+        return opened(name, *how, **more)
 
-    monkeypatch.setattr(Path, "read_bytes", gone)
+    monkeypatch.setattr(os, "open", gone)
 
 
 _SLOW = {"the icon", "the report", "a drawing of the FMU in Python"}
 """The cases that read their file in the middle of a build, except one that runs by default."""
 _CASES = [
-    *((case, _folder) for case in READING if case not in PICTURES),
+    *((case, what) for what in (_folder, _pipe, _device) for case in READING if case not in PICTURES),
     # without rov.toml, a folder of tests is inspected and a draft is offered
-    *((case, _gone) for case in READING if case not in {*PICTURES, "a tank test", "rov.toml"}),
+    *((case, _gone) for case in READING if case not in {*PICTURES, "a tank test", "rov.toml", "the signature"}),
     *(
         pytest.param(case, _gone_as_it_is_read, marks=pytest.mark.long if case in _SLOW else ())
         for case in READING

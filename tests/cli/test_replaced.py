@@ -1,16 +1,19 @@
-"""Files that `identify` replaces: unchanged files that it wrote itself, and all others only with --force."""
+"""Files that a command replaces: unchanged files that rov-fmu wrote, and all others only with --force."""
 
 import shutil
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
+import click
 import pytest
 
-from rov_fmu.cli import main
+from rov_fmu.build import build
+from rov_fmu.cli import _commands, main
 from rov_fmu.identify import identify as identification
-from rov_fmu.io.output import WriteError, check_replaced, sealed
+from rov_fmu.io.output import Output, WriteError, check_replaced, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import without_progress
+from tests.commands import BARE, FEW_TESTS, without_progress
 from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
@@ -66,8 +69,8 @@ def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Pat
 @pytest.mark.parametrize(
     ("made_by_hand", "reason"),
     [
-        (False, "has changed since identify wrote it"),
-        (True, "does not begin with a digest by identify, so it may have been made by hand"),
+        (False, "has changed since rov-fmu wrote it"),
+        (True, "is not as rov-fmu wrote it: it may have been made or changed by hand"),
     ],
 )
 def test_the_work_of_others_is_refused_before_anything_is_computed(
@@ -103,9 +106,9 @@ def test_force_replaces_the_work_of_others_and_reports_it(
     capsys.readouterr()
     assert _identify(tank_tests, folder, "--force") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
-        f"{folder / 'rov.toml'}: replaced a file that has changed since identify wrote it",
-        f"{folder / 'r.html'}: replaced a file that does not begin with a digest by identify, so it may have been "
-        "made by hand",
+        f"{folder / 'rov.toml'}: replaced a file that has changed since rov-fmu wrote it",
+        f"{folder / 'r.html'}: replaced a file that is not as rov-fmu wrote it: it may have been made or changed by "
+        "hand",
     ]
     assert [path.read_bytes() for path in sorted(folder.iterdir())] == [p.read_bytes() for p in sorted(made.iterdir())]
 
@@ -117,7 +120,7 @@ def _check(paths: Sequence[Path]) -> list[str]:
 def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "some.toml"
     assert _check([path]) == []
-    text = sealed("a = 1\nb = 2\n", "# {}")
+    text = sealed("a = 1\nb = 2\n", "# {}", "identify")
     for whole in (text, text.replace("\n", "\r\n"), f"\ufeff{text}"):
         path.write_bytes(whole.encode())
         assert _check([path]) == [f"{path}: replaced the result of an earlier run"]
@@ -125,3 +128,127 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
         path.write_bytes(other.encode())
         with pytest.raises(WriteError):
             _check([path])
+
+
+# ---- Every command ---------------------------------------------------------------------------------------------------
+
+_TUNE = f"tune {BARE} --axis heave --command 0.3 --v-ss 0.2"
+# What each option writes, in the folder {f}. A study and the files beside an FMU have names of their own.
+WRITING = {
+    ("build", "output"): ("rov.fmu", f"build {BARE} --platform host -o {{f}}/rov.fmu"),
+    ("build", "osp"): ("bare_OspModelDescription.xml", f"build {BARE} --platform host --osp -o {{f}}/rov.fmu"),
+    ("simulate", "output"): ("run.csv", f"simulate {BARE} -o {{f}}/run.csv"),
+    ("simulate", "plot"): ("run.svg", f"simulate {BARE} --plot {{f}}/run.svg"),
+    ("fly", "output"): ("fly.html", f"fly {BARE} -o {{f}}/fly.html"),
+    ("sitl", "log"): ("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
+    ("sdf", "output"): ("rov.sdf", f"sdf {BARE} -o {{f}}/rov.sdf"),
+    ("prove", "report"): ("proof.html", "prove {fmu} --report {f}/proof.html"),
+    ("study", "output"): ("study.html", "study {f}/plan.toml -o {f}"),
+    ("study", "run"): ("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
+    ("identify", "output"): ("rov.toml", f"identify {FEW_TESTS} -o {{f}}/rov.toml"),
+    ("identify", "report"): ("report.html", f"identify {FEW_TESTS} --report {{f}}/report.html"),
+    ("identify", "mcap"): ("logs.mcap", f"identify {FEW_TESTS} --mcap {{f}}/logs.mcap"),
+    ("tune", "output"): ("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
+}
+READING = {
+    *{("build", "sign"), ("simulate", "commands"), ("fly", "recording"), ("fly", "identified")},
+    *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("identify", "folder"), ("tune", "points")},
+}
+"""The arguments and options that name a file to read."""
+AGAIN = [key for key in WRITING if key[0] in ("simulate", "fly", "sdf", "tune")]
+"""What is quick enough to be written several times."""
+
+
+def test_every_file_that_a_command_writes_is_known_here() -> None:
+    named = {
+        (name, parameter.name)
+        for name, command in _commands.commands.items()
+        for parameter in command.params
+        if isinstance(parameter.type, click.Path)
+    }
+    assert named - READING == {key for key in WRITING if key not in (("build", "osp"), ("study", "run"))}
+    assert {name for name, command in _commands.commands.items() for p in command.params if p.name == "force"} == {
+        name for name, _ in WRITING
+    }
+
+
+@pytest.mark.parametrize("key", WRITING, ids=" ".join)
+def test_no_command_replaces_the_work_of_others(
+    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    name, command = WRITING[key]
+    (tmp_path / "plan.toml").write_text(f'vehicle = "{BARE.name}"\nstop_time = 1.0\n', encoding="utf-8")
+    shutil.copy(BARE, tmp_path)
+    (tmp_path / name).write_bytes(b"my work")
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    assert main([word.format(f=tmp_path, fmu=videoray_fmu) for word in command.split()]) == 2
+    out, err = capsys.readouterr()
+    assert (out, without_progress(err).count("\n")) == ("", 1)
+    assert str(tmp_path / name) in err
+    assert "--force" in err
+    assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
+
+
+@pytest.mark.parametrize("key", AGAIN, ids=" ".join)
+def test_a_command_replaces_its_own_file_until_somebody_changes_it(
+    key: tuple[str, str], tmp_path: Path, capsys: Capsys
+) -> None:
+    name, command = WRITING[key]
+    words = command.format(f=tmp_path).split()
+    assert [main(words), main(words)] == [0, 0]
+    with (tmp_path / name).open("ab") as file:
+        file.write(b"\n")
+    assert main(words) == 2
+    assert "wrote it" in capsys.readouterr().err
+    assert main([*words, "--force"]) == 0
+
+
+def test_an_fmu_proves_itself_on_any_machine(
+    videoray_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where there is no list of what was written, its hashes tell."""
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "elsewhere"))
+    monkeypatch.setattr("rov_fmu.build.compile_all", lambda *_: pytest.fail("it is not refused"))
+    whole, vehicle = videoray_fmu.read_bytes(), load_vehicle(BARE)
+    path = tmp_path / "rov.fmu"
+    path.write_bytes(whole)
+    with pytest.raises(pytest.fail.Exception):
+        build(vehicle, path, platforms="host")
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr("extra/notes.txt", "my notes")
+    changed = path.read_bytes()
+    for content in (changed, whole + b"x", b"x" + whole, whole[:-1000], b"PK\x03\x04"):
+        path.write_bytes(content)
+        with pytest.raises(WriteError, match="--force"):
+            build(vehicle, path, platforms="host")
+
+
+def test_what_is_written_is_listed_and_the_list_stays_short(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    monkeypatch.setattr("rov_fmu.io.output._LARGEST_LIST", 65 * 20)
+    path = tmp_path / "some.csv"
+    for n in range(45):
+        write_whole(Output(path, b"%d" % n))
+    (listed,) = (tmp_path / "state").rglob("written")
+    assert 65 * 10 <= listed.stat().st_size <= 65 * 22
+    path.write_bytes(b"my work")
+    with pytest.raises(WriteError):
+        write_whole(Output(path, b"new"))
+    path.write_bytes(b"43")
+    write_whole(Output(path, b"new"))
+    listed.unlink()
+    with pytest.raises(WriteError):
+        write_whole(Output(path, b"newer"))
+
+
+def test_where_nothing_can_be_listed_files_are_written_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "state").touch()
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
+    path = tmp_path / "some.csv"
+    write_whole(Output(path, b"1"))
+    with pytest.raises(WriteError):
+        write_whole(Output(path, b"2"))
+    write_whole(Output(path, b"2"), force=True)
+    assert path.read_bytes() == b"2"

@@ -12,8 +12,11 @@ import pytest
 
 import rov_fmu
 from rov_fmu.cli import main
+from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.interface.command_files import read_inputs
-from rov_fmu.io.messages import FileError
+from rov_fmu.interface.simulate_command import read_settings
+from rov_fmu.io.messages import FileError, InputError
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE
 from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
@@ -41,6 +44,23 @@ def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
         [name, f"{expected[name][-1]:.6g}", expected.units[name]]
         for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.calculated)
     ]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_state_and_angle_can_be_set_at_the_start(name: str) -> None:
+    """Those of the attitude under the names that the results have; the quaternion as a whole."""
+    vehicle = rov_fmu.load(name)
+    angles = [name.removesuffix("_0") for name in vehicle.layout.initial]
+    states = [one for one in vehicle.layout.state if one not in QUATERNION]
+    for one in (*states, *angles):
+        start = read_settings([f"{one}=0.25"], vehicle.layout).start
+        assert vehicle.simulate([0.0, 0.001], start=start)[one][0] == pytest.approx(0.25, rel=1e-14)
+        assert vehicle.simulate([0.0, 0.001], start={one: 0.25})[one][0] == pytest.approx(0.25, rel=1e-14)
+    for one in angles:
+        with pytest.raises(InputError, match=rf"^--set {one}_0=1: {one}_0 is set twice$"):
+            read_settings([f"{one}=1", f"{one}_0=1"], vehicle.layout)
+        with pytest.raises(InputError, match=rf"^start\['{one}_0'\]: {one}_0 is given, too, which is the same$"):
+            vehicle.simulate(1.0, start={one: 1.0, f"{one}_0": 1.0})
 
 
 def test_a_vehicle_that_nothing_moves_is_said_to_need_a_command(capsys: Capsys) -> None:

@@ -259,7 +259,7 @@ def test_the_first_simulations_end_where_the_pages_say(vehicle: Vehicle) -> None
     readme, drive = (page.read_text(encoding="utf-8") for page in (README, ROOT / "docs" / "drive.md"))
     (*_, ahead) = course(vehicle, lambda _: {"u_l": 0.3, "u_r": 0.3}, 10.0, 0.1, 0.0)
     assert f"ends at u = {ahead['u']:.4f} m/s" in readme
-    untuned = vehicle.replaced({"alpha_w": 1.0, "beta_w": 1.0})
+    untuned = vehicle.with_(alpha_w=1.0, beta_w=1.0)
     (*_, down) = course(untuned, lambda _: {"u_t": 0.3}, 20.0, 0.1, 0.0)
     assert f"positive down: {down['w']:.4f} m/s" in drive
     (*_, down) = course(vehicle, lambda _: {"u_t": 0.3}, 10.0, 0.1, 0.0)

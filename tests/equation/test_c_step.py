@@ -45,13 +45,13 @@ def test_a_tiny_force_carries_a_vehicle_no_further_than_its_steady_velocity(vehi
     rov, step = vehicle
     steady = 1e-250 / 3.0
     for h in (1e20, 1e28, 1e35):
-        found = step(rov.replaced({"b_d_u": 3.0}), still(rov) | {"X_ext": 1e-250}, at_rest(rov), h)
+        found = step(rov.with_(b_d_u=3.0), still(rov) | {"X_ext": 1e-250}, at_rest(rov), h)
         assert (found["u"], found["x"]) == pytest.approx((steady, steady * h), rel=1e-13, abs=0.0)
 
 
 def test_a_step_of_too_many_pieces_is_refused(steps: list[Step]) -> None:
     (step,) = steps
     rov = VIDEORAY
-    frictionless = rov.replaced({"a_d_r": 0.0, "b_d_r": 0.0})
+    frictionless = rov.with_(a_d_r=0.0, b_d_r=0.0)
     with pytest.raises(AssertionError):
         step(frictionless, still(rov), at_rest(rov) | {"u": 1.0, "r": 1e30}, 1.0)

@@ -34,7 +34,7 @@ def drift(x: Array, size: float) -> float:
 
 @LENGTHS
 def test_a_free_body_keeps_its_energy_and_its_impulses(h: float) -> None:
-    rov = frictionless(SIX).replaced({"W": 0.0, "B": 0.0})
+    rov = frictionless(SIX).with_(W=0.0, B=0.0)
     nu, x, R = tumbled(rov, h)
     momentum = rigid_vehicle.body(rov, still(rov)).mass @ nu
     linear = np.einsum("ijt,jt->it", R, momentum[:3])
@@ -47,7 +47,7 @@ def test_a_free_body_keeps_its_energy_and_its_impulses(h: float) -> None:
 
 @LENGTHS
 def test_weight_and_buoyancy_keep_the_total_energy(h: float) -> None:
-    rov = frictionless(SIX).replaced({"W": SIX["B"]})  # neither sinks nor rises
+    rov = frictionless(SIX).with_(W=SIX["B"])  # neither sinks nor rises
     nu, x, R = tumbled(rov, h)
     body = rigid_vehicle.body(rov, still(rov))
     kinetic = 0.5 * (nu * (body.mass @ nu)).sum(axis=0)

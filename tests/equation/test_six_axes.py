@@ -130,13 +130,13 @@ def test_a_long_step_of_a_motion_that_never_settles_is_many_short_ones() -> None
     rng = random.Random(9)
     scaled = [name for name in HEAVY.coefficients if re.match("(I|m_a|a_d|b_d|z_B)", name)]
     for n in range(30):
-        rov = HEAVY.replaced({name: HEAVY[name] * 10.0 ** rng.uniform(-1.0, 1.0) for name in scaled})
-        rov = rov.replaced({name: 0.0 for name in scaled if n % 3 == 0 and name.startswith("b_d")})
+        rov = HEAVY.with_(**{name: HEAVY[name] * 10.0 ** rng.uniform(-1.0, 1.0) for name in scaled})
+        rov = rov.with_(**{name: 0.0 for name in scaled if n % 3 == 0 and name.startswith("b_d")})
         found = in_c(rov, random_inputs(rng, rov), random_state(rng, rov), [0.0, 100.0])
         assert np.isfinite(found).all(), n
 
 
-@pytest.mark.parametrize("rov", [SIX.replaced({"b_d_v": 30.0, "b_d_r": 0.5}), with_axes("pr")], ids=["six", "two"])
+@pytest.mark.parametrize("rov", [SIX.with_(b_d_v=30.0, b_d_r=0.5), with_axes("pr")], ids=["six", "two"])
 def test_a_long_step_of_a_steady_turn_is_many_short_ones(rov: Vehicle) -> None:
     """In C, it ends with a circle in closed form. With weight the vehicle stays nearly level; without, it tumbles."""
     inputs = still(rov) | {"X_ext": 8.0, "K_ext": 0.6, "N_ext": -2.0}

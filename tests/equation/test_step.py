@@ -13,7 +13,7 @@ from tests.equation.steps import in_engine, in_python, worst
 from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
-FREE = VEHICLES["surge without drag"].replaced({"a_d_r": 0.0, "b_d_r": 0.0})
+FREE = VEHICLES["surge without drag"].with_(a_d_r=0.0, b_d_r=0.0)
 AHEAD = {"u_1": 0.5, "u_2": 0.6, "u_3": -0.4, "u_4": -0.5}
 BACK = {"F_1": -10.0, "F_2": -10.0, "F_3": 10.0, "F_4": 10.0}
 """Forces against the commands ahead."""
@@ -25,7 +25,7 @@ CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
     "the thrust changes its sign": (HEAVY, AHEAD, {**BACK, "u": -0.3}, (1e-3, 0.1, 0.5)),
     "a load cancels the present thrust": (HEAVY, {"X_ext": 28.284271247461902}, BACK, (1e-5, 1.0)),
     "surge and sway turn the vehicle": (COUPLED, {}, {"u": 1.0, "v": 0.5}, (1e-3, 0.3, 2.0)),
-    "a lag of a millisecond": (LAGGING.replaced({"T_t200": 1e-3}), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
+    "a lag of a millisecond": (LAGGING.with_(T_t200=1e-3), {"u_l": 0.3}, {"u": 1.0, "F_l": 1.0}, (1e-3, 0.3)),
     "there and back with a turn there and back": (
         FREE,
         {"X_ext": -M, "N_ext": -I_R},
@@ -33,7 +33,7 @@ CASES: dict[str, tuple[Vehicle, Values, Values, tuple[float, ...]]] = {
         (1.0, 2.0, 3.0),
     ),
     "a fast axis beside slow ones": (
-        VIDEORAY.replaced({"b_d_w": 1e4}),
+        VIDEORAY.with_(b_d_w=1e4),
         {"u_l": 0.6, "u_r": 0.3, "u_t": 0.5},
         {"w": 0.3},
         (0.1, 1.0),

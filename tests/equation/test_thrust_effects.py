@@ -23,6 +23,7 @@ from tests.vehicles import (
     THRUST_EFFECTS,
     VIDEORAY,
     at_rest,
+    extended,
     fin,
     numbered,
     random_inputs,
@@ -120,7 +121,7 @@ def test_v_ss_is_the_velocity_at_which_the_loss_of_thrust_and_the_net_weight_bal
 
 def test_the_speed_of_advance_of_an_arm_is_that_of_its_place() -> None:
     """The arm R sin γ of the VideoRay is the distance of its thrusters from the middle."""
-    rov = VIDEORAY.extended({"d_rear": 5.0, "d_top": 2.0})
+    rov = extended(VIDEORAY, d_rear=5.0, d_top=2.0)
     distance = rov["R"] * math.sin(rov["gamma"])
     thrusters = [
         t.model_copy(

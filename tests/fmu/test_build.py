@@ -68,7 +68,7 @@ def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
         with zipfile.ZipFile(path, "w") as archive:
             for name in ("modelDescription.xml", *(f"binaries/{folder}/x.so" for folder in before)):
                 archive.writestr(name, "")
-        built = rov_fmu.load(BARE).build(path, platforms="linux32")
+        built = rov_fmu.load(BARE).build(path, platforms="linux32", force=True)
         assert [*built.lost] == sorted(before)
         assert (built.path, built.size, dict(built.binaries)) == (path, path.stat().st_size, {"linux32": 7})
         assert 0.0 <= built.seconds["linux32"] < 60.0
@@ -99,4 +99,4 @@ def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
 def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Vehicle) -> None:
     guid = fmpy.read_model_description(str(videoray_fmu)).guid
     assert native_content(vehicle).guid == guid
-    assert native_content(vehicle.replaced({"m_rov": 6.58})).guid != guid
+    assert native_content(vehicle.with_(m_rov=6.58)).guid != guid

@@ -21,7 +21,7 @@ _OLD = b"the old one"
 
 
 def _build(output: Path, *arguments: str) -> int:
-    return main(["build", str(BARE), "--platform", "host", "-o", str(output), *arguments])
+    return main(["build", str(BARE), "--platform", "host", "--force", "-o", str(output), *arguments])
 
 
 @pytest.fixture
@@ -103,7 +103,7 @@ def _run(old: Path, folder: Path, **environment: str) -> subprocess.Popen[str]:
     """Start the script as another process, with its temporary files in a folder of the test."""
     (folder / "tmp").mkdir()
     return subprocess.Popen(
-        [sys.executable, _SCRIPT, str(BARE), "--platform", "host", "-o", str(old)],
+        [sys.executable, _SCRIPT, str(BARE), "--platform", "host", "--force", "-o", str(old)],
         env=os.environ | {"TMPDIR": str(folder / "tmp")} | environment,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

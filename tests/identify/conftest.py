@@ -41,7 +41,7 @@ def identified(made_once: Made) -> Identified:
     return found
 
 
-TRUTH = VIDEORAY.replaced({"alpha_w": 1.0, "alpha_r": 1.0})
+TRUTH = VIDEORAY.with_(alpha_w=1.0, alpha_r=1.0)
 FORCES = {f"thrust_{name}.csv": pulled(TRUTH[f"a_t_{name}"], TRUTH[f"b_t_{name}"]) for name in ("top", "rear")}
 KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
 """A rov.toml of the VideoRay's mass, inertia and arm."""

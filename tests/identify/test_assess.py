@@ -15,7 +15,7 @@ from rov_fmu.identify.result import Disturbance, Effect, Point, Slip
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
 from tests.report import results
-from tests.vehicles import VIDEORAY
+from tests.vehicles import VIDEORAY, extended
 
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
 WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
@@ -128,14 +128,14 @@ def of_drag(deviation: float, gain: float) -> Posterior:
 
 def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() -> None:
     """V_ss and Tau follow 0.7 of a slow change of thrust; the file has other curves than the fit, and none is exact."""
-    uncertain, file = of_drag(0.04, 0.05), VIDEORAY.replaced({"b_d_u": 1.1 * VIDEORAY["b_d_u"]})
+    uncertain, file = of_drag(0.04, 0.05), VIDEORAY.with_(b_d_u=1.1 * VIDEORAY["b_d_u"])
     axis = VIDEORAY.layout.kinds["surge"]
 
     def numbers(rov: Vehicle, command: float) -> np.ndarray:
         V, Tau = rov.response(SURGE, command)
         return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_way(abs(V), 0.1)])
 
-    more, less = (VIDEORAY.replaced({"a_d_u": VIDEORAY["a_d_u"] * np.exp(s)}) for s in (0.01, -0.01))
+    more, less = (VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(s)) for s in (0.01, -0.01))
     found = answers(uncertain, SURGE, file)
     assert axis
     assert [one.command for one in found] == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0]
@@ -158,7 +158,7 @@ def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() 
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:
-    losing, exact = VIDEORAY.extended({"d_rear": 3.0}), of_drag(0.0, 1e-9)
+    losing, exact = extended(VIDEORAY, d_rear=3.0), of_drag(0.0, 1e-9)
     table = replace(exact.table, layout=losing.layout, base=losing.coefficients)
     half, full = (
         next(a for a in answers(replace(exact, table=table), SURGE, losing, strongest=0.5) if a.command == command)
@@ -178,7 +178,7 @@ def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
     """A file without estimates has no intervals: both ends are the value."""
     rov = load_vehicle(REFIT)
     names, rows = rov.uncertainty.names, np.random.default_rng(0).random((1000, len(rov.uncertainty.names)))
-    drawn = [rov.replaced(dict(zip(names, row, strict=True))) for row in rov.uncertainty.drawn(rows).tolist()]
+    drawn = [rov.with_(**dict(zip(names, row, strict=True))) for row in rov.uncertainty.drawn(rows).tolist()]
     for one, exact in zip(answers_of_file(rov, HEAVE), answers_of_file(VIDEORAY, HEAVE), strict=True):
         numbers = np.array([k.response(HEAVE, one.command) for k in drawn])
         for (value, interval), some, own in zip(

@@ -25,7 +25,7 @@ from tests.identify.conftest import FORCES, KNOWN, Identified, add_voltage
 from tests.recordings import PLANS, Measured, run, with_more, write_log
 from tests.vehicles import VIDEORAY
 
-TRUTH = VIDEORAY.replaced({"alpha_u": 1.0, "alpha_w": 1.0, "alpha_r": 1.0, "beta_u": 0.8})
+TRUTH = VIDEORAY.with_(alpha_u=1.0, alpha_w=1.0, alpha_r=1.0, beta_u=0.8)
 """The true vehicle. Its forces are those of a scale in a tank, so that every α is 1."""
 COMMANDS = (0.3, -0.3, 0.5, -0.5)
 STILL = "time [s],command [%],depth [m]\n" + "".join(f"{n / 10},{30 * (n > 9)},1.5\n" for n in range(50))
@@ -230,7 +230,7 @@ def test_the_file_of_a_measured_curve_tells_how_far_off_its_forces_are(
         vehicle = load_vehicle(tmp_path / f"{n}.toml")
         known = vehicle.uncertainty
         rows = known.drawn(random.random((1000, len(known.names)))).tolist()
-        drawn = [vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in rows]
+        drawn = [vehicle.with_(**dict(zip(known.names, row, strict=True))) for row in rows]
         for c in (sign * size for size in (0.3, 0.5, 0.7, 1.0) for sign in (1.0, -1.0)):
             some = [one.curve_force(one.layout.curves[0], c) for one in drawn]
             low, high = np.quantile(some, [0.025, 0.975])

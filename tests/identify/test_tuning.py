@@ -12,11 +12,13 @@ from scipy.stats import t
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
+from rov_fmu.fmu.card import card
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.report.console_results import print_tuning
-from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import pulsed, thruster
+from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
+from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
+from rov_fmu.vehicle.writer import write_tuned
+from tests.vehicles import extended, pulsed, thruster
 
 k = load_vehicle(VIDEORAY)
 """The vehicle of the paper."""
@@ -48,7 +50,7 @@ def test_steady_velocities_alone_leave_beta() -> None:
 
 def test_intervals_are_those_of_linear_regression() -> None:
     """With linear drag, V_ss is proportional to α, so that its relative errors are linear in α."""
-    plain = k.replaced({"alpha_u": 1.0, "a_d_u": 0.0})
+    plain = k.with_(alpha_u=1.0, a_d_u=0.0)
     wanted = [Target("V_ss", c, V) for c, V in ((0.2, 0.31), (0.5, 1.06), (0.7, 1.47), (-0.4, -0.6))]
     ratios = np.array([p.by(plain, SURGE) / p.value for p in wanted])
     alpha = ratios.sum() / (ratios @ ratios)
@@ -92,7 +94,7 @@ def test_what_no_tuning_gives(
 )
 def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, told: dict[str, dict[str, float]]) -> None:
     points = (Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 2.0))
-    rov = k.replaced({"alpha_w": alpha, "beta_w": beta})
+    rov = k.with_(alpha_w=alpha, beta_w=beta)
     found = implausible(Tuning(HEAVE, rov, points, {"alpha_w": None, "beta_w": None}))
     assert {finding.kind.removeprefix("implausible tuned "): finding.numbers for finding in found} == told
     of_alpha_alone = [*implausible(Tuning(HEAVE, rov, points[:1], {"alpha_w": None}))]
@@ -101,7 +103,7 @@ def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, told: d
 
 def test_thrust_that_falls_with_the_speed_cannot_be_tuned() -> None:
     with pytest.raises(TuningError, match="heave: its thrust decreases with the speed of advance"):
-        tuned_to(k.extended({"d_top": 1.0}), HEAVE, 0.3, 0.2)
+        tuned_to(extended(k, d_top=1.0), HEAVE, 0.3, 0.2)
 
 
 # ---- Of another vehicle, by direction --------------------------------------------------------------------------------
@@ -192,7 +194,41 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path, capsys: pytest.
     assert tuned.data.resolve() == vehicle.data
     before, after = VIDEORAY.read_text(encoding="utf-8").splitlines(), output.read_text(encoding="utf-8").splitlines()
     changed = {a.split(" ")[0] for a, b in zip(before, after, strict=True) if a != b}
-    assert changed == {"data", "pictures", "alpha", "beta"}
+    assert changed == {"name", "identifier", "data", "pictures", "alpha", "beta"}
+    assert (
+        tuned["alpha_w"] == tune(vehicle, HEAVE, [Target("V_ss", 0.3, 0.2), Target("Tau", 0.3, 3.0)]).vehicle["alpha_w"]
+    )
+
+
+@pytest.mark.parametrize(
+    ("file", "identifier", "name"),
+    [
+        ("mine.toml", "mine", "VideoRay Pro 4, tuned: mine"),
+        ("VideoRay.toml", "VideoRay_tuned", "VideoRay Pro 4, tuned: VideoRay"),
+        ("bluerov2.toml", "bluerov2_tuned", "VideoRay Pro 4, tuned: bluerov2"),
+        ("2 är-b.toml", "_2__r_b", "VideoRay Pro 4, tuned: 2 är-b"),
+    ],
+)
+def test_a_tuned_vehicle_is_one_of_its_own(file: str, identifier: str, name: str, tmp_path: Path) -> None:
+    """Its FMU does not replace that of the vehicle that ships, and the card says that it is tuned."""
+    output = tmp_path / file
+    assert main(["tune", str(VIDEORAY), *HEAVE_AT_30[:4], "--v-ss", "0.2", "-o", str(output)]) == 0
+    tuned = load_vehicle(output)
+    assert (tuned.identifier, tuned.name) == (identifier, name)
+    assert "alpha_w: tuned to V_ss = 0.2 at 30%." in card(tuned)["From which data"]
+    assert main(["tune", str(output), *HEAVE_AT_30[:4], "--v-ss", "0.21", "-o", str(output)]) == 0
+    assert (load_vehicle(output).identifier, load_vehicle(output).name) == (identifier, name)
+    assert main(["tune", str(output), *HEAVE_AT_30[:4], "--v-ss", "0.2", "-o", str(tmp_path / "next.toml")]) == 0
+    assert load_vehicle(tmp_path / "next.toml").name == "VideoRay Pro 4, tuned: next"
+
+
+def test_a_tuned_copy_of_an_identified_vehicle_says_so(tmp_path: Path) -> None:
+    """Its verdicts are of another vehicle, and the digest in its first line would no longer be right."""
+    write_tuned(SHIPPED["videoray_refit"], path := tmp_path / "mine.toml", {"alpha_u": 1.1}, f"{TUNED} V_ss")
+    assert "wrote this file" not in path.read_text(encoding="utf-8")
+    trust = "The predictions are those of the vehicle before it was tuned."
+    assert trust in card(load_vehicle(path))["How far to trust it"]
+    assert trust not in card(load_vehicle(SHIPPED["videoray_refit"]))["How far to trust it"]
 
 
 def test_points_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -203,7 +239,10 @@ def test_points_of_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     )
     output = tmp_path / "tuned.toml"
     assert main(["tune", str(VIDEORAY), "--axis", "heave", "--points", str(points), "-o", str(output)]) == 0
-    assert load_vehicle(output) == k, "Table 9 is what the points were made with"
+    found = load_vehicle(output)
+    assert [found[name] for name in ("alpha_w", "beta_w")] == pytest.approx([k["alpha_w"], k["beta_w"]], rel=1e-6), (
+        "Table 9 is what the points were made with"
+    )
     assert "95 %" in capsys.readouterr().out
 
 

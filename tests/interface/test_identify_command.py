@@ -1,17 +1,24 @@
 """The command `identify` as a function: the parts of its work and their progress."""
 
-from itertools import pairwise
+from dataclasses import replace
+from itertools import chain, pairwise
 from pathlib import Path
 
 import pytest
 
+import rov_fmu
+from rov_fmu.fmu.evidence.related import origin
 from rov_fmu.interface.identify_command import identify_folder
 from rov_fmu.io.messages import Progress
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.folders import small_folder
 
 
 @pytest.mark.parametrize("with_report", [pytest.param(False, marks=pytest.mark.long), True])
-def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, tmp_path: Path) -> None:
+def test_the_progress_names_what_is_done_and_never_goes_back(
+    with_report: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)  # a vehicle that is from no file has its report in the current folder
     begun: dict[str, list[tuple[str, float]]] = {}
 
     def begin(name: str) -> Progress:
@@ -20,7 +27,8 @@ def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, 
 
     report = tmp_path / "report.html" if with_report else None
     folder = small_folder(tmp_path / "tests")
-    identify_folder(folder, None, report, force=False, begin=begin)
+    identification, _ = identify_folder(folder, tmp_path / "rov.toml", report, force=False, begin=begin)
+    _check_is_the_same(identification.vehicle, tmp_path / "rov.toml")
     assert [*begun] == ["reading the folder", "identifying the vehicle", *["drawing the report"] * with_report]
     for calls in begun.values():
         shares = [share for _, share in calls]
@@ -28,3 +36,18 @@ def test_the_progress_names_what_is_done_and_never_goes_back(with_report: bool, 
         assert not shares or (shares[0] == 0.0 and shares[-1] < 1.0)
     steps = [step for step, _ in begun["identifying the vehicle"]]
     assert {"reading the logs", "start 1 of 2", "start 2 of 2", "what to measure next of heave"} <= {*steps}
+
+
+def _check_is_the_same(vehicle: Vehicle, path: Path) -> None:
+    """Check that the vehicle of the result is that of its file, whose numbers have meaningful digits."""
+    written = load_vehicle(path)
+    assert replace(written, provenance=None) == replace(vehicle, provenance=None)
+    numbers = [*vehicle.coefficients.values(), *vehicle.command_range, *chain(*vehicle.intervals.values())]
+    assert all(x == float(f"{x:.6g}") for x in numbers + [row.error for row in vehicle.estimates.values()])
+    assert all(r == round(r, 6) != 0.0 for row in vehicle.estimates.values() for r in row.correlation.values())
+    ((name, content),) = (
+        origin(rov_fmu.load(replace(vehicle, provenance=written.provenance)))[0].items()
+        - origin(replace(written, provenance=None, file=None))[0].items()
+    )
+    assert name.endswith(".toml")
+    assert content == path.read_bytes()

@@ -389,7 +389,7 @@ def test_a_mistake_is_one_line(case: str, videoray: VehicleModel) -> None:
 def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: VehicleModel, tmp_path: Path) -> None:
     """However it came about."""
     for name, value in (("a_du", 1.0), ("a_d_u", float("nan"))):
-        wrong = videoray.replaced({name: value})
+        wrong = replace(videoray, coefficients={**videoray.coefficients, name: value})
         for action in (lambda v: build(v, tmp_path / "x.fmu"), lambda v: v.simulate(TIMES)):
             with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
                 action(wrong)

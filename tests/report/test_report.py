@@ -40,6 +40,7 @@ from tests.report.pages import (
     unfolded,
 )
 from tests.report.results import FILES, GOOD, example, prediction, without_findings
+from tests.vehicles import extended
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
 SECTIONS = [
@@ -314,7 +315,7 @@ def driven_by(names: Sequence[str]) -> Identification:
     vehicle = without_findings().vehicle
     layout = vehicle.layout
     kept = replace(layout, thrusters=tuple(t for t in layout.thrusters if t.name in names))
-    return told(replace(without_findings(), vehicle=vehicle.in_layout(kept)))
+    return told(replace(without_findings(), vehicle=vehicle.with_(kept)))
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -335,7 +336,7 @@ def test_an_axis_whose_thrusters_drive_others_is_told_so_beside_its_speeds(monke
     assert all(line[1:] in first_screen for line in lines)
     symmetric = example().vehicle
     astern = [{f"{name}_reverse": share * symmetric[name] for name in ("a_t_rear", "b_t_rear")} for share in (0.7, 0.5)]
-    weaker, weak = (replace(example(), vehicle=symmetric.extended(values)) for values in astern)
+    weaker, weak = (replace(example(), vehicle=extended(symmetric, **values)) for values in astern)
     assert not driven_aside(weaker)
     assert driven_aside(weak) == lines[1:]
     for path in SHIPPED.values():

@@ -55,7 +55,7 @@ LEVELS = {95: (0.025, 0.975), 90: (0.05, 0.95)}
 def a_vehicle(random: Random) -> Vehicle:
     """Return a VideoRay with coefficients that differ by a quarter, and any β that a body in water may have."""
     off = {name: value * np.exp(0.25 * random.standard_normal()) for name, value in NOMINAL.items()}
-    return VIDEORAY.replaced({**off, "alpha_u": 1.0, "beta_u": random.uniform(0.5, 1.0)})
+    return VIDEORAY.with_(**{**off, "alpha_u": 1.0, "beta_u": random.uniform(0.5, 1.0)})
 
 
 def pulls(folder: Path, k: Vehicle, random: Random) -> None:

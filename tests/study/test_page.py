@@ -70,7 +70,7 @@ odd = "y[y > 1e9][0]"
 
 def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> None:
     results = Results(done)
-    text = (done / "study.html").read_text(encoding="utf-8")
+    text = (done / "study.html").read_text(encoding="utf-8").partition("\n")[2]  # below the digest
     page = html.fromstring(text)
     rows = {row[0].text_content(): [cell.text_content() for cell in row] for row in page.iter("tr")}
     ended = results.runs[results.runs.status != "failed"]
@@ -269,7 +269,7 @@ def test_another_page_of_this_name_is_not_overwritten(
     own = tmp_path / "study.html"
     own.write_text("<p>My studies</p>")
     assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    reason = "is not a page of this tool, and would be overwritten. Choose another folder"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: {reason}\n"
+    reason = "the file there is not as rov-fmu wrote it: it may have been made or changed by hand; --force replaces it"
+    assert capsys.readouterr().err == f"rov-fmu: {own}: cannot be written: {reason}\n"
     assert [*tmp_path.iterdir()] == [own]
     assert own.read_text() == "<p>My studies</p>"

@@ -41,7 +41,7 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     """The log also replaces F_0, because another vehicle has another trim."""
     base = load_vehicle(SHIPPED["bluerov2"])
     folder = folder_of(tmp_path / "tests", BLUEROV2, {})
-    true = base.replaced({"F_0_w": 0.0, "a_d_w": 50.0, "b_d_w": 8.0, "beta_w": 0.9})
+    true = base.with_(F_0_w=0.0, a_d_w=50.0, b_d_w=8.0, beta_w=0.9)
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", run(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
@@ -77,7 +77,7 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     folder = folder_of(tmp_path / "tests", HEAD, {})
     (folder / "old.toml").write_text(text, encoding="utf-8")
     table = '[axes.sway]\nm_a = { value = 7.0, unit = "kg", source = "a strip" }\n'
-    k = load_vehicle(SHIPPED["bluerov2"]).replaced({"m_a_v": 7.0})
+    k = load_vehicle(SHIPPED["bluerov2"]).with_(m_a_v=7.0)
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
         limits = LIMITS.format(-1, 1, 0.2, 0.21, 0, 1e4, 1e4)
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}{limits}', responses(k, SWAY))

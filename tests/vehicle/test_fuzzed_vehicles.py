@@ -128,7 +128,7 @@ def _name(text: str) -> Callable[[str], str]:
 RARE: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("arm.R.value", "0xfff")),
     "a key of 3000 parts": (lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'), ("vehicle.name",)),
-    "tables in tables": (lambda text: text + "deep = " + "{a=" * 100_000, ("not TOML",)),
+    "tables in tables": (lambda text: text + "deep = " + "{a=" * 50_000, ("not TOML",)),
     "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
 }
 

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
 from tests.paper.test_paper import TABLE_9
-from tests.vehicles import sources_of
+from tests.vehicles import extended, sources_of
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT, flags=re.MULTILINE)
@@ -41,13 +42,18 @@ def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
 
 def test_a_turn_pushes_ahead_where_thrust_astern_is_weaker(vehicle: Vehicle) -> None:
     def weaker(share: float) -> Vehicle:
-        return vehicle.extended({f"{key}_rear_reverse": share * vehicle[f"{key}_rear"] for key in ("a_t", "b_t")})
+        return extended(vehicle, **{f"{key}_rear_reverse": share * vehicle[f"{key}_rear"] for key in ("a_t", "b_t")})
 
     ((axis, push),) = weaker(0.5).side_effects(YAW, 0.5)
     assert axis is SURGE
     assert push == pytest.approx(0.25 * vehicle.force(SURGE, 0.5))
     assert [*weaker(0.999).side_effects(YAW, 0.5), *vehicle.side_effects(SURGE, 0.5)] == []
-    assert vehicle.replaced({"beta_w": 0.0}).effective_inertia(vehicle.layout.kinds["heave"]) == inf
+    assert (
+        replace(vehicle, coefficients={**vehicle.coefficients, "beta_w": 0.0}).effective_inertia(
+            vehicle.layout.kinds["heave"]
+        )
+        == inf
+    )
 
 
 # How the file is changed, and what the one line must contain: the key, the value, what is allowed.

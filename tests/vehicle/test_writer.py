@@ -3,6 +3,7 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from random import Random
 
 import pytest
 
@@ -40,6 +41,33 @@ def test_everything_reads_back(vehicle: Vehicle, tmp_path: Path) -> None:
     assert {p.name for p in tmp_path.iterdir()} == {"made.toml", "report.html"}
 
 
+@pytest.mark.parametrize("source", [EVERYTHING, SIX_AXES, VIDEORAY, REFIT], ids=lambda path: path.stem)
+def test_every_number_is_read_back_to_the_last_bit(source: Path, tmp_path: Path) -> None:
+    """From file to vehicle to file to vehicle, of any vehicle, whatever digits its numbers have."""
+    vehicle, random = load_vehicle(source), Random(7)
+    drawn = {name: value * random.uniform(0.999, 1.001) for name, value in vehicle.coefficients.items() if value}
+    bounds = {name: (one.minimum, one.maximum) for name, one in vehicle.layout.coefficients.items()}
+    values = {name: min(max(value, bounds[name][0]), bounds[name][1]) for name, value in drawn.items()}
+    estimates = {
+        name: row.model_copy(update={"error": row.error * random.uniform(0.9, 1.1)})
+        for name, row in vehicle.estimates.items()
+    }
+    intervals = {name: (value * (1.0 - 1e-9) / 3.0, 3.0 * value) for name, value in values.items() if value > 0.0}
+    made = replace(
+        vehicle,
+        coefficients={**vehicle.coefficients, **values},
+        sources=dict.fromkeys(vehicle.coefficients, "drawn"),
+        intervals={**vehicle.intervals, **intervals} if vehicle.estimates else {},
+        estimates=estimates,
+    )
+    path = tmp_path / "made.toml"
+    write_vehicle(made, path)
+    again, text = load_vehicle(path), path.read_text(encoding="utf-8")
+    assert vehicle_text(replace(again, measured_from=made.measured_from), tmp_path) == text
+    assert again.coefficients == made.coefficients
+    assert again == made
+
+
 def test_a_file_that_was_made_is_written_as_it_stands() -> None:
     refit = replace(load_vehicle(REFIT), measured_from="tank tests")
     assert vehicle_text(refit, REFIT.parent) == TEXT
@@ -64,14 +92,15 @@ def test_tuning_changes_only_the_given_coefficients(source: Path, tmp_path: Path
     lines = [file.read_text(encoding="utf-8").splitlines() for file in (source, path)]
     new = [line for line in lines[1] if line not in lines[0]]
     assert sum("a test" in line for line in new) == 2
-    assert all("a test" in line or line.startswith(("data", "pictures")) for line in new)
+    assert all("a test" in line or line.startswith(("data", "pictures", "name", "identifier")) for line in new)
+    assert (after.name, after.identifier) == (f"{before.name}, tuned: tuned", "tuned")
 
 
 def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path: Path) -> None:
     path = tmp_path / "kept.toml"
     path.write_text("before", encoding="utf-8")
     with pytest.raises(VehicleFileError) as caught:
-        write_vehicle(vehicle.replaced({"m_rov": -1.0}), path)
+        write_vehicle(replace(vehicle, coefficients={**vehicle.coefficients, "m_rov": -1.0}), path, force=True)
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]

@@ -172,7 +172,7 @@ def test_a_changed_file_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "a.csv").write_text("other", encoding="utf-8")
     known = Recorded("mine", "somebody/Somewhere", "", {"a": {"a.csv": 64 * "0"}})
-    for data, reason in ((tmp_path, "has the SHA-256"), (tmp_path / "none", "cannot be read")):
+    for data, reason in ((tmp_path, "has the SHA-256"), (tmp_path / "none", "there is no such file")):
         with pytest.raises(DataFileError, match=reason) as refused:
             known.write("training", data, tmp_path)
         assert len(str(refused.value).splitlines()) == 1

@@ -79,7 +79,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             steps.measure(plain_c, heavy_c, effort.repetitions)
             yield from steps.sections()
             if picture_file:
-                write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()))
+                write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()), force=True)
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
     for limit, one in zip(_PROMISED, (rov, heavy), strict=True):

@@ -96,7 +96,7 @@ class Variations:
         """
         exact = []
         for values in self.values[:_CHECKED].tolist():
-            rov = self.rov.replaced(dict(zip(self.parameters, values, strict=True)))
+            rov = self.rov.with_(**dict(zip(self.parameters, values, strict=True)))
             state = dict.fromkeys(rov.layout.state, 0.0)
             for command in self.work.sequence:
                 state = rov.step(command, state, _HOLD)

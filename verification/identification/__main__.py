@@ -77,7 +77,7 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
     print_scores(*tables)
     texts = [table.to_csv(index=False, float_format="%.6g", lineterminator="\n") for table in tables]
     texts.append(picture(tables[0]))
-    write_whole(*(Output(path, text.encode()) for path, text in zip(files, texts, strict=True)))
+    write_whole(*(Output(path, text.encode()) for path, text in zip(files, texts, strict=True)), force=True)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

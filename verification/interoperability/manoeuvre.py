@@ -103,7 +103,7 @@ class Manoeuvre:
     @cached_property
     def reference(self) -> list[dict[str, float]]:
         """The time and the outputs at each communication point by the step in Python."""
-        rov, inputs = self.rov.replaced(self.parameters), self.inputs_at(0.0)
+        rov, inputs = self.rov.with_(**self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
         line = rov.delay_line()
         rows = []

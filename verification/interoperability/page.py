@@ -29,7 +29,7 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     heads, *rows = matrix(outcomes)
     lines = [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
     content = "\n".join(["", *lines, "", f"Run on {date.today()}.", "", ""])
-    write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()))
+    write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()), force=True)
 
 
 def matrix(outcomes: Sequence[Outcome]) -> list[list[str]]:

@@ -14,7 +14,7 @@ from rov_fmu.fmu.experiments import FOLDER
 from rov_fmu.fmu.proof import remedy
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
-from rov_fmu.io.reading import hash_of
+from rov_fmu.io.reading import hash_of, open_file
 
 
 @dataclass(frozen=True)
@@ -118,7 +118,7 @@ def prove_claims(
         for n, claim in enumerate(CLAIMS):
             on_progress(claim.name.lower(), n / len(CLAIMS))
             evidence.append((claim, _checked(claim, subject)))
-        with fmu.open("rb") as file:
+        with open_file(fmu) as file:
             sha256 = hash_of(file, "sha256").hex()
         return Proof(fmu, sha256, subject.description, measures.card_of(subject), evidence)
 

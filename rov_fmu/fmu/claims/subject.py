@@ -9,8 +9,6 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from lxml import etree
-
 from rov_fmu.fmu.claims.runs import NUMBERS, Plan, Runs
 from rov_fmu.fmu.experiments import (
     DEFAULT_STEPS,
@@ -25,6 +23,7 @@ from rov_fmu.io.child_process import ChildProcess, Limits
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
+from rov_fmu.io.reading import read_bytes, root_of_xml
 
 TIME_LIMIT = 60.0
 """The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
@@ -65,7 +64,7 @@ class Subject:
     @cached_property
     def bounds(self) -> dict[str, tuple[float, float]]:
         """The least and the largest value of each variable, by name. FMPy does not read those of FMI 3.0."""
-        root = etree.parse(str(Path(self.folder, "modelDescription.xml"))).getroot()
+        root = root_of_xml(read_bytes(Path(self.folder, "modelDescription.xml")))
         types = {one.get("name"): _attributes(one) for one in root.iterfind("TypeDefinitions/*")}
         bounds = {}
         for own in map(_attributes, root.iterfind("ModelVariables/*")):

@@ -12,8 +12,8 @@ from rov_fmu.fmu.evidence.meta_data import FILES, GENERATOR, INPUTS, META_DATA, 
 from rov_fmu.fmu.evidence.signature import check_signature
 from rov_fmu.fmu.unpacking import refusal
 from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.messages import NO_FILE, FileError, ProofError, brief, shown
-from rov_fmu.io.reading import hash_of, root_of_xml
+from rov_fmu.io.messages import FileError, ProofError, brief, shown
+from rov_fmu.io.reading import hash_of, open_file, root_of_xml
 
 _MOST_BYTES = 20_000_000
 """The largest size of the meta-data."""
@@ -44,16 +44,14 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
     check_suffix(fmu, FMU)
     evidence = MetaData()
     try:
-        with zipfile.ZipFile(fmu) as archive:
+        with open_file(fmu) as file, zipfile.ZipFile(file) as archive:
             if reason := refusal(archive):
                 raise FileError(f"{fmu}: {reason}")
             if META_DATA in archive.namelist():
                 evidence = _read(fmu, archive)
                 if evidence != MetaData() and (change := next(_changes(archive, evidence.files), "")):
                     raise ProofError(f"{fmu}: {change}")
-    except FileNotFoundError as error:
-        raise FileError(f"{fmu}: {NO_FILE}") from error
-    except (FileError, ProofError, OSError):
+    except (FileError, ProofError):
         raise
     except Exception as error:  # zipfile raises many kinds on damaged archives
         raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error

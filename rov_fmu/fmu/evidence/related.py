@@ -3,7 +3,6 @@
 The layered standard FMI-LS-REF lists these files with their roles in its manifest.
 """
 
-import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import exp
@@ -16,7 +15,7 @@ from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.description import TABLES
 from rov_fmu.vehicle.uncertainty import NORMAL, Uncertainty, is_factor
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from rov_fmu.vehicle.writer import vehicle_text
 
 _ORIGIN = "vehicle"
@@ -24,7 +23,7 @@ _ORIGIN = "vehicle"
 COVARIANCE = "covariance.csv"
 """The name of the file with the covariance, beside the manifest."""
 _DIGITS = ".6g"
-"""How numbers are written that follow from those of the vehicle file, which have six digits."""
+"""How numbers are written that follow from standard errors, which are known to fewer digits."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ def manifest(vehicle: Vehicle, related: Iterable[Related]) -> bytes:
 def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:
     """Return the vehicle file, its tables and the covariance, by their paths in the FMU, with their roles.
 
-    The vehicle file is that of the user, byte for byte. If coefficients have changed since it was read, it is written
+    The vehicle file is that of the user, byte for byte. If the vehicle has changed since it was read, it is written
     anew. A vehicle that was made in Python has none, unless `identify` made it. Pictures and the report of an
     identification are elsewhere in the FMU already.
     """
@@ -58,8 +57,8 @@ def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:
         files[f"{FOLDER}/{name}"] = content
         roles.append(Related(name, role, kind, description))
 
-    if vehicle.path or vehicle.provenance:
-        folder = vehicle.path.parent if vehicle.path else Path()
+    if vehicle.file or vehicle.provenance:
+        folder = vehicle.file.path.parent if vehicle.file else Path()
         content = _vehicle_file(vehicle, folder)
         add(f"{_ORIGIN}/{vehicle.identifier}.toml", content, "model", "application/toml", "The vehicle file")
         for path, role, description in _tables(vehicle):
@@ -73,22 +72,12 @@ def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:
 
 def _vehicle_file(vehicle: Vehicle, folder: Path) -> bytes:
     """Return the content of the vehicle file, whose folder is given. Raises VehicleFileError."""
-    if vehicle.path and _is_as_in_file(vehicle, vehicle.path):
-        return read_bytes(vehicle.path, VehicleFileError)
+    if content := vehicle.file_content:
+        return content
     try:
         return vehicle_text(vehicle, folder).encode()
     except ValueError as error:
         raise VehicleFileError(f"{folder}: {error}") from error
-
-
-def _is_as_in_file(vehicle: Vehicle, path: Path) -> bool:
-    """Return True if a vehicle is the one that a file describes now."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # the file was read before, with its warnings
-        try:
-            return load_vehicle(path) == vehicle
-        except VehicleFileError:
-            return False
 
 
 def _tables(vehicle: Vehicle) -> Iterator[tuple[Path, str, str]]:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from rov_fmu.io.messages import FileError, InputError, ProofError
-from rov_fmu.io.reading import hash_of, read_bytes
+from rov_fmu.io.reading import hash_of, open_file, read_bytes
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
@@ -108,7 +108,7 @@ def check_signature(fmu: Path, key: Path | None = None) -> str:
     from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
     public, signature = _read(path)
-    with fmu.open("rb") as file:
+    with open_file(fmu) as file:
         digest = hash_of(file, _HASH.decode())
     try:
         Ed25519PublicKey.from_public_bytes(public).verify(signature, _message(digest))

@@ -15,7 +15,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import EXTERNAL
 from rov_fmu.equation.layout import Layout, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import NO_FILE, FileError
+from rov_fmu.io.reading import open_file
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
@@ -116,8 +116,8 @@ def _add_identified(
 
     Raises DataFileError if the file has nothing about this log.
     """
-    if not path.is_file():
-        raise FileError(f"{path}: {NO_FILE}")
+    with open_file(path):
+        pass
     own = f"/{topic_name(log.file)}/"
     known = [topic_name(signal["quantity"]) for signal in signals]
     known += [f"unknown_force/{form.axis.name}" for form in layout.axes]

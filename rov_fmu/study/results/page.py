@@ -2,21 +2,19 @@
 
 from collections.abc import Iterator, Sequence
 from functools import partial
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.output import Output
+from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
 from rov_fmu.study.run.worker import REASON, STATUS
 
 PAGE = "study.html"
-_KIND = b'<p class="kind">Study</p>'
 """The mark of a page of a study, by which an existing file is recognised."""
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
@@ -37,14 +35,7 @@ _CONSTANT = 1e-6
 
 def page_output(results: Results) -> Output:
     """Return the page about the finished runs as a file in the folder of the study. Raises FileError."""
-    return Output(results.folder / PAGE, study_page(results).encode())
-
-
-def check_place(folder: Path) -> None:
-    """Raise FileError if the page would overwrite another file."""
-    path = folder / PAGE
-    if path.exists() and _KIND not in path.read_bytes():
-        raise FileError(f"{path}: is not a page of this tool, and would be overwritten. Choose another folder")
+    return Output(results.folder / PAGE, sealed(study_page(results), "<!-- {} -->", "study").encode())
 
 
 def study_page(results: Results) -> str:

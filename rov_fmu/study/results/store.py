@@ -75,7 +75,7 @@ class Store:
         self._clean()
         head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs, "plan": dict(plan), "fmu": fmu}
         text = json.dumps({**head, **description}, indent=2, ensure_ascii=False)
-        write_whole(Output(path, f"{text}\n".encode()))
+        write_whole(Output(path, f"{text}\n".encode()), force=True)
 
     def description(self) -> dict[str, Any]:
         """Return the description of the study. Raises FileError."""
@@ -85,7 +85,7 @@ class Store:
         try:
             found = json.loads(read_text(path))
             known = isinstance(found, dict) and found.get("format") == _FORMAT
-        except ValueError:
+        except (ValueError, RecursionError):
             known = False
         if not known:
             raise FileError(
@@ -111,7 +111,7 @@ class Store:
         """Write the rows of some runs, whole or not at all. Raises WriteError."""
         name = f"part-{first:09d}-{end - 1:09d}.parquet"
         outputs = [Output(self.folder / TRAJECTORIES / name, trajectories)] if trajectories is not None else []
-        write_whole(*outputs, Output(self.folder / RUNS / name, runs))
+        write_whole(*outputs, Output(self.folder / RUNS / name, runs), force=True)
 
     def _clean(self) -> None:
         """Remove unfinished files of a process that was killed."""

@@ -74,7 +74,7 @@ def run_study(
             warnings=prepared.warnings,
         )
         if plan.vehicle:
-            write_whole(Output(folder / model.name, model.content))
+            write_whole(Output(folder / model.name, model.content), force=True)
         spent = execute(job, design, store, workers, scheduler, on_progress)
         if spent.turned:
             count = f"in {spent.turned} of {spent.runs} runs"

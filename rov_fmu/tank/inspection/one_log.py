@@ -4,7 +4,8 @@ import warnings
 from pathlib import Path
 
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.messages import NO_FILE, FileError, lines_on
+from rov_fmu.io.messages import lines_on
+from rov_fmu.io.reading import open_file
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, RovFile, read_description
 from rov_fmu.tank.findings import SENTENCES, sentences
@@ -20,10 +21,9 @@ _NOT_TOLD = {"missing column", "unknown direction", "time of arrival"}
 
 def description_beside(path: Path) -> RovFile:
     """Return what the rov.toml beside a log says. Raises FileError if there is no log."""
-    if not path.is_file():
-        raise FileError(f"{path}: {NO_FILE}")
-    described = path.parent / ROV_FILE
-    return read_description(described) if described.is_file() else NO_ROV_FILE
+    with open_file(path):
+        described = path.parent / ROV_FILE
+        return read_description(described) if described.exists() else NO_ROV_FILE
 
 
 def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = False) -> Log:

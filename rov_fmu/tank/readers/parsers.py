@@ -24,7 +24,8 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, open_text, read_header
-from rov_fmu.io.messages import NO_FILE, FileError, brief, listed
+from rov_fmu.io.messages import FileError, brief, listed
+from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import ZSTD, read_bag, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
@@ -81,15 +82,8 @@ FORMAT_NAMES = listed(dict.fromkeys(kind.name for kind in (TABLE, *FORMATS)))
 
 def format_of(path: Path) -> Format:
     """Return the format of a log by its first bytes. Raises DataFileError for a file that is none."""
-    try:
-        if path.exists() and not (path.is_file() or path.is_dir()):
-            raise DataFileError(f"{path}: is a device or a pipe, and not a file")
-        with path.open("rb") as file:
-            head = file.read(1024)
-    except FileNotFoundError:
-        raise DataFileError(f"{path}: {NO_FILE}") from None
-    except OSError as error:
-        raise UnreadableFileError(f"{path}: cannot be read: {error.strerror or error}") from error
+    with open_file(path, UnreadableFileError) as file:
+        head = file.read(1024)
     if not head:
         raise UnreadableFileError(f"{path}: {EMPTY}")
     reason = reason_against(path, head)

@@ -29,7 +29,7 @@ fmu = of_both_versions("six_dir", "outside3_dir", is_two_long=True)
 def _restarted(folder: Path) -> None:
     """Write what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the ballast at 10 s."""
     y: Any = places(ROV, ROV.layout.at_rest)
-    for rov in (ROV, ROV.replaced(BALLAST)):
+    for rov in (ROV, ROV.with_(**BALLAST)):
         y = rigid_vehicle.integrate(rov, INPUTS, y, 10.0)
     (folder / "end.json").write_text(json.dumps([float(x) for x in compared(ROV, list(y))]), encoding="utf-8")
 

@@ -82,9 +82,9 @@ def _holds(rov: Vehicle) -> list[str]:
 def test_commands_at_which_thrust_pushes_backward_are_told() -> None:
     first = "Commands of 20% to 70%; beyond them the thrust curves extrapolate."
     assert _holds(VIDEORAY) == [first]
-    turned = VIDEORAY.replaced({"a_t_rear": 100.3, "b_t_rear": -27.09})  # of the paper's equation (8)
+    turned = VIDEORAY.with_(a_t_rear=100.3, b_t_rear=-27.09)  # of the paper's equation (8)
     assert _holds(turned) == [first, "The rear thrust is negative below 27%."]
-    turned = _ROVS["everything"].replaced({"a_t_frame_reverse": 20.0, "b_t_frame_reverse": -4.0, "b_t_boost": 0.0})
+    turned = _ROVS["everything"].with_(a_t_frame_reverse=20.0, b_t_frame_reverse=-4.0, b_t_boost=0.0)
     assert _holds(turned)[1:] == ["The frame thrust in reverse is negative below 29%."], "after a dead band of 8.7 %"
 
 

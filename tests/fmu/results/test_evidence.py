@@ -18,6 +18,7 @@ import pytest
 import tomlkit
 from lxml import etree
 
+import rov_fmu
 from rov_fmu.build import build
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import archive
@@ -30,6 +31,8 @@ from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import write_tuned, write_vehicle
+from tests.commands import BARE
 from tests.conftest import Made, without_page
 from tests.often import often
 from tests.vehicles import THRUST_EFFECTS
@@ -60,7 +63,56 @@ def test_a_vehicle_can_be_read_from_its_fmu(tmp_path: Path) -> None:
             (tmp_path / path).write_bytes(content)
         assert load_vehicle(tmp_path / name) == vehicle
         assert (files[name] == source.read_bytes()) == (vehicle["a_d_u"] != 150.0)
-    assert origin(replace(vehicle, path=None)) == ({}, []), "of a vehicle that was made in Python there is no file"
+    assert origin(replace(vehicle, file=None)) == ({}, []), "of a vehicle that was made in Python there is no file"
+
+
+def _shipped(name: str) -> Callable[[Path], Path]:
+    return lambda _: SHIPPED[name]
+
+
+def _tuned(folder: Path) -> Path:
+    write_tuned(_REFIT, path := folder / "tuned.toml", {"alpha_u": 1.0 / 3.0}, "Tuned to V_ss = 0.5 at 30%")
+    return path
+
+
+def _by_hand(folder: Path) -> Path:
+    """Written by the package, with a number of many digits."""
+    write_vehicle(replace(load_vehicle(_REFIT).with_(a_d_u=100.0 / 7.0)), path := folder / "by_hand.toml")
+    return path
+
+
+VEHICLE_FILES = {**{name: _shipped(name) for name in SHIPPED}, "tuned": _tuned, "by hand": _by_hand}
+
+
+@pytest.mark.parametrize("kind", VEHICLE_FILES)
+def test_both_interfaces_put_the_bytes_of_the_users_file_into_the_fmu(kind: str, tmp_path: Path) -> None:
+    path = VEHICLE_FILES[kind](tmp_path)
+    one, other = load_vehicle(path), rov_fmu.load(path)
+    assert one == other
+    assert origin(one) == origin(other)
+    assert path.read_bytes() in origin(one)[0].values()
+    assert origin(one.with_(m_rov=9.87654321)) == origin(other.with_(m_rov=9.87654321)) != origin(one)
+    name = f"{FOLDER}/vehicle/{one.identifier}.toml"
+    for changed in (one.with_(m_rov=9.87654321), replace(one, version="2"), replace(one, limits=("It leaks.",))):
+        written = changed.file_content or origin(changed)[0][name]
+        assert written != path.read_bytes()
+        assert b"9.87654321" in written or changed["m_rov"] == one["m_rov"]
+    assert origin(replace(one.with_(m_rov=9.0), coefficients=one.coefficients, sources=one.sources)) == origin(one)
+
+
+def test_both_interfaces_build_the_same_bytes(tmp_path: Path) -> None:
+    with without_page():
+        assert main(["build", str(BARE), "--platform", "host", "-o", str(tmp_path / "command.fmu")]) == 0
+        rov_fmu.load(BARE).build(tmp_path / "python.fmu", platforms="host")
+    assert (tmp_path / "command.fmu").read_bytes() == (tmp_path / "python.fmu").read_bytes()
+
+
+def test_a_file_that_changes_while_its_vehicle_is_in_use_does_not_change_the_vehicle(tmp_path: Path) -> None:
+    path = tmp_path / "rov.toml"
+    path.write_bytes(BARE.read_bytes())
+    vehicle = load_vehicle(path)
+    path.write_text("something else", encoding="utf-8")
+    assert BARE.read_bytes() in origin(vehicle)[0].values()
 
 
 ROLES = """

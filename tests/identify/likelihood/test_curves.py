@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, 
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.vehicles import VIDEORAY
+from tests.vehicles import VIDEORAY, extended
 
 REAR, _ = VIDEORAY.layout.curves
 
@@ -26,7 +26,7 @@ def test_a_published_curve_is_met_within_a_thousandth_of_full_thrust() -> None:
     truth = 51.5 * np.maximum(commands - 0.06, 0.0) ** 1.45 / 0.94**1.45
 
     def errors(p: np.ndarray) -> np.ndarray:
-        rov = k.replaced({"c_0_t200": float(p[0])})
+        rov = k.with_(c_0_t200=float(p[0]))
         shape = Shapes({curve.name: np.concatenate([p[2:], np.zeros(len(KNOTS))])}, {curve.name: (float(p[0]), 0.0)})
         return np.asarray(np.exp(p[1]) * shape.forces(rov, curve, commands) - truth)
 
@@ -89,7 +89,7 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
     found = dict(curve.coefficients)
 
     def error(coefficients: dict[str, float]) -> float:
-        near = VIDEORAY.replaced(coefficients)
+        near = VIDEORAY.with_(**coefficients)
         off = NO_SHAPES.forces(near, REAR, commands) / shape.forces(VIDEORAY, REAR, commands) - 1.0
         return float(np.sqrt(np.mean(np.square(off))))
 
@@ -102,7 +102,7 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
 def test_a_measured_time_constant_contains_the_lag(command: float) -> None:
     """SciPy integrates w and the thrust from rest, beside a load, until 63 % of V_ss."""
     T, M = 0.4, VIDEORAY["m_rov"] / VIDEORAY["beta_w"]
-    k = VIDEORAY.extended({"T_top": T, "F_0_w": 0.1})
+    k = extended(VIDEORAY, T_top=T, F_0_w=0.1)
 
     def rates(_: float, x: np.ndarray) -> list[float]:
         w, F = x

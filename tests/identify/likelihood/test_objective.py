@@ -109,7 +109,7 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     The log has a voltage and a distance over ground. With frozen gains, the gradient has other signs.
     """
     path = folder_of(tmp_path / "tests", KNOWN, {"thrust_rear.csv": pulled(43.0, 2.7)})
-    stronger = VIDEORAY.replaced({name: 3.0 * VIDEORAY[name] for name in ("a_t_rear", "b_t_rear")})
+    stronger = VIDEORAY.with_(**{name: 3.0 * VIDEORAY[name] for name in ("a_t_rear", "b_t_rear")})
     log = write_log(path, "0", run(stronger, SURGE, PLAN, 5.0).noisy(np.random.default_rng(0), "distance"))
     add_voltage(log)
     known, logs, rows = begin(load_tests(path))

@@ -11,7 +11,7 @@ from scipy.stats import multivariate_normal, t
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
 from rov_fmu.tank.arrays import Array
-from tests.vehicles import VIDEORAY
+from tests.vehicles import VIDEORAY, extended
 
 LOAD = Parameter("load", "heave", mean=0.02, deviation=0.05, null=0.0)
 INERTIA = Parameter("inertia", "heave", mean=0.0, deviation=0.5, is_log=True)
@@ -23,7 +23,7 @@ def conjugate(parameters: Sequence[Parameter], A: Array, y: Array, noise: float)
     weight = np.diag([p.deviation**-2.0 for p in parameters])
     M = A.T @ A / noise**2 + weight
     z = np.linalg.solve(M, A.T @ y / noise**2 + weight @ np.array([p.mean for p in parameters]))
-    k = VIDEORAY.extended({"F_0_w": 0.0})
+    k = extended(VIDEORAY, F_0_w=0.0)
     return Posterior.of(Table(k.layout, k.coefficients, {"heave": 6.0}, tuple(parameters)), z, 2.0 * M)
 
 

@@ -31,6 +31,7 @@ from tests.identify.scenarios.scenario import (
 )
 from tests.identify.scenarios.tank import driven, moved, tilted
 from tests.recordings import with_more
+from tests.vehicles import extended
 from verification.references.pool import NOTHING, Array, Commands, Conditions
 
 Plan = Sequence[tuple[float, Mapping[str, float]]]
@@ -110,7 +111,7 @@ class Kind:
     def vehicle(self) -> Vehicle:
         """The vehicle, with the lags of its curves."""
         lags = {f"T_{name}": curve.lag for name, curve in self.curves.items()}
-        return load_vehicle(self.path).replaced({**self.other, **lags})
+        return load_vehicle(self.path).with_(**{**self.other, **lags})
 
     @property
     def hardware(self) -> str:
@@ -129,7 +130,7 @@ class Kind:
             lines |= {f"a_t_{name}": 0.0, f"a_t_{name}_reverse": 0.0, f"c_0_{name}": 0.0}
             lines[f"b_t_{name}"] = curve.force(abs(command)) / abs(command)
             lines[f"b_t_{name}_reverse"] = curve.force(-abs(command)) / -abs(command)
-        return self.vehicle.extended(lines).response(AXES[axis], command)[0]
+        return extended(self.vehicle, **lines).response(AXES[axis], command)[0]
 
 
 LIKE_BLUEROV2 = Kind(

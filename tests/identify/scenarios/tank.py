@@ -31,8 +31,8 @@ Random = np.random.Generator
 Motion = Mapping[str, Array]
 
 TRUTHS = {
-    "videoray": load_vehicle(SHIPPED["videoray"]).replaced({"beta_u": 0.8}),
-    "bluerov2_heavy": load_vehicle(SHIPPED["bluerov2_heavy"]).replaced({"z_B": -0.05}),
+    "videoray": load_vehicle(SHIPPED["videoray"]).with_(beta_u=0.8),
+    "bluerov2_heavy": load_vehicle(SHIPPED["bluerov2_heavy"]).with_(z_B=-0.05),
 }
 """The true vehicles. β of the VideoRay in surge differs from 1, where a fit may start. The centre of buoyancy of the
 Heavy lies 5 cm above that of mass, so that a pilot without an autopilot can fly it."""
@@ -132,7 +132,7 @@ class Tank:
         seconds = self.logs.seconds if "voltage" in self.logs.columns else 0.0
         factor = sagging(0.5 * seconds, seconds) if seconds else 1.0
         thrust = [name for name in truth.coefficients if name[:4] in ("a_t_", "b_t_")]
-        pushed = truth.replaced({name: factor * truth[name] for name in thrust})
+        pushed = truth.with_(**{name: factor * truth[name] for name in thrust})
         found: dict[tuple[str, str], float] = {}
         for axis in self.recorded:
             names = [axis.coefficient(key) for key in ("a_d", "b_d", "beta")]

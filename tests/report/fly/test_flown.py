@@ -45,7 +45,7 @@ def test_keys_loads_and_places_of_the_heavy() -> None:
 
 
 def test_sliders_reach_from_half_to_twice_a_mass_and_20_cm_beside_a_centre() -> None:
-    found = live([Flown(flown_vehicle("bluerov2_heavy").replaced({"alpha_u": 0.05, "beta_w": 2.0}), b"")])
+    found = live([Flown(flown_vehicle("bluerov2_heavy").with_(alpha_u=0.05, beta_w=2.0), b"")])
     ballast, tuning = found.tunable.values()
     mass = "m_rov m_rov 6.75 27 13.5 kg, W W 106.1 165.7 132.6 N, B B 105.3 164.5 131.6 N"
     assert shown(row[:-1] for row in ballast) == f"{mass}, z_B z_B -0.21 0.19 -0.01 m"

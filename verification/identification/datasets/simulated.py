@@ -65,7 +65,7 @@ class Simulated:
         """The true vehicle."""
         usual = load_vehicle(SHIPPED[self.base])
         factors = {axis.coefficient(key): f for axis in self.axes for key, f in _CHANGED.items()}
-        return usual.replaced({n: usual[n] * f for n, f in factors.items()} | dict(self.changed))
+        return usual.with_(**{n: usual[n] * f for n, f in factors.items()} | dict(self.changed))
 
     @property
     def truth(self) -> Truth:
