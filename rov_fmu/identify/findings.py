@@ -239,7 +239,8 @@ def told(identification: Identification) -> Identification:
     assert made
     sentences_of = {
         "warnings": warnings(findings),
-        "facts": facts(findings),
+        # other files beside the tests say nothing about the vehicle
+        "facts": facts(finding for finding in findings if finding.kind != "other files"),
         "verdicts": tuple(map(verdict_in_words, identification.axes)),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }

@@ -1,6 +1,7 @@
 """The Jacobians of a step against 50 digits, and the variational equation with CasADi's derivatives and DOP853."""
 
 import random
+from dataclasses import replace
 from typing import Any
 
 import casadi
@@ -80,7 +81,7 @@ def _of(rov: Vehicle, values: Values) -> tuple[Vehicle, Values, Values]:
     """Return a vehicle with coefficients of these values, its inputs and its states."""
     parts = (rov.coefficients, rov.layout.inputs, rov.layout.state)
     coefficients, inputs, state = ({name: values[name] for name in part} for part in parts)
-    return rov.with_(**coefficients), inputs, state
+    return replace(rov, coefficients=coefficients), inputs, state
 
 
 def _exact(rov: Vehicle, values: Values, name: str, side: int) -> list[float]:

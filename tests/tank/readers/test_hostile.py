@@ -179,7 +179,7 @@ def test_a_file_that_is_gone_as_it_is_read_is_one_line(tmp_path: Path, monkeypat
 def test_a_pipe_is_no_file(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     os.mkfifo(path)
-    with pytest.raises(DataFileError, match="is a device or a pipe, and not a file"):
+    with pytest.raises(DataFileError, match="is a device or a pipe, and must be a file"):
         read(path)
 
 

@@ -15,7 +15,7 @@ from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import commanded, measured
 from tests.tank.readers.motion import BLUEROV2, TIME
-from tests.tank.readers.test_mavlink import N, dive
+from tests.tank.readers.test_autopilots import N, dive
 from tests.tank.readers.writers import Ros, parameter, write_tlog
 
 
