@@ -320,9 +320,11 @@ def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColum
 
 def _without_thruster(table: Columns, layout: Layout) -> Iterator[Finding]:
     """Yield findings about columns such as `u_7 [%]` of a log whose other commands are those of numbered thrusters."""
-    if any(_NUMBERED.fullmatch(title) for title in table.headers.values()):
-        others = (title for title in table.header if title not in table.headers.values())
-        extra = {shown(title): int(match[1]) for title in others if (match := _NUMBERED.fullmatch(title))}
+    # by their numbers: headers that are read may have been renamed
+    used = {int(match[1]) for title in table.headers.values() if (match := _NUMBERED.fullmatch(title))}
+    numbers = {title: int(match[1]) for title in table.header if (match := _NUMBERED.fullmatch(title))}
+    if used:
+        extra = {shown(title): number for title, number in numbers.items() if number not in used}
         yield from misfits(table.path.name, layout, [], extra, None)
 
 

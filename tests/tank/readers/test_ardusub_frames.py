@@ -20,7 +20,7 @@ from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.tank.logs import read_log
+from tests.tank.logs import commanded, read_log
 from tests.tank.readers.writers import attitude, dataflash, packed, parameter, rcou, servos, write_tlog
 from tests.vehicles import thruster
 from verification.references.autopilot.ardusub import VECTORED_6DOF
@@ -289,6 +289,16 @@ def test_columns_of_numbered_thrusters_that_the_vehicle_lacks_are_named(tmp_path
         (said,) = sentences(found, SENTENCES) or ("",)
         assert said.endswith(words)
         assert len(found) == (len(layout.axes) if words else 0)
+
+
+@pytest.mark.parametrize("neutral", [1500.0, 1530.0])
+def test_columns_whose_neutral_is_where_they_rest_have_their_thrusters(neutral: float, tmp_path: Path) -> None:
+    rows, header = _rows()[:, :8], ",".join(["time [s]", *(f"u_{n} [us]" for n in range(1, 7)), "depth [m]"])
+    rows[:, 1:7] = neutral + 100.0 * (rows[:, :1] > 2.0)
+    np.savetxt(tmp_path / "dive.csv", rows, "%.4g", ",", header=header, comments="")
+    read = read_log(tmp_path / "dive.csv", BLUEROV2)
+    assert not [finding for finding in read.findings if finding.kind in KINDS]
+    assert commanded(read.log, "1")[0] == 0.0
 
 
 def _rows() -> Array:
