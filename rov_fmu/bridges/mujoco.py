@@ -12,6 +12,7 @@ import numpy as np
 from rov_fmu.bridges import sdf
 from rov_fmu.bridges.mcap import hull_size
 from rov_fmu.equation import step
+from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Thruster
 from rov_fmu.equation.printed import printed_accelerations
 from rov_fmu.io.messages import listed
@@ -25,23 +26,13 @@ _PACKAGE = '''\
 from functools import partial
 from pathlib import Path
 
-import mujoco
-
 from . import equation, plugin
 from .plugin import step
 
+FOLDER = Path(__file__).parent
 Rov = partial(plugin.Rov, equation)
-_FOLDER = Path(__file__).parent
-
-
-def load(**coefficients):
-    """Return the vehicle in its world, with other values of some coefficients."""
-    return Rov(mujoco.MjModel.from_xml_path(str(_FOLDER / "scene.xml")), **coefficients)
-
-
-def draws():
-    """Return the sets of coefficients that were drawn, if there are any: load(**draws()[0])."""
-    return plugin.draws_of(_FOLDER / "draws.csv")
+load = partial(plugin.load, equation, FOLDER / "scene.xml")
+draws = partial(plugin.draws, FOLDER / "draws.csv")
 '''
 _MAIN = '''\
 """Open MuJoCo's viewer with the vehicle, or write a picture: python -m {package} [FILE.png]."""
@@ -75,6 +66,7 @@ def mujoco_files(
         "gravity": sdf.gravity(vehicle),
         "body": sdf.link_of(vehicle, 1.0),
         "hull": hull,
+        "foam": {"at": hull * (0.0, 0.0, 0.72), "size": hull * (1.01, 0.9, 0.3)},
         "range": np.array([low, high]),
         "thrusters": [_drawn(vehicle, thruster, _PROPELLER * float(hull.max()) * 2.0) for thruster in layout.thrusters],
         "package": package,
@@ -130,7 +122,7 @@ def _notes(vehicle: Vehicle) -> list[str]:
     """Return what is different in MuJoCo, without full stops."""
     layout = vehicle.layout
     notes = ["Steps of `implicit` or `Euler` are taken; `RK4` is not", "The water has no surface"]
-    if lacking := [name for name in sdf.AXES if name not in layout.kinds]:
+    if lacking := [name for name in AXES if name not in layout.kinds]:
         notes.append(
             f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "
             "times its mass"

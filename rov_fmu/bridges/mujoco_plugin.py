@@ -18,7 +18,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
+_HAS_DISPLAY = sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+if not _HAS_DISPLAY:
     os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it as it is imported
 
 import mujoco
@@ -53,6 +54,7 @@ class Water:
         self.forces = dict.fromkeys(self.equation.LAGGING, 0.0)
         self.line = DelayLine(self.equation.COMMANDS, self.equation.DELAYED)
         self.held: tuple[float, ...] = ()
+        self.numbers: dict[str, float] = {}
         self.since = 0.0
         """The time since the numbers of the equation were last computed, s."""
 
@@ -69,7 +71,12 @@ class Water:
         return found
 
     def accelerate(
-        self, commands: Mapping[str, float], state: tuple[list[float], list[float]], outside: list[float], t: float, h: float
+        self,
+        commands: Mapping[str, float],
+        state: tuple[list[float], list[float]],
+        outside: list[float],
+        t: float,
+        h: float,
     ) -> list[float]:
         """Return the mean acceleration during a time step of h seconds from time t, with the commands held.
 
@@ -102,16 +109,14 @@ class Water:
         self, commands: Mapping[str, float], after: float, velocity: list[float], quaternion: list[float]
     ) -> list[float]:
         """Return the acceleration some seconds after the start of a part of the step."""
-        R = _rotation(quaternion)
-        flow = [self.inputs.get(name, 0.0) for name in ("V_N", "V_E", "V_D")]
-        through = [v - current for v, current in zip(velocity[:3], flow, strict=True)]
-        u, v, w = (sum(R[i][j] * through[i] for i in range(3)) for j in range(3))
-        p, q, r = velocity[3:]
-        nu = (u, v, w, p, q, r)
+        R = first, second, third = _rotation(quaternion)
+        x, y, z = (v - self.inputs.get(name, 0.0) for v, name in zip(velocity, ("V_N", "V_E", "V_D"), strict=False))
+        u, v, w = (a * x + b * y + c * z for a, b, c in zip(first, second, third, strict=True))
+        nu = u, v, w, p, q, r = u, v, w, *velocity[3:]
         self._hold(commands, nu)
-        rates: list[float] = self.rates(self.since + after, *nu, *R[2])
+        rates: list[float] = self.rates(self.since + after, *nu, *third)
         for n in self.lacking:
-            tilt = (0.0, 0.0, 0.0, R[2][1], -R[2][0], 0.0)[n]
+            tilt = (0.0, 0.0, 0.0, third[1], -third[0], 0.0)[n]
             rates[n] = -2.0 * nu[n] / _REST - tilt / _REST**2
         # the velocity of the origin changes in the earth frame by v' + omega x v
         a, b, c = rates[0] + q * w - r * v, rates[1] + r * u - p * w, rates[2] + p * v - q * u
@@ -180,9 +185,10 @@ class Rov:
         self.reset()
 
     def reset(self) -> None:
-        """Stop the thrusters, and forget the commands that wait for the dead time. `step` does so if the time went back."""
+        """Stop the thrusters and forget the commands that wait for the dead time, as `step` does if time went back."""
         self.water.reset()
-        self._time, self._outside, self._weighed = self.data.time, np.zeros(6), {}
+        self._time, self._outside = self.data.time, np.zeros(6)
+        self._weighed: dict[str, float] = {}
 
     @property
     def forces(self) -> dict[str, float]:
@@ -271,14 +277,16 @@ def _check(model: Any, body: int, name: str) -> None:
     if model.body_gravcomp[body] != 1.0:
         raise ValueError(f'body {name}: must have gravcomp="1", because the equation contains weight and buoyancy')
     if model.opt.density or model.opt.viscosity:
-        raise ValueError("option: density and viscosity must be 0, because the equation contains the forces of the water")
+        raise ValueError(
+            "option: density and viscosity must be 0, because the equation contains the forces of the water"
+        )
 
 
 def _rigid_mass(model: Any, body: int) -> Any:
     """Return the 6x6 mass matrix of a rigid body about its origin, in its own frame."""
-    mass, centre, axes = model.body_mass[body], model.body_ipos[body], np.empty(9)
-    mujoco.mju_quat2Mat(axes, model.body_iquat[body])
-    axes = axes.reshape(3, 3)
+    mass, centre, entries = model.body_mass[body], model.body_ipos[body], np.empty(9)
+    mujoco.mju_quat2Mat(entries, model.body_iquat[body])
+    axes = entries.reshape(3, 3)
     cross = np.cross(np.eye(3), centre)  # cross @ x is centre x x
     about_centre = axes @ np.diag(model.body_inertia[body]) @ axes.T
     return np.block([[mass * np.eye(3), -mass * cross], [mass * cross, about_centre - mass * cross @ cross]])
@@ -291,14 +299,19 @@ def _cross(a: Any, b: Any) -> tuple[float, float, float]:
 # ---- The exported folder ---------------------------------------------------------------------------------------------
 
 
-def draws_of(path: Path) -> list[dict[str, float]]:
-    """Return sets of coefficients by name, from a table with a set in each row. They are arguments of `Rov`."""
+def load(equation: Any, scene: Path, **coefficients: float) -> Rov:
+    """Return the vehicle in its world (MJCF), with other values of some coefficients."""
+    return Rov(equation, mujoco.MjModel.from_xml_path(str(scene)), None, "", **coefficients)
+
+
+def draws(path: Path) -> list[dict[str, float]]:
+    """Return the sets of coefficients that were drawn, from a table with a set in each row: load(**draws()[0])."""
     with path.open(encoding="utf-8", newline="") as file:
         return [{name: float(text) for name, text in row.items()} for row in csv.DictReader(file)]
 
 
 def show(rov: Rov, picture: Path | None = None) -> None:
-    """Open MuJoCo's viewer with a vehicle, or write a picture (.png) of it, 3 s after the start of an example.
+    """Open MuJoCo's viewer with a vehicle, or write a picture (.png) of it, 2 s after the start of an example.
 
     Raises SystemExit with a line about what is missing.
     """
@@ -310,18 +323,18 @@ def show(rov: Rov, picture: Path | None = None) -> None:
     if picture is None:
         _view(rov)
         return
-    while rov.data.time < 3.0:
+    while rov.data.time < 2.0:
         rov.step()
     mujoco.mj_forward(rov.model, rov.data)
     try:
         with mujoco.Renderer(rov.model, 720, 1280) as renderer:
+            renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
             renderer.update_scene(rov.data, "chase")
             picture.write_bytes(_png(renderer.render()))
     except (AttributeError, ImportError, OSError, RuntimeError, mujoco.FatalError) as error:
-        with_osmesa = "MUJOCO_GL=osmesa with the package libosmesa6"
         raise SystemExit(
-            f"MuJoCo cannot draw ({error}): on Linux without a display it needs EGL (packages libegl1, libgl1-mesa-dri), "
-            f"or {with_osmesa}"
+            f"MuJoCo cannot draw ({error}): on Linux without a display, it needs EGL (packages libegl1 and "
+            "libgl1-mesa-dri), or MUJOCO_GL=osmesa and the package libosmesa6"
         ) from error
 
 
@@ -330,13 +343,12 @@ def _view(rov: Rov) -> None:
 
     import mujoco.viewer
 
+    if not _HAS_DISPLAY:
+        raise SystemExit("There is no display for a window: give the name of a picture, such as rov.png, to draw one")
     try:
         viewer = mujoco.viewer.launch_passive(rov.model, rov.data)
-    except Exception as error:  # GLFW, the Cocoa of macOS and MuJoCo raise different ones
-        raise SystemExit(
-            f"MuJoCo cannot open a window ({error}): give the name of a picture, such as rov.png, to draw one instead; "
-            "on macOS, run mjpython in place of python"
-        ) from error
+    except RuntimeError as error:
+        raise SystemExit(f"MuJoCo cannot open a window ({error}); on macOS, run mjpython in place of python") from error
     with viewer:
         ahead = rov.data.time - time.monotonic()
         while viewer.is_running():

@@ -108,7 +108,9 @@ def printed_accelerations(layout: Layout, step: str) -> str:
 
     Frames and signs are those of the equation: forward, starboard, down. `step` is the name of step.py there.
     """
-    words = "The mass matrix and the accelerations of a vehicle (forward, starboard, down). All numbers are in SI units."
+    words = (
+        "The mass matrix and the accelerations of a vehicle (forward, starboard, down). All numbers are in SI units."
+    )
     return _module(words, step, accelerations_text(layout))
 
 
@@ -121,7 +123,7 @@ def accelerations_text(layout: Layout) -> str:
     formulas = {**equation.program, **equation.forces}
     numbers = {name: x for name, x in formulas.items() if name not in equation.orientation}
     mass = mass_matrix(layout, equation.names)
-    masses = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
+    masses: dict[tuple[str, str], Expression] = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
     for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):
         masses[a, b] = masses[b, a] = equation.names("mass", a + b)
     rows = "".join(
@@ -137,7 +139,7 @@ PIVOTS = {_pivots(equation)}  # of the mass matrix, all above 0
 {_tables(equation)}
 
 def numbers(values):
-    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and lagging forces, together with these.\"\"\"
+    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and lagging forces, and these.\"\"\"
     v = dict(values)
 {_assignments(numbers)}
     return v

@@ -216,9 +216,12 @@ class Vehicle:
 
     # ---- Thrust ----
 
-    def curve_force(self, curve: Curve, command: float) -> float:
-        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual inputs."""
+    def curve_force(self, curve: Curve, command: float, voltage: float | None = None) -> float:
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage or
+        another one (V)."""
         values = {**self.coefficients, **self.layout.usual_inputs, "u_one": command}
+        if voltage is not None:
+            values["voltage"] = voltage
         *_, force = _thrust_of(curve)(values).values()
         return float(force)
 
