@@ -18,8 +18,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-_HAS_DISPLAY = sys.platform != "linux" or os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
-if not _HAS_DISPLAY:
+if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
     os.environ.setdefault("MUJOCO_GL", "egl")  # MuJoCo reads it as it is imported
 
 import mujoco
@@ -343,7 +342,7 @@ def _view(rov: Rov) -> None:
 
     import mujoco.viewer
 
-    if not _HAS_DISPLAY:
+    if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
         raise SystemExit("There is no display for a window: give the name of a picture, such as rov.png, to draw one")
     try:
         viewer = mujoco.viewer.launch_passive(rov.model, rov.data)
