@@ -49,7 +49,7 @@ COMMANDS = {
         lambda path: ["build", str(BARE), "--platform", "host", "--osp", "-o", str(path.with_name("rov.fmu"))],
     ),
     "the page that flies": Command("fly.html", lambda path: ["fly", str(BARE), "-o", str(path)]),
-    "the model for Gazebo": Command("bare.sdf", lambda path: ["sdf", str(BARE), "-o", str(path)]),
+    "the model for Gazebo": Command("bare.sdf", lambda path: ["export", str(BARE), "--to", "sdf", "-o", str(path)]),
     "the vehicle": Command("rov.toml", lambda path: ["identify", str(FEW_TESTS), "--force", "-o", str(path)]),
     "the report": Command("report.html", lambda path: ["identify", str(FEW_TESTS), "--force", "--report", str(path)]),
     "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "-o", str(path)]),

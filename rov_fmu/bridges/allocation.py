@@ -5,7 +5,7 @@ w = B F for the forces F of the thrusters. The forces of least size for a wrench
 (Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, 12.3.2). The tuning alpha is in B.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from math import ceil
 
@@ -21,17 +21,19 @@ from rov_fmu.vehicle.vehicle import Vehicle
 Array = NDArray[np.float64]
 Row = tuple[float, float]
 """A force, N, and the fraction of the full command that gives it."""
-_Force = Callable[[float], float]
 
-_EXACT = 1e-4
+_EXACT = 3e-4
 """The largest error of a force that is interpolated between two rows, relative to the force."""
+_SMALL = 0.005
+"""The share of the strongest force below which errors are no smaller than at this share."""
 _FAINT = 1e-5
 """The least force of a table beside 0, relative to the strongest one: within it, the dead band is crossed."""
-_APART = 0.025
+_APART = 0.0125
 """The most that two neighbouring voltages differ, relative to the lower one."""
 _RANGE = 0.8, 1.2
 """The range of the voltage relative to the usual one, where the thrust follows a power of it."""
-_SAMPLES = 64
+_SAMPLES = 300
+"""The commands among which the rows of a table are chosen."""
 
 
 def allocation_files(vehicle: Vehicle) -> dict[str, str]:
@@ -104,7 +106,7 @@ def voltages(vehicle: Vehicle, curve: Curve) -> list[float | None]:
     usual = vehicle.layout.voltage
     if usual is None or not (len(curve.tables) > 1 or "V_0" in curve.keys):
         return [None]
-    known = [one.voltage for one in curve.tables] if curve.tables else [usual * share for share in _RANGE]
+    known = [one.voltage for one in curve.tables] if len(curve.tables) > 1 else [usual * share for share in _RANGE]
     ends = sorted({*known, min(max(usual, known[0]), known[-1])})
     found = [ends[0]]
     for low, high in pairwise(ends):
@@ -124,45 +126,33 @@ def table(vehicle: Vehicle, curve: Curve, voltage: float | None) -> list[Row]:
 
 
 def _one_way(vehicle: Vehicle, curve: Curve, voltage: float | None, sign: float) -> Iterator[Row]:
-    """Yield forces and commands in one direction, without their sign."""
+    """Yield forces and commands in one direction, without their sign: as few as the interpolation needs."""
 
     def force(command: float) -> float:
         return sign * vehicle.curve_force(curve, sign * command, voltage)
 
-    rows: list[Row] = []
-    commands = np.linspace(0.0, 1.0, _SAMPLES + 1).tolist()
-    forces = [*map(force, commands)]
-    least = _FAINT * max(0.0, *forces)
-    low = 0.0
-    for c, F in zip(commands, forces, strict=True):
-        if max(least, rows[-1][0] if rows else 0.0) < F:
-            if not rows:
-                rows.append(_beginning(force, low, c, least))
-            rows.append((F, c))
-        elif not rows:
-            low = c
-    yield from rows[:1]
-    for first, last in pairwise(rows):
-        yield from _refined(force, first, last)
-
-
-def _beginning(force: _Force, low: float, high: float, least: float) -> Row:
-    """Return the row where the force just exceeds the least one, between a command with less and one with more."""
-    for _ in range(60):
+    strongest = max(map(force, np.linspace(0.0, 1.0, 65).tolist()))
+    low, high = 0.0, 1.0
+    while high - low > 1e-12 and strongest > 0.0:  # where the force rises above the least one
         middle = 0.5 * (low + high)
-        low, high = (low, middle) if force(middle) > least else (middle, high)
-    return force(high), high
+        low, high = (low, middle) if force(middle) > _FAINT * strongest else (middle, high)
+    commands = low + (1.0 - low) * np.linspace(0.0, 1.0, _SAMPLES) ** 2  # most near the dead band
+    forces = np.array([*map(force, commands.tolist())])
+    rises = (forces > 0.0) & (forces > np.concatenate([[0.0], np.maximum.accumulate(forces)[:-1]]))
+    commands, forces = commands[rises], forces[rises]
+    n, last = 0, len(forces) - 1
+    while n <= last:
+        yield float(forces[n]), float(commands[n])
+        end = n + 2
+        while end <= last and _is_straight(commands[n : end + 1], forces[n : end + 1], _SMALL * strongest):
+            end += 1
+        n = max(min(end - 1, last), n + 1)
 
 
-def _refined(force: _Force, first: Row, last: Row, depth: int = 16) -> Iterator[Row]:
-    """Yield the rows after the first up to the last one, as many as the interpolation needs."""
-    c = 0.5 * (first[1] + last[1])
-    F, linear = force(c), 0.5 * (first[0] + last[0])
-    if depth and first[0] < F < last[0] and abs(F - linear) > _EXACT * linear:
-        yield from _refined(force, first, (F, c), depth - 1)
-        yield from _refined(force, (F, c), last, depth - 1)
-    else:
-        yield last
+def _is_straight(commands: Array, forces: Array, small: float) -> bool:
+    """Return True if a line between the ends gives the forces in between."""
+    line = np.interp(commands, commands[[0, -1]], forces[[0, -1]])
+    return bool((np.abs(line - forces) <= _EXACT * np.maximum(forces, small)).all())
 
 
 def _row(values: list[float]) -> str:

@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.io.messages import InputError, shown
-from rov_fmu.vehicle.uncertainty import draws as drawn_from
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -71,7 +70,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         """Draw all coefficients and starts anew. Return the states (vehicles x states)."""
         super().reset(seed=seed[0] if isinstance(seed, list) else seed, options=options)
         if self.draws:
-            drawn = drawn_from(self.vehicle, self.num_envs, self.np_random, forced=self.draws == "force")
+            drawn = self.vehicle.draws(self.num_envs, self.np_random, forced=self.draws == "force")
             self.coefficients = {name: column[:, np.newaxis] for name, column in drawn.items()}
         self._begin(np.ones(self.num_envs, bool))
         return self.state.copy(), {}

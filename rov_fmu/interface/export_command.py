@@ -1,7 +1,9 @@
 """The command `rov-fmu export`: the files of a vehicle for other simulators and for thruster managers."""
 
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from keyword import iskeyword
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +17,12 @@ from rov_fmu.io.file_kinds import GAZEBO_MODEL, check_written
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import shell_words
-from rov_fmu.vehicle.uncertainty import draws
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 _ENDS = {"mujoco": "_mujoco", "allocation": "_allocation", "sdf": ".sdf", "urdf": ".urdf"}
 """The end of the usual name of a folder or a file, after the identifier of the vehicle, by format."""
+_TAKEN = {"mujoco", "numpy", *sys.stdlib_module_names}
+"""The names of modules that the folder for MuJoCo imports, directly or through others."""
 _OF_CARD = ("Where it holds", "How far to trust it", "What it leaves out")
 
 
@@ -65,8 +68,9 @@ def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exp
     if path.exists() and not path.is_dir():
         raise InputError(f"{path}: is a file, and --to {to} writes a folder")
     files = _mujoco(loaded, path, options) if to == "mujoco" else allocation_files(loaded)
-    if path.parent.is_dir():
-        path.mkdir(exist_ok=True)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    path.mkdir(exist_ok=True)
     check_targets((path / name for name in files), inputs)
     write_whole(*(Output(path / name, text.encode()) for name, text in files.items()))
     there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
@@ -86,14 +90,12 @@ def _misplaced(to: str, options: Options) -> Iterator[str]:
 
 
 def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Mapping[str, str]:
-    if not path.name.isidentifier():
-        raise InputError(
-            f"{path}: programs import this folder, so its name must begin with a letter and have only letters, digits "
-            "and _"
-        )
+    if not path.name.isidentifier() or iskeyword(path.name) or path.name in _TAKEN:
+        reason = "begin with a letter, have only letters, digits and _, and not be that of another module"
+        raise InputError(f"{path}: programs import this folder, so its name must {reason}")
     drawn = {}
     if options.draws is not None:
-        drawn = draws(vehicle, options.draws, np.random.default_rng(options.seed or 0), forced=options.force)
+        drawn = vehicle.draws(options.draws, np.random.default_rng(options.seed or 0), forced=options.force)
     paragraphs = card(vehicle)
     columns = {name: column.tolist() for name, column in drawn.items()}
     return mujoco_files(vehicle, path.name, {heading: paragraphs[heading] for heading in _OF_CARD}, columns)

@@ -8,7 +8,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from math import floor, inf, isfinite, log, log10
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +16,7 @@ from scipy.special import ndtri, stdtrit
 
 from rov_fmu.equation.catalogue import TUNING, Declaration
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.schema import Estimated
-
-if TYPE_CHECKING:
-    from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
@@ -120,39 +115,6 @@ class Uncertainty:
 
 NOTHING = Uncertainty((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((0, 2)))
 """The distribution of no coefficients."""
-
-
-def draws(vehicle: "Vehicle", count: int, generator: np.random.Generator, *, forced: bool = False) -> dict[str, Array]:
-    """Return the coefficients of `count` vehicles, drawn from what is known about a vehicle, by their names.
-
-    These are the sets of `rov-fmu export --draws`, of `RovVectorEnv` and of a study with `vary_from` and the sampler
-    "random", for equal seeds. Raises InputError if nothing is known, or unless `forced`, if an axis is not fit for use.
-    """
-    known = vehicle.uncertainty
-    if not known.names:
-        raise InputError(f"{vehicle.identifier}: no coefficient has a confidence interval, so nothing can be drawn")
-    if not forced and (reasons := unfit_axes(vehicle)):
-        raise InputError(f"{vehicle.identifier}: {'; '.join(reasons)}. Draws do not tell how far such an axis is off")
-    return dict(zip(known.names, known.drawn(generator.random((count, len(known.names)))).T, strict=True))
-
-
-def unfit_axes(vehicle: "Vehicle") -> list[str]:
-    """Return each axis whose verdict is neither good nor usable, with the verdict: `yaw: do not use`.
-
-    An axis without a verdict, or in a file without verdicts an axis of which no coefficient has an interval, was not
-    identified.
-    """
-    sentences = vehicle.provenance.verdicts if vehicle.provenance else ()
-    words = {axis: rest.partition(".")[0] for axis, _, rest in (sentence.partition(": ") for sentence in sentences)}
-    if not sentences:
-        own = {
-            keys[1]
-            for name, keys in vehicle.layout.keys_in_file.items()
-            if name in vehicle.intervals and keys[0] == "axes"
-        }
-        words = dict.fromkeys(own, "usable")
-    found = {axis: words.get(axis, "not identified") for axis in vehicle.layout.kinds}
-    return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
 
 
 def uncertainty(

@@ -10,7 +10,7 @@ from rov_fmu.io.messages import first_of, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.model import Variable, unsettable
 from rov_fmu.study.plan.plan import Plan
-from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty, unfit_axes
+from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _KEY = "vary_from"
@@ -69,8 +69,8 @@ class Estimates:
         if not self._vehicle:
             return
         file, has = self._plan.vary_from, self._has
-        if (made := self._vehicle.provenance) and made.verdicts and (reasons := unfit_axes(self._vehicle)):
-            yield f"{file}: {'; '.join(reasons)}. The estimates do not tell how far such an axis is off"
+        if (made := self._vehicle.provenance) and made.verdicts and (axes := self._vehicle.unfit_axes):
+            yield f"the estimates of {file} do not show how far these axes may be off: {', '.join(axes)}"
         alone = [name for name in self.names if name not in self._vehicle.estimates]
         if alone and len(self.names) > 1:
             yield (
