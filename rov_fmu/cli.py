@@ -536,7 +536,7 @@ def _write_export(
     print_end([exported.path], exported.following)
 
 
-@_commands.command("sdf", hidden=True)
+@_commands.command("sdf")
 @_vehicle_or_videoray()
 @_output_option(metavar="FILE.sdf|.urdf", help="File to write. The default is <identifier>.sdf.")
 @_world(help="Add a world with water, which Gazebo can run (sdf).")

@@ -6,6 +6,8 @@ equation of the vehicle, which `equation/printed.py` prints.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -18,6 +20,9 @@ from rov_fmu.equation.printed import printed_accelerations
 from rov_fmu.io.messages import listed
 from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.bridges.mujoco_plugin import Rov
 
 _PLUGIN = Path(__file__).with_name("mujoco_plugin.py")
 _PACKAGE = '''\
@@ -93,7 +98,25 @@ def mujoco_files(
     return files
 
 
-def equation_module(vehicle: Vehicle) -> str:
+def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
+    """Return a vehicle in its world in MuJoCo, as `load` of the folder does. Needs the extra `mujoco`.
+
+    Raises InputError as `mujoco_files` does.
+    """
+    import mujoco
+
+    from rov_fmu.bridges.mujoco_plugin import Rov
+
+    files = mujoco_files(vehicle, "rov", {}, {})
+    equation = ModuleType("equation")
+    exec(compile(equation_module(vehicle, "rov_fmu.equation.step"), "<equation>", "exec"), equation.__dict__)
+    model = mujoco.MjModel.from_xml_string(
+        files["scene.xml"], {f"{vehicle.identifier}.xml": files[f"{vehicle.identifier}.xml"].encode()}
+    )
+    return Rov(equation, model, None, "", **coefficients)
+
+
+def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
     """Return the module with the equation of a vehicle and its numbers, as `mujoco_plugin.py` takes it."""
     layout = vehicle.layout
     data = {
@@ -107,7 +130,7 @@ def equation_module(vehicle: Vehicle) -> str:
         "EXAMPLE": layout.example(layout.axes[0].axis),
     }
     lines = [f"{name} = {value!r}" for name, value in data.items()]
-    return "\n".join([printed_accelerations(layout, ".step"), "", *lines, ""])
+    return "\n".join([printed_accelerations(layout, step), "", *lines, ""])
 
 
 def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, object]:
