@@ -269,6 +269,8 @@ def step(*rovs: Rov) -> None:
 
 def _check(model: Any, body: int, name: str) -> None:
     """Raise ValueError if the equation cannot move a body."""
+    if hasattr(mujoco.MjData, "qM"):  # contacts there do not feel what is added to M
+        raise ValueError(f"MuJoCo {mujoco.__version__}: must be 3.17 or later: pip install --upgrade mujoco")
     if model.body_parentid[body] or model.body_jntnum[body] != 1 or model.jnt_type[model.body_jntadr[body]] != _FREE:
         raise ValueError(f"body {name}: must be in <worldbody> and have a <freejoint>, and no other joint")
     if model.body_simple[body]:

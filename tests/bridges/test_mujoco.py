@@ -411,6 +411,12 @@ def test_a_model_that_the_equation_cannot_move_is_one_line(change: Any, message:
         package.Rov(spec.compile())
 
 
+def test_a_mujoco_whose_contacts_would_not_feel_the_added_mass_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mujoco.MjData, "qM", None, raising=False)
+    with pytest.raises(ValueError, match=r"^MuJoCo .*: must be 3\.17 or later"):
+        loaded("videoray")[1].load()
+
+
 def test_an_unknown_coefficient_is_one_line() -> None:
     with pytest.raises(ValueError, match=r"^a_d_v: the vehicle has no such coefficient$"):
         loaded("videoray")[1].load(a_d_v=1.0)
@@ -435,6 +441,7 @@ def test_every_kind_of_vehicle_moves_or_is_refused_in_one_line(name: str) -> Non
 # ---- The folder ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="pictures are drawn with EGL")
 def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path) -> None:
     assert main(["export", "bluerov2", "--to", "mujoco", "-o", str(tmp_path / "rov")]) == 0
     program = "import runpy, sys; sys.modules['rov_fmu'] = None; sys.argv[1:] = ['rov.png']; runpy.run_module('rov')"
