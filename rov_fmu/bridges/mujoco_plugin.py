@@ -181,6 +181,7 @@ class Rov:
         self._lower = np.tril_indices(6)
         self._entries = model.M_rowadr[dof + self._lower[0]] + self._lower[1]
         self._rigid = _rigid_mass(model, self.body)
+        self._turning = self._rigid[:, 3:]
         self.reset()
 
     def reset(self) -> None:
@@ -223,19 +224,19 @@ class Rov:
 
     def add_forces(self) -> None:
         """Add the forces that give the body the accelerations of the equation, unless other forces act."""
-        data, equation = self.data, self.water.equation
-        self._start = data.qpos[self._pose].copy(), data.qvel[self._dofs].copy()
-        pose, velocity = self._start
-        commands = dict(zip(equation.COMMANDS, data.ctrl[self._actuators].tolist(), strict=True))
-        state = (_FLIP * velocity).tolist(), [pose[3], *(_FLIP[:3] * pose[4:]).tolist()]
+        data, commands = self.data, self.water.equation.COMMANDS
+        pose, velocity = self._start = data.qpos[self._pose].copy(), data.qvel[self._dofs].copy()
+        held = dict(zip(commands, data.ctrl[self._actuators].tolist(), strict=True))
+        e, a, b, c = pose[3:].tolist()
+        state = (_FLIP * velocity).tolist(), [e, a, -b, -c]
         outside = (_FLIP * self._outside).tolist()
-        mean = self.water.accelerate(commands, state, outside, data.time, self.model.opt.timestep)
-        self._accelerated = _FLIP * mean
-        omega, centre = velocity[3:], self.model.body_ipos[self.body]
-        swing = omega * (omega @ centre) - centre * (omega @ omega)
-        moment = self._rigid[3:, 3:] @ omega
-        rigid = *(self._rigid[0, 0] * swing), *_cross(omega, moment)
-        data.qfrc_passive[self._dofs] += self._turn.T @ (self._mass @ (self._turn @ self._accelerated) + rigid)
+        mean = self.water.accelerate(held, state, outside, data.time, self.model.opt.timestep)
+        self._accelerated = _FLIP * np.array(mean)
+        # what MuJoCo subtracts for the rigid body: m omega x (omega x r_G) and omega x I omega
+        turning = self._turning @ velocity[3:]
+        data.qfrc_passive[self._dofs] += self._turn.T @ (
+            self._mass @ (self._turn @ self._accelerated) + np.array(_crossed(velocity[3:].tolist(), turning.tolist()))
+        )
 
     def move(self) -> None:
         """Move the body with its mean velocity during the step, where MuJoCo took the last one."""
@@ -293,8 +294,11 @@ def _rigid_mass(model: Any, body: int) -> Any:
     return np.block([[mass * np.eye(3), -mass * cross], [mass * cross, about_centre - mass * cross @ cross]])
 
 
-def _cross(a: Any, b: Any) -> tuple[float, float, float]:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def _crossed(omega: list[float], other: list[float]) -> list[float]:
+    """Return the cross products of the rates with two vectors, one after the other."""
+    p, q, r = omega
+    a, b, c, d, e, f = other
+    return [q * c - r * b, r * a - p * c, p * b - q * a, q * f - r * e, r * d - p * f, p * e - q * d]
 
 
 # ---- The exported folder ---------------------------------------------------------------------------------------------
