@@ -84,7 +84,7 @@ def mujoco_files(
     notes = tuple(_notes(vehicle))
     files = {
         "README.md": sdf.written("mujoco.md.j2", vehicle, notes, **content),
-        f"{vehicle.identifier}.xml": sdf.written("mujoco.xml.j2", vehicle, notes, **content),
+        "vehicle.xml": sdf.written("mujoco.xml.j2", vehicle, notes, **content),
         "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
         "__init__.py": _PACKAGE,
         "__main__.py": _MAIN.format(package=package),
@@ -110,9 +110,7 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
     files = mujoco_files(vehicle, "rov", {}, {})
     equation = ModuleType("equation")
     exec(compile(equation_module(vehicle, "rov_fmu.equation.step"), "<equation>", "exec"), equation.__dict__)
-    model = mujoco.MjModel.from_xml_string(
-        files["scene.xml"], {f"{vehicle.identifier}.xml": files[f"{vehicle.identifier}.xml"].encode()}
-    )
+    model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
     return Rov(equation, model, None, "", **coefficients)
 
 

@@ -58,9 +58,14 @@ class Water:
         """The time since the numbers of the equation were last computed, s."""
 
     def mass(self) -> Any:
-        """Return the 6x6 mass matrix with added mass and tuning."""
-        still = dict.fromkeys("uvwpqr", 0.0)
-        return np.array(self.equation.mass(self._numbers({**self.equation.COMMANDS, **still})))
+        """Return the 6x6 mass matrix with added mass and tuning. Raises ValueError if no body has the coefficients."""
+        still, there = dict.fromkeys("uvwpqr", 0.0), [n for n in range(6) if n not in self.lacking]
+        try:
+            mass = np.array(self.equation.mass(self._numbers({**self.equation.COMMANDS, **still})))
+            np.linalg.cholesky(mass[np.ix_(there, there)])
+        except (ZeroDivisionError, np.linalg.LinAlgError) as error:
+            raise ValueError("coefficients: the mass matrix must be positive definite; check m_rov and beta") from error
+        return mass
 
     def _numbers(self, values: Mapping[str, float]) -> dict[str, float]:
         delayed = {later: values[name] for name, later in self.equation.DELAYED.items()}
@@ -335,12 +340,13 @@ def show(rov: Rov, picture: Path | None = None) -> None:
         with mujoco.Renderer(rov.model, 720, 1280) as renderer:
             renderer.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = True
             renderer.update_scene(rov.data, "chase")
-            picture.write_bytes(_png(renderer.render()))
+            pixels = renderer.render()
     except (AttributeError, ImportError, OSError, RuntimeError, mujoco.FatalError) as error:
         raise SystemExit(
             f"MuJoCo cannot draw ({error}): on Linux without a display, it needs EGL (packages libegl1 and "
             "libgl1-mesa-dri), or MUJOCO_GL=osmesa and the package libosmesa6"
         ) from error
+    picture.write_bytes(_png(pixels))
 
 
 def _view(rov: Rov) -> None:

@@ -58,7 +58,7 @@ MONITORED = {places(equation.monitored)!r}  # velocities on whose direction coef
 OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets from the start
 GROUPS = {[*filter(None, groups)]!r}  # the states of like size
 QUATERNION = {places(quaternion)!r}
-PIVOTS = {_pivots(equation)}  # of the mass matrix, all above 0
+PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of the mass matrix, all above 0
 {_tables(equation)}
 
 def numbers(values):
@@ -135,7 +135,6 @@ def accelerations_text(layout: Layout) -> str:
     )
     return f"""\
 VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
-PIVOTS = {_pivots(equation)}  # of the mass matrix, all above 0
 {_tables(equation)}
 
 def numbers(values):
@@ -227,10 +226,6 @@ def _arrived(equation: Equation, indent: str) -> str:
     """Print assignments of the arrived fractions of the lags."""
     rates = {progress: written(equation.rows[progress][0].coefficient, PYTHON) for progress in equation.lags}
     return "".join(f"{indent}{progress} = -expm1(-{rate} * _time)\n" for progress, rate in rates.items())
-
-
-def _pivots(equation: Equation) -> list[str]:
-    return [name.identifier for name in equation.names.of_kind("pivot")]
 
 
 def _lagging_text(equation: Equation) -> str:

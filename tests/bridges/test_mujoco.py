@@ -184,7 +184,7 @@ def test_two_vehicles_in_one_world_and_one_after_a_reset_move_as_one_alone() -> 
     _, package = loaded("bluerov2_heavy")
     alone = package.load()
     spec = scene(package, 0.002)
-    other = mujoco.MjSpec.from_file(str(package.FOLDER / "bluerov2_heavy.xml"))
+    other = mujoco.MjSpec.from_file(str(package.FOLDER / "vehicle.xml"))
     spec.attach(other, prefix="other_", frame=spec.worldbody.add_frame(pos=[0.0, 3.0, 0.0]))
     model = spec.compile()
     data = mujoco.MjData(model)
@@ -383,7 +383,7 @@ def _without_joint(spec: Any) -> None:
 
 
 def _without_child(spec: Any) -> None:
-    spec.delete(spec.body("thrusters"))
+    spec.delete(spec.body("videoray_thrusters"))
 
 
 def _with_gravity(spec: Any) -> None:
@@ -415,6 +415,16 @@ def test_a_mujoco_whose_contacts_would_not_feel_the_added_mass_is_one_line(monke
     monkeypatch.setattr(mujoco.MjData, "qM", None, raising=False)
     with pytest.raises(ValueError, match=r"^MuJoCo .*: must be 3\.17 or later"):
         loaded("videoray")[1].load()
+
+
+@pytest.mark.parametrize("name", ["bluerov2", "every_option"])
+@pytest.mark.parametrize("impossible", [{"m_rov": -50.0}, {"beta_u": 0.0}])
+def test_ballast_that_no_body_has_is_one_line(name: str, impossible: dict[str, float]) -> None:
+    rov = loaded(name)[1].load()
+    rov.step()
+    rov.coefficients |= impossible
+    with pytest.raises(ValueError, match=r"^coefficients: the mass matrix must be positive definite"):
+        rov.step()
 
 
 def test_an_unknown_coefficient_is_one_line() -> None:
