@@ -92,9 +92,8 @@ def mujoco_files(
         "step.py": Path(step.__file__).read_text(encoding="utf-8"),
         "equation.py": equation_module(vehicle),
     }
-    if draws:
-        rows = zip(*draws.values(), strict=True)
-        files["draws.csv"] = "\n".join([",".join(draws), *(",".join(map(repr, row)) for row in rows), ""])
+    rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
+    files["draws.csv"] = "\n".join([",".join(draws), *(",".join(map(repr, row)) for row in rows), ""])
     return files
 
 
