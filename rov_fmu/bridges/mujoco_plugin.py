@@ -237,7 +237,7 @@ class Rov:
         outside = (_FLIP * self._outside).tolist()
         mean = self.water.accelerate(held, state, outside, data.time, self.model.opt.timestep)
         self._accelerated = _FLIP * np.array(mean)
-        # what MuJoCo subtracts for the rigid body: m omega x (omega x r_G) and omega x I omega
+        # qfrc_bias, which MuJoCo subtracts, has the same of the rigid body: m omega x (omega x r_G) and omega x I omega
         turning = self._turning @ velocity[3:]
         data.qfrc_passive[self._dofs] += self._turn.T @ (
             self._mass @ (self._turn @ self._accelerated) + np.array(_crossed(velocity[3:].tolist(), turning.tolist()))
@@ -246,6 +246,8 @@ class Rov:
     def move(self) -> None:
         """Move the body with its mean velocity during the step, where MuJoCo took the last one."""
         data, h = self.data, self.model.opt.timestep
+        if data.time <= self._time:  # MuJoCo has reset a simulation that became unstable
+            return
         pose, velocity = self._start
         mean = 0.5 * (velocity + data.qvel[self._dofs])
         pose[:3] += h * mean[:3]

@@ -9,13 +9,12 @@ from functools import lru_cache
 from types import ModuleType
 
 from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from .catalogue import AXES
 from .expression import FUNCTIONS, PYTHON, Expression, Name, call, of, replaced, total, written
 from .layout import Layout
 from .step import interpolated
 from .terms import Equation, equation_of, mass_matrix, rate_formula
 
-VELOCITIES = "uvwpqr"
-"""The velocities of all axes, in their order."""
 _FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
 
 
@@ -117,7 +116,8 @@ def printed_accelerations(layout: Layout, step: str) -> str:
 def accelerations_text(layout: Layout) -> str:
     """Return this module without its imports."""
     equation = equation_of(layout)
-    states = [*VELOCITIES, *(entry(3, column) for column in (1, 2, 3))]
+    every = [axis.velocity for axis in AXES.values()]
+    states = [*every, *(entry(3, column) for column in (1, 2, 3))]
     products = {name: x for name, x in equation.starts.items() if x.names <= {*states} and x != Name(name)}
     rates = {v: replaced(rate_formula(equation.rows[v]), products) for v in layout.velocities}
     formulas = {**equation.program, **equation.forces}
@@ -127,12 +127,9 @@ def accelerations_text(layout: Layout) -> str:
     for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):
         masses[a, b] = masses[b, a] = equation.names("mass", a + b)
     rows = "".join(
-        f"        [{', '.join(written(masses.get((a, b), of(0.0)), PYTHON, _value) for b in VELOCITIES)}],\n"
-        for a in VELOCITIES
+        f"        [{', '.join(written(masses.get((a, b), of(0.0)), PYTHON, _value) for b in every)}],\n" for a in every
     )
-    accelerations = "".join(
-        f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in VELOCITIES
-    )
+    accelerations = "".join(f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in every)
     return f"""\
 VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
 {_tables(equation)}

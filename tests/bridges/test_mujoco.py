@@ -7,6 +7,7 @@ the package.
 import importlib
 import subprocess
 import sys
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import mkdtemp
@@ -430,6 +431,27 @@ def test_ballast_that_no_body_has_is_one_line(name: str, impossible: dict[str, f
 def test_an_unknown_coefficient_is_one_line() -> None:
     with pytest.raises(ValueError, match=r"^a_d_v: the vehicle has no such coefficient$"):
         loaded("videoray")[1].load(a_d_v=1.0)
+
+
+def test_a_vehicle_without_thrusters_moves_by_loads() -> None:
+    bare = rov_fmu.load(BARE)
+    rov = package_of(bare.in_layout(replace(bare.layout, thrusters=(), curves=()))).load()
+    rov.inputs["Z_ext"] = 5.0
+    rov.step()
+    assert rov.data.qacc[2] == pytest.approx(-5.0 / bare["m_rov"], rel=1e-2)
+    assert rov.forces == {}
+
+
+def test_a_simulation_that_becomes_unstable_begins_anew() -> None:
+    rov = loaded("bluerov2")[1].load()
+    start = rov.data.qpos.copy()
+    rov.step()
+    rov.data.qfrc_applied[0] = 1e13
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(mkdtemp())  # MuJoCo writes a log there
+        rov.step()
+    assert rov.data.time == 0.002, "it has begun anew, and taken a step"
+    assert rov.data.qpos == pytest.approx(start, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", [*VEHICLES, "bare"])
