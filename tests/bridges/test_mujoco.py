@@ -236,6 +236,31 @@ def test_a_force_from_outside_feels_the_whole_mass_and_that_of_a_payload(name: s
     assert acceleration(*wrench) - acceleration(*np.zeros(6)) == pytest.approx(wrench, rel=1e-9, abs=1e-9)
 
 
+@pytest.mark.parametrize("angle", [0.0, np.pi / 4.0, 1.2])
+def test_a_body_that_a_constraint_welds_to_the_origin_adds_its_mass(angle: float) -> None:
+    """The Heavy, without drag and weight, is pitched and pushed with 10 N to the north for 60 ms."""
+    vehicle, package = loaded("bluerov2_heavy")
+    spec = scene(package)
+    spec.option.iterations, spec.option.tolerance = 200, 1e-14
+    other = spec.worldbody.add_body(name="payload", pos=[0.0, 0.0, -2.0], gravcomp=1.0)
+    other.add_freejoint()
+    other.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0.0, 0.0], mass=2.0, contype=0, conaffinity=0)
+    stiff = {"solref": [0.002, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
+    names = {"name1": vehicle.identifier, "name2": "payload", "objtype": mujoco.mjtObj.mjOBJ_BODY}
+    spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, **names, **stiff)
+    rov = package.Rov(spec.compile(), **{**frictionless(vehicle).coefficients, "W": 0.0, "B": 0.0})
+    for first in (3, 10):
+        rov.data.qpos[first : first + 4] = np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0
+    rov.data.xfrc_applied[rov.body, 0] = 10.0
+    speeds = []
+    for _ in range(60):
+        rov.step()
+        speeds.append(rov.data.qvel[0])
+    along, across = (vehicle["m_rov"] + vehicle[m_a] + 2.0 for m_a in ("m_a_u", "m_a_w"))
+    expected = 10.0 * (np.cos(angle) ** 2 / along + np.sin(angle) ** 2 / across)
+    assert np.polyfit(0.001 * np.arange(60), speeds, 1)[0] == pytest.approx(expected, rel=2e-4)
+
+
 def test_the_figures_of_the_heavy() -> None:
     """10 N forward give 10 / (13.5 + 6.36) m/s²; at 45° of pitch, half of the inverse of each mass counts."""
     _, package = loaded("bluerov2_heavy")
