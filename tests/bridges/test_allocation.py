@@ -54,7 +54,8 @@ def exported(path: Path, folder: Path) -> tuple[VehicleModel, Any, dict[str, Arr
         for row in csv.DictReader(file):
             values = [float(row[name] or "nan") for name in ("voltage_V", "force_N", "command")]
             rows.setdefault(row["curve"], []).append(values)
-    content = yaml.safe_load((folder / "allocation" / "allocation.yaml").read_text(encoding="utf-8"))
+    text = (folder / "allocation" / "allocation.yaml").read_text(encoding="utf-8")
+    content = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))  # in C where it is there: ten times faster
     return vehicle, content, {name: np.array(values) for name, values in rows.items()}
 
 
@@ -70,7 +71,7 @@ def command(content: Any, curve: str, voltage: float | None, force: float) -> fl
 def accelerations(vehicle: VehicleModel, inputs: dict[str, float]) -> Array:
     """Return the accelerations at rest by the engine of the FMU, with all thrust and all commands arrived."""
     layout = vehicle.layout
-    steady = vehicle.simulate([0.0, 60.0], inputs, record=[*layout.lagging]) if layout.lagging else {}
+    steady = vehicle.simulate([0.0, 6.0], inputs, record=[*layout.lagging]) if layout.lagging else {}
     start = {name: values[-1] for name, values in steady.items()}
     without = vehicle.in_layout(replace(layout, has_dead_time=False))
     run = without.simulate([0.0, 1e-3], inputs, start=start, record=[f"der({v})" for v in layout.velocities])
