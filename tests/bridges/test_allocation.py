@@ -5,6 +5,7 @@ vehicle with these commands and the opposite loads from outside: it must not acc
 """
 
 import csv
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -16,6 +17,7 @@ import yaml
 from numpy.typing import NDArray
 
 import rov_fmu
+from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -69,22 +71,25 @@ def command(content: Any, curve: str, voltage: float | None, force: float) -> fl
 
 
 def accelerations(vehicle: VehicleModel, inputs: dict[str, float]) -> Array:
-    """Return the accelerations at rest by the engine of the FMU, with all thrust and all commands arrived."""
+    """Return the accelerations at rest by the engine of the FMU, with all thrust arrived."""
     layout = vehicle.layout
-    steady = vehicle.simulate([0.0, 6.0], inputs, record=[*layout.lagging]) if layout.lagging else {}
-    start = {name: values[-1] for name, values in steady.items()}
-    without = vehicle.in_layout(replace(layout, has_dead_time=False))
-    run = without.simulate([0.0, 1e-3], inputs, start=start, record=[f"der({v})" for v in layout.velocities])
-    return np.array([values[0] for values in run.values()])
+    values = {**layout.usual_inputs, **inputs, **layout.at_rest}
+
+    def engine(seconds: float, record: Sequence[str]) -> Array:
+        at = {name: np.array([[value]]) for name, value in values.items()}
+        return simulate(vehicle, [0.0, seconds], at, record).values[:, 0]
+
+    values |= dict(zip(layout.lagging, engine(6.0, [*layout.lagging])[:, -1].tolist(), strict=True))
+    return engine(1e-3, [f"der({v})" for v in layout.velocities])[:, 0]
 
 
-@pytest.mark.filterwarnings("ignore:.*turns over:UserWarning", "ignore:.*no signal:UserWarning")
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in USUAL else pytest.mark.long) for name in VEHICLES]
 )
 def test_the_wrench_that_is_asked_is_the_wrench_that_acts(name: str, tmp_path: Path) -> None:
     """Commands accelerate the vehicle as the wrench does if it comes from outside."""
     vehicle, content, _ = exported(VEHICLES[name], tmp_path)
+    vehicle = vehicle.in_layout(replace(vehicle.layout, has_dead_time=False))
     layout, random = vehicle.layout, np.random.default_rng(1)
     matrix, inverse = np.array(content["matrix"]), np.array(content["pseudo_inverse"])
     thrusters, axes = content["thrusters"], [part.axis for part in layout.axes]
