@@ -67,7 +67,14 @@ class Water:
             raise ValueError("coefficients: the mass matrix must be positive definite; check m_rov and beta") from error
         return mass
 
+    def check(self) -> None:
+        """Raise ValueError about the first coefficient or input that the vehicle does not have."""
+        has = self.equation.COEFFICIENTS.keys() | self.equation.INPUTS.keys()
+        for name in (name for name in (*self.coefficients, *self.inputs) if name not in has):
+            raise ValueError(f"{name}: the vehicle has no such coefficient or input")
+
     def _numbers(self, values: Mapping[str, float]) -> dict[str, float]:
+        self.check()
         delayed = {later: values[name] for name, later in self.equation.DELAYED.items()}
         found: dict[str, float] = self.equation.numbers(
             {**self.coefficients, **self.inputs, **delayed, **values, **self.forces}
@@ -172,10 +179,8 @@ class Rov:
         self.model, self.data = model, mujoco.MjData(model) if data is None else data
         self.water = Water(equation)
         self.coefficients, self.inputs = self.water.coefficients, self.water.inputs
-        for name, value in coefficients.items():
-            if name not in self.coefficients:
-                raise ValueError(f"{name}: the vehicle has no such coefficient")
-            self.coefficients[name] = float(value)
+        self.coefficients |= coefficients
+        self.water.check()
         name = prefix + equation.IDENTIFIER
         self.body = model.body(name).id
         self._actuators = [model.actuator(prefix + command).id for command in equation.COMMANDS]

@@ -453,9 +453,15 @@ def test_ballast_that_no_body_has_is_one_line(name: str, impossible: dict[str, f
         rov.step()
 
 
-def test_an_unknown_coefficient_is_one_line() -> None:
-    with pytest.raises(ValueError, match=r"^a_d_v: the vehicle has no such coefficient$"):
-        loaded("videoray")[1].load(a_d_v=1.0)
+def test_an_unknown_coefficient_or_input_is_one_line() -> None:
+    _, package = loaded("videoray")
+    with pytest.raises(ValueError, match=r"^a_d_v: the vehicle has no such coefficient or input$"):
+        package.load(a_d_v=1.0)
+    rov = package.load()
+    rov.step()
+    rov.inputs["Y_ext"] = 1.0
+    with pytest.raises(ValueError, match=r"^Y_ext: the vehicle has no such coefficient or input$"):
+        rov.step()
 
 
 def test_a_vehicle_without_thrusters_moves_by_loads() -> None:
