@@ -1,4 +1,4 @@
-"""The command rov-fmu: build, simulate, fly, sitl, sdf, prove, study, identify, tune, schema, tables.
+"""The command rov-fmu: build, simulate, fly, sitl, export, prove, study, identify, tune, schema, tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -504,38 +504,75 @@ def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **o
     serve(vehicle, Options(servos=servos, settings=settings, **options))
 
 
-# ---- sdf -------------------------------------------------------------------------------------------------------------
+# ---- export ----------------------------------------------------------------------------------------------------------
+
+_added_mass = partial(click.option, "--added-mass", type=_Choice(["link", "plugin"]))
+_world = partial(click.option, "--world", "in_world", is_flag=True)
+
+
+@_commands.command("export")
+@_vehicle_or_videoray()
+@click.option(
+    "--to",
+    required=True,
+    type=_Choice(["mujoco", "allocation", "sdf", "urdf"], {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco"}),
+    help="MuJoCo, the allocation of thrust, Gazebo (SDFormat), or ROS 2 (URDF).",
+)
+@_output_option(
+    metavar="PATH",
+    help="Folder (mujoco, allocation) or file (sdf, urdf) to write. The default is <identifier>_mujoco, "
+    "<identifier>_allocation, <identifier>.sdf or <identifier>.urdf.",
+)
+@click.option(
+    "--draws",
+    type=_number("a whole number from 1 to 1e6", 1, 10**6, int),
+    metavar="N",
+    help="Also draw N sets of coefficients from what the logs know, with their correlations (mujoco).",
+)
+@click.option(
+    "--seed",
+    type=_number("a whole number from 0", 0, 2**63, int),
+    metavar="N",
+    help="Seed of the draws. The default is 0.",
+)
+@_world(help="Add a world with water, which Gazebo can run (sdf).")
+@_added_mass(help="Added mass in the link (engine DART, the default), or in the Hydrodynamics plugin (sdf).")
+@_force_option(
+    help="Replace files that rov-fmu did not write, or that have changed since. Draw also where the verdict of an axis "
+    "is neither good nor usable."
+)
+def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None:
+    """Write a vehicle for another simulator, or for a thruster manager. The default is the VideoRay Pro 4."""
+    _write_export(vehicle, to, output, **options)
+
+
+def _write_export(
+    vehicle: Path, to: str, output: Path | None, in_world: bool, added_mass: str | None, **options: Any
+) -> None:
+    """Write a vehicle for another simulator, and print what is different there."""
+    from rov_fmu.interface.export_command import Options, export
+    from rov_fmu.report.console import console, paragraph, print_end
+
+    exported = export(vehicle, to, output, Options(in_world=in_world, added_mass=added_mass, **options))
+    if exported.notes:
+        paragraph(console(), f"What is different {exported.place}:")
+    for note in exported.notes:
+        paragraph(console(), f"- {note}")
+    for warning in exported.warnings:
+        _warn(warning)
+    print_end([exported.path], exported.following)
 
 
 @_commands.command("sdf")
 @_vehicle_or_videoray()
-@_output_option(
-    metavar="FILE.sdf|.urdf",
-    help="File to write. The default is <identifier>.sdf. URDF has the hydrodynamics for ROS 2.",
-)
-@click.option("--world", "in_world", is_flag=True, help="Add a world with water, which Gazebo can run.")
-@click.option(
-    "--added-mass",
-    type=_Choice(["link", "plugin"]),
-    default="link",
-    show_default=True,
-    help="Added mass in the link (engine DART), or in the Hydrodynamics plugin (any engine; may diverge).",
-)
+@_output_option(metavar="FILE.sdf|.urdf", help="File to write. The default is <identifier>.sdf.")
+@_world(help="Add a world with water, which Gazebo can run (sdf).")
+@_added_mass(help="Added mass in the link, or in the Hydrodynamics plugin.")
 @_force_option()
-def _sdf(vehicle: Path, output: Path | None, in_world: bool, added_mass: str, *, force: bool) -> None:
-    """Write a vehicle as a model for Gazebo (gz-sim). The default is the VideoRay Pro 4."""
-    from rov_fmu.interface.sdf_command import write_model
-    from rov_fmu.report.console import console, paragraph, print_end, shell_words
-
-    path, model = write_model(vehicle, output, in_world=in_world, explicit=added_mass == "plugin", force=force)
-    if model.notes:
-        paragraph(console(), "What is different in Gazebo:")
-    for note in model.notes:
-        paragraph(console(), f"- {note}")
-    for warning in model.warnings:
-        _warn(warning)
-    following = shell_words("gz", "sim", "-r", path) if in_world else "include it in a world, or give --world"
-    print_end([path], "" if path.suffix.lower() == ".urdf" else following)
+def _sdf(vehicle: Path, output: Path | None, **options: Any) -> None:
+    """Do the same as `rov-fmu export --to sdf`, or with a name that ends with .urdf, `--to urdf`."""
+    is_urdf = output is not None and output.suffix.lower() == ".urdf"
+    _write_export(vehicle, "urdf" if is_urdf else "sdf", output, **options)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------

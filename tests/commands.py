@@ -58,7 +58,9 @@ COMMANDS = {
         ],
     ),
     "the page that flies": Command("fly.html", lambda path: ["fly", str(BARE), "--force", "-o", str(path)]),
-    "the model for Gazebo": Command("bare.sdf", lambda path: ["sdf", str(BARE), "--force", "-o", str(path)]),
+    "the model for Gazebo": Command(
+        "bare.sdf", lambda path: ["export", str(BARE), "--to", "sdf", "--force", "-o", str(path)]
+    ),
     "the vehicle": Command("rov.toml", lambda path: ["identify", str(FEW_TESTS), "--force", "-o", str(path)]),
     "the report": Command("report.html", lambda path: ["identify", str(FEW_TESTS), "--force", "--report", str(path)]),
     "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "--force", "-o", str(path)]),

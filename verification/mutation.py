@@ -106,7 +106,7 @@ TESTS = {
     "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
     "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
     "rov_fmu/interface/sitl_command.py": "bridges/test_sitl.py cli/test_targets.py",
-    "rov_fmu/interface/sdf_command.py": "bridges/test_sdf.py bridges/test_urdf.py cli/test_targets.py",
+    "rov_fmu/interface/export_command.py": "interface/test_export_command.py bridges",
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",

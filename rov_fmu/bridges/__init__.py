@@ -1,1 +1,1 @@
-"""Connections to ArduPilot, Gazebo, CasADi, JAX and Gymnasium."""
+"""Connections to ArduPilot, MuJoCo, Gazebo, CasADi, JAX, Gymnasium, MCAP and thruster managers."""

@@ -4,7 +4,7 @@ The task is to hold station: the vehicle starts at rest in a random place near t
 stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states.
 """
 
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -24,6 +24,7 @@ STEPS = 300
 """The steps of an episode by default."""
 START = 2.0
 """The vehicle starts within this distance of the origin along each axis, m, and within this heading, rad."""
+Draws = Literal[True, False, "force"]
 BOUND = 1000.0
 """The largest size of a state in an episode, in SI units."""
 
@@ -34,14 +35,15 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
     The reward is minus the sum of the squares of the position (m) and the heading (rad, of a vehicle without roll and
     pitch), and a tenth of that of the commands. An episode is truncated after `steps` steps of `step` seconds, and
     begins anew in the step after that. It is terminated when a state exceeds BOUND or the motion cannot be computed.
-    With `draws=False`, all vehicles have the coefficients of the file. The processor's vectors step several vehicles at
-    once, so that the states differ from those of the FMU by rounding errors.
+    With `draws=False`, all vehicles have the coefficients of the file. An axis whose verdict is neither good nor usable
+    is an InputError, unless `draws="force"`. The processor's vectors step several vehicles at once, so that the states
+    differ from those of the FMU by rounding errors.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
 
     def __init__(
-        self, vehicle: Vehicle, count: int = 1, *, step: float = STEP, steps: int = STEPS, draws: bool = True
+        self, vehicle: Vehicle, count: int = 1, *, step: float = STEP, steps: int = STEPS, draws: Draws = True
     ) -> None:
         if not isinstance(vehicle, Vehicle):
             raise InputError(f"vehicle = {shown(vehicle)}: must be a vehicle, such as rov_fmu.load returns")
@@ -50,7 +52,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
                 raise InputError(f"{name} = {shown(value)}: must be above 0")
         layout = vehicle.layout
         self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
-        self.draws = draws and len(vehicle.uncertainty.names) > 0
+        self.draws: Draws = draws if len(vehicle.uncertainty.names) else False
         self.states, self.commands = tuple(layout.state), tuple(layout.commands)
         self.targets = [n for n, name in enumerate(self.states) if name in ("x", "y", "z", "psi")]
         self.single_observation_space = Box(-BOUND, BOUND, (len(self.states),), np.float64)
@@ -73,9 +75,8 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         """Draw all coefficients and starts anew. Return the states (vehicles x states)."""
         super().reset(seed=seed[0] if isinstance(seed, list) else seed, options=options)
         if self.draws:
-            known = self.vehicle.uncertainty
-            drawn = known.drawn(self.np_random.random((self.num_envs, len(known.names))))
-            self.coefficients = {name: column[:, np.newaxis] for name, column in zip(known.names, drawn.T, strict=True)}
+            drawn = self.vehicle.draws(self.num_envs, self.np_random, forced=self.draws == "force")
+            self.coefficients = {name: column[:, np.newaxis] for name, column in drawn.items()}
         self._begin(np.ones(self.num_envs, bool))
         return self.state.copy(), {}
 
@@ -123,7 +124,7 @@ class RovEnv(gymnasium.Env[Array, Array]):
 
     metadata = {"render_modes": []}  # noqa: RUF012 - as Gymnasium declares it
 
-    def __init__(self, vehicle: Vehicle, *, step: float = STEP, steps: int = STEPS, draws: bool = True) -> None:
+    def __init__(self, vehicle: Vehicle, *, step: float = STEP, steps: int = STEPS, draws: Draws = True) -> None:
         self.many = RovVectorEnv(vehicle, step=step, steps=steps, draws=draws)
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
 

@@ -215,7 +215,7 @@ def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "Sce
 
 def hull_size(vehicle: Vehicle) -> Array:
     """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
-    corners = np.abs([place(vehicle, thruster) for thruster in vehicle.layout.thrusters])
+    corners = np.abs([(0.0, 0.0, 0.0), *(place(vehicle, thruster) for thruster in vehicle.layout.thrusters)])
     size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
     return size
 

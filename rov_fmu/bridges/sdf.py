@@ -153,18 +153,24 @@ def written(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: 
 
 def check_possible(vehicle: Vehicle) -> None:
     """Raise InputError about a vehicle that Gazebo cannot have."""
+    check_body(vehicle, "Gazebo")
     if mistake := next(_impossible(vehicle), None):
         raise InputError(f"{vehicle.identifier}: {mistake}")
 
 
-def _impossible(vehicle: Vehicle) -> Iterator[str]:
-    """Yield a line about each reason why Gazebo cannot have the vehicle."""
+def check_body(vehicle: Vehicle, simulator: str) -> None:
+    """Raise InputError about a vehicle that lacks the mass of a body in a simulator, or has an infinite one."""
     if "m_rov" not in vehicle.coefficients:
-        yield "has no surge, sway or heave, and so no mass m_rov, which a link in Gazebo must have"
-        return
+        reason = f"no surge, sway or heave, and so no mass m_rov, which a body in {simulator} must have"
+        raise InputError(f"{vehicle.identifier}: has {reason}")
     for name in (part.axis.coefficient("beta") for part in vehicle.layout.axes):
         if vehicle[name] == 0.0:
-            yield f"{name} = 0: must be more than 0 for Gazebo, because m/{name} is a mass"
+            reason = f"must be more than 0 for {simulator}, because m/{name} is a mass"
+            raise InputError(f"{vehicle.identifier}: {name} = 0: {reason}")
+
+
+def _impossible(vehicle: Vehicle) -> Iterator[str]:
+    """Yield a line about each reason why Gazebo cannot have the vehicle, which has a mass."""
     thrusters = {thruster.name for thruster in vehicle.layout.thrusters}
     for name in (t.name for t in vehicle.layout.thrusters if f"{t.name}_joint" in thrusters):
         yield f"thruster.{name}_joint: choose another name for Gazebo, where the joint of {name} has this name"
@@ -214,15 +220,15 @@ def _centre(vehicle: Vehicle, of: str) -> Array:
     return _SIGNS[:3] * [vehicle.coefficients.get(f"{axis}_{of}", 0.0) for axis in "xyz"]
 
 
-def link_of(vehicle: Vehicle) -> Link:
+def link_of(vehicle: Vehicle, held: float = _HELD_INERTIA) -> Link:
     """Return the body of a vehicle, without added mass.
 
-    About an axis that the vehicle lacks, its moment of inertia is so large that it hardly turns.
+    About an axis that the vehicle lacks, its moment of inertia is `held` times a usual one, so that it hardly turns.
     """
     mass, centre = vehicle["m_rov"], _centre(vehicle, "G")
     own = [vehicle.coefficients.get(axis.inertia) for axis in AXES.values() if axis.is_rotation]
     typical = max((moment for moment in own if moment), default=mass * _volume(vehicle) ** (2.0 / 3.0) / 6.0)
-    about_origin = np.diag([_HELD_INERTIA * typical if moment is None else moment for moment in own])
+    about_origin = np.diag([held * typical if moment is None else moment for moment in own])
     inertia = about_origin - _of_point(mass, centre)
     least, middle, most = np.linalg.eigvalsh(inertia)
     if least <= 0.0 or least + middle < most:  # no body has these moments, and SDFormat refuses them

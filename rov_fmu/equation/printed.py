@@ -1,6 +1,6 @@
-"""The equation of motion of a vehicle, printed as a Python module for step.py.
+"""The equation of motion of a vehicle, printed as Python modules that need only the standard library and step.py.
 
-The module needs only the standard library and step.py. It is part of the FMU in pure Python.
+One is for step.py, and part of the FMU in pure Python. The other is for simulators that move the body themselves.
 """
 
 import math
@@ -9,24 +9,31 @@ from functools import lru_cache
 from types import ModuleType
 
 from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
-from .expression import FUNCTIONS, PYTHON, Expression, Name, call, total, written
+from .catalogue import AXES
+from .expression import FUNCTIONS, PYTHON, Expression, Name, call, of, replaced, total, written
 from .layout import Layout
 from .step import interpolated
-from .terms import Equation, equation_of, rate_formula
+from .terms import Equation, equation_of, mass_matrix, rate_formula
 
 _FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
 
 
 def printed(layout: Layout, step: str) -> str:
     """Return the module. `step` is the name of the module that step.py has there."""
+    words = f"The equation of motion of a vehicle, for {step}.py. All numbers are in SI units."
+    return _module(words, step, equation_text(layout))
+
+
+def _module(words: str, step: str, text: str) -> str:
+    """Return a module with its docstring and its imports."""
     return f"""\
-\"\"\"The equation of motion of a vehicle, for {step}.py. All numbers are in SI units.\"\"\"
+\"\"\"{words}\"\"\"
 
 from math import {", ".join(["expm1", *_FUNCTIONS])}
 
 from {step} import interpolated
 
-{equation_text(layout)}"""
+{text}"""
 
 
 def equation_text(layout: Layout) -> str:
@@ -80,10 +87,7 @@ def motion(_numbers):
 
 {_sizes(equation, layout, states)}
 
-def lagging(v, _time):
-    \"\"\"Return the forces that lag, at a time since the start of the step.\"\"\"
-    return {{{", ".join(_lagging(equation))}}}
-"""
+{_lagging_text(equation)}"""
 
 
 @lru_cache(maxsize=100)
@@ -93,6 +97,71 @@ def model_of(layout: Layout) -> ModuleType:
     module.__dict__.update({name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]}, interpolated=interpolated)
     exec(compile(equation_text(layout), "<equation>", "exec"), module.__dict__)
     return module
+
+
+# ---- For a simulator that moves the body itself ----------------------------------------------------------------------
+
+
+def printed_accelerations(layout: Layout, step: str) -> str:
+    """Return the module for a simulator that knows the velocities and the attitude of the body.
+
+    Frames and signs are those of the equation: forward, starboard, down. `step` is the name of step.py there.
+    """
+    words = (
+        "The mass matrix and the accelerations of a vehicle (forward, starboard, down). All numbers are in SI units."
+    )
+    return _module(words, step, accelerations_text(layout))
+
+
+def accelerations_text(layout: Layout) -> str:
+    """Return this module without its imports."""
+    equation = equation_of(layout)
+    every = [axis.velocity for axis in AXES.values()]
+    states = [*every, *(entry(3, column) for column in (1, 2, 3))]
+    products = {name: x for name, x in equation.starts.items() if x.names <= {*states} and x != Name(name)}
+    rates = {v: replaced(rate_formula(equation.rows[v]), products) for v in layout.velocities}
+    formulas = {**equation.program, **equation.forces}
+    numbers = {name: x for name, x in formulas.items() if name not in equation.orientation}
+    mass = mass_matrix(layout, equation.names)
+    masses: dict[tuple[str, str], Expression] = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
+    for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):
+        masses[a, b] = masses[b, a] = equation.names("mass", a + b)
+    rows = "".join(
+        f"        [{', '.join(written(masses.get((a, b), of(0.0)), PYTHON, _value) for b in every)}],\n" for a in every
+    )
+    accelerations = "".join(f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in every)
+    return f"""\
+VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
+{_tables(equation)}
+
+def numbers(values):
+    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and lagging forces, and these.\"\"\"
+    v = dict(values)
+{_assignments(numbers)}
+    return v
+
+
+def mass(v):
+    \"\"\"Return the mass matrix about the origin, with added mass and tuning, for some numbers.\"\"\"
+    return [
+{rows}    ]
+
+
+def accelerations(_numbers):
+    \"\"\"Return the function from the time since `_numbers`, the velocities through the water, and the third row of the
+    rotation matrix to the accelerations, which are None along axes that the vehicle lacks.\"\"\"
+{_coefficients(rates.values(), equation, [*states, *equation.lags])}
+    def rates(_time, {", ".join(states)}):
+{_arrived(equation, " " * 8)}        return [
+{accelerations}        ]
+
+    return rates
+
+
+{_lagging_text(equation)}"""
+
+
+# ---- Parts of both ---------------------------------------------------------------------------------------------------
 
 
 def _assignments(formulas: Mapping[str, Expression]) -> str:
@@ -147,11 +216,22 @@ def _coefficients(formulas: Iterable[Expression], equation: Equation, states: li
 
 def _states(equation: Equation, states: list[str], indent: str) -> str:
     """Print assignments of the states. The progress of a lag follows from the time alone."""
-    lines = [f"{', '.join(states)}, = _state"]
-    for progress in equation.lags:
-        rate = written(equation.rows[progress][0].coefficient, PYTHON)
-        lines.append(f"{progress} = -expm1(-{rate} * _time)")
-    return "\n".join(indent + line for line in lines)
+    return f"{indent}{', '.join(states)}, = _state\n{_arrived(equation, indent)}".rstrip("\n")
+
+
+def _arrived(equation: Equation, indent: str) -> str:
+    """Print assignments of the arrived fractions of the lags."""
+    rates = {progress: written(equation.rows[progress][0].coefficient, PYTHON) for progress in equation.lags}
+    return "".join(f"{indent}{progress} = -expm1(-{rate} * _time)\n" for progress, rate in rates.items())
+
+
+def _lagging_text(equation: Equation) -> str:
+    """Print the function of the forces that lag."""
+    return f"""\
+def lagging(v, _time):
+    \"\"\"Return the forces that lag, at a time since the start of the step.\"\"\"
+    return {{{", ".join(_lagging(equation))}}}
+"""
 
 
 def _lagging(equation: Equation) -> Iterable[str]:

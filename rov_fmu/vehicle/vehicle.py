@@ -31,6 +31,10 @@ from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, read_tables, some_estimates
 
 if TYPE_CHECKING:
+    from numpy import float64
+    from numpy.random import Generator
+    from numpy.typing import NDArray
+
     from rov_fmu.vehicle.uncertainty import Uncertainty
 
 BY_HAND = "set by hand"
@@ -225,6 +229,38 @@ class Vehicle:
 
         return uncertainty(self.layout, self.coefficients, self.intervals, self.estimates)
 
+    def draws(self, count: int, generator: "Generator", *, forced: bool = False) -> dict[str, "NDArray[float64]"]:
+        """Return the coefficients of `count` vehicles, drawn from what is known about this one, by their names.
+
+        These are the sets of `rov-fmu export --draws`, of `RovVectorEnv`, and of a study with `vary_from` and the
+        sampler "random", for equal seeds. Raises InputError if nothing is known, or unless `forced`, if the model of an
+        axis may not be trusted.
+        """
+        known = self.uncertainty
+        if not known.names:
+            raise InputError(f"{self.identifier}: no coefficient has a confidence interval, so nothing can be drawn")
+        if not forced and (axes := self.unfit_axes):
+            raise InputError(
+                f"{self.identifier}: nothing is drawn, because the draws do not show how far these axes may be off: "
+                f"{', '.join(axes)}; --force (in Python, forced) draws all the same"
+            )
+        return dict(zip(known.names, known.drawn(generator.random((count, len(known.names)))).T, strict=True))
+
+    @property
+    def unfit_axes(self) -> list[str]:
+        """The axes whose verdict is neither good nor usable, each with its verdict: `yaw: do not use`.
+
+        An axis without a verdict, or in a file without verdicts an axis of which no coefficient has an interval, was
+        not identified.
+        """
+        sentences = self.provenance.verdicts if self.provenance else ()
+        words = {axis: rest.partition(".")[0] for axis, _, rest in (one.partition(": ") for one in sentences)}
+        if not sentences:
+            places = [keys for name, keys in self.layout.keys_in_file.items() if name in self.intervals]
+            words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
+        found = {axis: words.get(axis, "not identified") for axis in self.layout.kinds}
+        return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
+
     def picture(self, name: str) -> Path | None:
         """Return the path of the vehicle's own picture with this name, or None."""
         own = self.pictures / name if self.pictures else None
@@ -241,9 +277,12 @@ class Vehicle:
 
     # ---- Thrust ----
 
-    def curve_force(self, curve: Curve, command: float) -> float:
-        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual inputs."""
+    def curve_force(self, curve: Curve, command: float, voltage: float | None = None) -> float:
+        """Return the steady thrust (2) of one thruster (N) for a fraction of the full command, at the usual voltage or
+        another one (V)."""
         values = {**self.coefficients, **self.layout.usual_inputs, "u_one": command}
+        if voltage is not None:
+            values["voltage"] = voltage
         *_, force = _thrust_of(curve)(values).values()
         return float(force)
 

@@ -1,6 +1,7 @@
 """The Gymnasium environments: Gymnasium's own checker, and the vector environment against the single one."""
 
 from copy import deepcopy
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -56,6 +57,18 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
     over = [many.step(actions[n])[3].any() for n in range(5)]
     assert over == [False] * 4 + [True]
     assert np.array_equal(many.reset(seed=[1, 2, 3])[0], start)
+
+
+def test_an_axis_that_may_not_be_trusted_is_drawn_by_force_only() -> None:
+    vehicle = rov_fmu.load("videoray_refit")
+    assert vehicle.provenance
+    words = tuple(one.replace("heave: good", "heave: do not use") for one in vehicle.provenance.verdicts)
+    doubted = replace(vehicle, provenance=vehicle.provenance.model_copy(update={"verdicts": words}))
+    with pytest.raises(InputError, match=r"these axes may be off: heave: do not use; --force \(in Python, forced\)"):
+        RovVectorEnv(doubted, 2).reset(seed=1)
+    drawn, usual = RovVectorEnv(doubted, 2, draws="force"), RovVectorEnv(vehicle, 2)
+    assert np.array_equal(drawn.reset(seed=1)[0], usual.reset(seed=1)[0])
+    assert np.array_equal(drawn.coefficients["a_d_u"], usual.coefficients["a_d_u"])
 
 
 def test_an_episode_ends_where_a_state_leaves_its_bound_and_the_others_go_on() -> None:

@@ -97,4 +97,6 @@ def test_the_command_writes_it_by_the_name_of_the_file(
     assert Path("rov.urdf").read_text(encoding="utf-8") == urdf_model(LOADED["bluerov2"]).text
     assert capsys.readouterr().out.endswith("Wrote rov.urdf.\n")
     assert main(["sdf", "bluerov2", "-o", "rov.urdf", "--world"]) == 2
-    assert capsys.readouterr().err.endswith("leave out --world\n")
+    assert "--to urdf: leave out --world, because only" in capsys.readouterr().err
+    assert main(["export", "bluerov2", "--to", "urdf"]) == 0
+    assert Path("bluerov2.urdf").read_bytes() == Path("rov.urdf").read_bytes()

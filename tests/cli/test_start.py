@@ -96,7 +96,20 @@ def test_a_command_imports_what_it_uses() -> None:
 # ---- Completion ------------------------------------------------------------------------------------------------------
 
 
-COMMANDS = ["build", "fly", "identify", "prove", "schema", "sdf", "simulate", "sitl", "study", "tables", "tune"]
+COMMANDS = [
+    "build",
+    "export",
+    "fly",
+    "identify",
+    "prove",
+    "schema",
+    "sdf",
+    "simulate",
+    "sitl",
+    "study",
+    "tables",
+    "tune",
+]
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,28 @@ def _estimates(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **ke
 # ---- Drawn -----------------------------------------------------------------------------------------------------------
 
 
+def test_random_runs_are_the_draws_of_the_vehicle_with_the_same_seed() -> None:
+    plan, found = _estimates(REFITTED, sampler="random", runs=5, seed=1)
+    rows = Design(plan, _has(REFITTED), found.known).rows(0, 5)
+    drawn = REFITTED.draws(5, np.random.default_rng(1), forced=True)
+    assert tuple(drawn) == found.names
+    assert np.array_equal(rows, np.column_stack([*drawn.values()]))
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "axes"),
+    [((), ""), (("surge: good. As it is.", "yaw: do not use. No."), "heave: not identified, yaw: do not use")],
+)
+def test_a_study_warns_of_axes_that_are_not_fit_for_use(verdicts: tuple[str, ...], axes: str) -> None:
+    assert REFITTED.provenance
+    vehicle = replace(REFITTED, provenance=REFITTED.provenance.model_copy(update={"verdicts": verdicts}))
+    _, found = _estimates(vehicle)
+    warnings = [warning for warning in found.warnings() if "may be off" in warning]
+    assert warnings == (
+        [f"the estimates of its.toml do not show how far these axes may be off: {axes}"] if axes else []
+    )
+
+
 def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
     plan, found = _estimates(MADE, sampler="random", runs=6000)
     drawn = Design(plan, _has(MADE), found.known).rows(0, 6000)

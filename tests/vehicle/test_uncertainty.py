@@ -12,14 +12,19 @@ from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.stats import kstest, norm, qmc, spearmanr
 
+import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.layout import Curve
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
+from tests.identify.scenarios.catalogue import USUAL
+from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
 from tests.vehicles import VIDEORAY
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
@@ -36,6 +41,38 @@ def of(values: list[float], errors: list[float], correlation: list[list[float]])
     bounds = np.column_stack([np.zeros(p), np.full(p, np.inf)])
     names = ("a_d_u", "b_d_u", "a_d_w")[:p]
     return Uncertainty(names, np.array(values), np.array(errors), np.array(correlation), bounds)
+
+
+# ---- Draws against a dive --------------------------------------------------------------------------------------------
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(3))
+def test_the_range_of_200_draws_contains_the_samples_of_an_unseen_dive(seed: int, tmp_path: Path) -> None:
+    """A VideoRay is identified from two dives of 20 s. A third one, with the noise of the sensors, is not seen.
+
+    The range of each sample is that of 90 % of the draws, with the same noise.
+    """
+    tank = replace(Tank(sensors=USUAL), logs=Logs("pilot", count=2, seconds=20.0))
+    tank.write(seed, tmp_path / "dives")
+    vehicle = identify(load_tests(tmp_path / "dives")).vehicle
+    random = np.random.default_rng(1000 + seed)
+    dive = next(flights(tank, random))
+    motion = moved(tank.truth, dive.commands, dive.time, dive.conditions)
+    drawn = vehicle.draws(200, np.random.default_rng(1))
+    inputs = {f"u_{name}": values for name, values in dive.commands.thrusters.items()}
+    many = rov_fmu.load("videoray").with_(vehicle.layout)
+    runs = many.simulate_many(
+        dive.time, {"time": dive.commands.switches, **inputs}, coefficients={**vehicle.coefficients, **drawn}
+    )
+    inside = []
+    for sensor in tank.sensors:
+        values = true_values(sensor, motion)
+        sample = values + sensor.noise * random.standard_normal(len(values))
+        every = runs[{"velocity": "u", "depth": "z", "heading": "psi"}[sensor.quantity]]
+        low, high = np.quantile(every + sensor.noise * random.standard_normal(every.shape), [0.05, 0.95], axis=0)
+        inside.append(np.mean((low <= sample) & (sample <= high)))
+    assert 0.85 <= min(inside) <= max(inside) <= 0.95
 
 
 # ---- Writing, reading and checking -----------------------------------------------------------------------------------

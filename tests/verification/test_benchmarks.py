@@ -169,7 +169,16 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
     picture = tmp_path / "cost_error.svg"
     command = [sys.executable, "-m", "verification.benchmarks", "--quick", "--picture", str(picture)]
     printed = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, encoding="utf-8").stdout
-    parts = ("turning", "fmi3SetFloat64", "RK4", "Model Exchange", "memory of each", "A study by two workers", "kept")
+    parts = (
+        "turning",
+        "fmi3SetFloat64",
+        "RK4",
+        "Model Exchange",
+        "memory of each",
+        "A study by two workers",
+        "kept",
+        "MuJoCo with the plug-in",
+    )
     for part in (*parts, "heyoka / ours" if taylor.installed() else taylor.NOT_INSTALLED[0]):
         assert part in printed, printed
     times_ours = next(line.split()[4] for line in printed.splitlines() if line.startswith("CVODE BDF  "))

@@ -69,6 +69,8 @@ class Estimates:
         if not self._vehicle:
             return
         file, has = self._plan.vary_from, self._has
+        if (made := self._vehicle.provenance) and made.verdicts and (axes := self._vehicle.unfit_axes):
+            yield f"the estimates of {file} do not show how far these axes may be off: {', '.join(axes)}"
         alone = [name for name in self.names if name not in self._vehicle.estimates]
         if alone and len(self.names) > 1:
             yield (

@@ -1,0 +1,152 @@
+"""Write a vehicle as a folder for MuJoCo, which is a Python package: the model (MJCF) and what adds the water to it.
+
+The package needs only MuJoCo and NumPy. It contains `mujoco_plugin.py` and `equation/step.py` as they are, and the
+equation of the vehicle, which `equation/printed.py` prints.
+"""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from rov_fmu.bridges import sdf
+from rov_fmu.bridges.mcap import hull_size
+from rov_fmu.equation import step
+from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.layout import Thruster
+from rov_fmu.equation.printed import printed_accelerations
+from rov_fmu.io.messages import listed
+from rov_fmu.report.plots.geometry import place
+from rov_fmu.vehicle.vehicle import Vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.bridges.mujoco_plugin import Rov
+
+_PLUGIN = Path(__file__).with_name("mujoco_plugin.py")
+_PACKAGE = '''\
+"""A vehicle in MuJoCo: see README.md. `load` returns it in its world, and `Rov` connects it in a world of your own."""
+
+from functools import partial
+from pathlib import Path
+
+from . import equation, plugin
+from .plugin import step
+
+FOLDER = Path(__file__).parent
+Rov = partial(plugin.Rov, equation)
+load = partial(plugin.load, equation, FOLDER / "scene.xml")
+draws = partial(plugin.draws, FOLDER / "draws.csv")
+'''
+_MAIN = '''\
+"""Open MuJoCo's viewer with the vehicle, or write a picture: python -m {package} [FILE.png]."""
+
+import sys
+from pathlib import Path
+
+from . import load
+from .plugin import show
+
+show(load(), *map(Path, sys.argv[1:2]))
+'''
+_PROPELLER = 0.05
+"""The radius, and half the length, of what is drawn for a thruster, relative to the size of the vehicle."""
+
+
+def mujoco_files(
+    vehicle: Vehicle, package: str, card: Mapping[str, Sequence[str]], draws: Mapping[str, Sequence[float]]
+) -> dict[str, str]:
+    """Return the files of the folder by name. `package` is its own name.
+
+    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. Raises
+    InputError about a vehicle without a mass or with β = 0.
+    """
+    sdf.check_body(vehicle, "MuJoCo")
+    layout = vehicle.layout
+    example = layout.example(layout.axes[0].axis)
+    hull = hull_size(vehicle) / 2.0
+    low, _, high = layout.pulse or (-1.0, 0.0, 1.0)
+    content = {
+        "gravity": sdf.gravity(vehicle),
+        "body": sdf.link_of(vehicle, 1.0),
+        "hull": hull,
+        "foam": {"at": hull * (0.0, 0.0, 0.72), "size": hull * (1.01, 0.9, 0.3)},
+        "range": np.array([low, high]),
+        "thrusters": [_drawn(vehicle, thruster, _PROPELLER * float(hull.max()) * 2.0) for thruster in layout.thrusters],
+        "package": package,
+        "example": example,
+        "card": card,
+        "draws": len(next(iter(draws.values()), ())),
+        "commands": ", ".join(layout.commands) or "none",
+        "others": ", ".join(name for name in layout.inputs if name not in layout.commands),
+    }
+    notes = tuple(_notes(vehicle))
+    files = {
+        "README.md": sdf.written("mujoco.md.j2", vehicle, notes, **content),
+        "vehicle.xml": sdf.written("mujoco.xml.j2", vehicle, notes, **content),
+        "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
+        "__init__.py": _PACKAGE,
+        "__main__.py": _MAIN.format(package=package),
+        "plugin.py": _PLUGIN.read_text(encoding="utf-8").replace("from rov_fmu.equation.step", "from .step"),
+        "step.py": Path(step.__file__).read_text(encoding="utf-8"),
+        "equation.py": equation_module(vehicle),
+    }
+    rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
+    files["draws.csv"] = "\n".join([",".join(draws), *(",".join(map(repr, row)) for row in rows), ""])
+    return files
+
+
+def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
+    """Return a vehicle in its world in MuJoCo, as `load` of the folder does. Needs the extra `mujoco`.
+
+    Raises InputError as `mujoco_files` does.
+    """
+    import mujoco
+
+    from rov_fmu.bridges.mujoco_plugin import Rov
+
+    files = mujoco_files(vehicle, "rov", {}, {})
+    equation = ModuleType("equation")
+    exec(compile(equation_module(vehicle, "rov_fmu.equation.step"), "<equation>", "exec"), equation.__dict__)
+    model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
+    return Rov(equation, model, None, "", **coefficients)
+
+
+def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
+    """Return the module with the equation of a vehicle and its numbers, as `mujoco_plugin.py` takes it."""
+    layout = vehicle.layout
+    data = {
+        "IDENTIFIER": vehicle.identifier,
+        "COEFFICIENTS": {name: vehicle[name] for name in layout.coefficients},
+        "COMMANDS": {name: layout.usual_inputs[name] for name in layout.commands},
+        "INPUTS": {name: x for name, x in layout.usual_inputs.items() if name not in layout.commands},
+        "DELAYED": dict(zip(layout.commands, layout.delayed, strict=False)),
+        "LAGGING": [*layout.lagging],
+        "FORCES": [f"F_{thruster.name}" for thruster in layout.thrusters],
+        "EXAMPLE": layout.example(layout.axes[0].axis),
+    }
+    lines = [f"{name} = {value!r}" for name, value in data.items()]
+    return "\n".join([printed_accelerations(layout, step), "", *lines, ""])
+
+
+def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, object]:
+    """Return where and how a thruster is drawn, in MuJoCo's frame."""
+    flip = np.array([1.0, -1.0, -1.0])
+    position, direction = flip * place(vehicle, thruster), flip * thruster.direction.value
+    ends = np.concatenate([position - radius * direction, position + radius * direction])
+    return {"name": thruster.name, "position": position, "direction": direction, "radius": radius, "ends": ends}
+
+
+def _notes(vehicle: Vehicle) -> list[str]:
+    """Return what is different in MuJoCo, without full stops."""
+    layout = vehicle.layout
+    notes = ["Steps of `implicit` or `Euler` are taken; `RK4` is not", "The water has no surface"]
+    if lacking := [name for name in AXES if name not in layout.kinds]:
+        notes.append(
+            f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "
+            "times its mass"
+        )
+    if not layout.coupled and len(layout.axes) > 1:
+        notes.append("The vehicle file has no Coriolis and Munk terms, and there are none here")
+    return notes

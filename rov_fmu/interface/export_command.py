@@ -1,0 +1,118 @@
+"""The command `rov-fmu export`: the files of a vehicle for other simulators and for thruster managers."""
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from keyword import iskeyword
+from pathlib import Path
+
+import numpy as np
+
+from rov_fmu.bridges.allocation import allocation_files
+from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.bridges.sdf import Model, gazebo_model
+from rov_fmu.bridges.urdf import urdf_model
+from rov_fmu.fmu.card import card
+from rov_fmu.io.file_kinds import GAZEBO_MODEL, check_written
+from rov_fmu.io.messages import InputError
+from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.report.console import shell_words
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+
+_ENDS = {"mujoco": "_mujoco", "allocation": "_allocation", "sdf": ".sdf", "urdf": ".urdf"}
+"""The end of the usual name of a folder or a file, after the identifier of the vehicle, by format."""
+_TAKEN = {"mujoco", "numpy", *sys.stdlib_module_names}
+"""The names of modules that the folder for MuJoCo imports, directly or through others."""
+_OF_CARD = ("Where it holds", "How far to trust it", "What it leaves out")
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the command, some of which belong to one format only."""
+
+    in_world: bool = False
+    """True for a world with water around the model for Gazebo."""
+    added_mass: str | None = None
+    """"plugin" for the added mass in Gazebo's Hydrodynamics plugin, in place of the link."""
+    draws: int | None = None
+    """The number of sets of coefficients to draw for MuJoCo."""
+    seed: int | None = None
+    force: bool = False
+    """True to replace files of others, and to draw also where an axis is not fit for use."""
+
+
+@dataclass(frozen=True)
+class Exported:
+    """What was written, and what the reader of the console should know."""
+
+    path: Path
+    place: str = ""
+    """Where the notes hold: "in Gazebo"."""
+    notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    following: str = ""
+    """The next command."""
+
+
+def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exported:
+    """Write a vehicle in a format: mujoco, allocation, sdf, urdf.
+
+    Raises FileError, InputError about an option or a vehicle that the format cannot have, and WriteError.
+    """
+    if mistake := next(_misplaced(to, options), None):
+        raise InputError(f"--to {to}: leave out {mistake}")
+    loaded = load_vehicle(vehicle)
+    path, inputs = output or Path(f"{loaded.identifier}{_ENDS[to]}"), [vehicle, *loaded.files]
+    if to in ("sdf", "urdf"):
+        return _exported_file(loaded, to, path, inputs, options)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file, and --to {to} writes a folder")
+    files = _mujoco(loaded, path, options) if to == "mujoco" else allocation_files(loaded)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: there is no folder {path.parent}")
+    path.mkdir(exist_ok=True)
+    check_targets((path / name for name in files), inputs)
+    write_whole(*(Output(path / name, text.encode()) for name, text in files.items()), force=options.force)
+    there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
+    return Exported(path, following=f"{there}python -m {path.name}" if to == "mujoco" else "")
+
+
+def _misplaced(to: str, options: Options) -> Iterator[str]:
+    """Yield the options that a format does not have, each with the reason."""
+    if to != "sdf" and options.in_world:
+        yield "--world, because only a model for Gazebo (sdf) has one"
+    if to != "sdf" and options.added_mass:
+        yield "--added-mass, because only a model for Gazebo (sdf) has this choice"
+    if to != "mujoco" and options.draws:
+        yield "--draws, because only mujoco has a table of draws"
+    if options.seed is not None and options.draws is None:
+        yield "--seed, or give --draws as well"
+
+
+def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Mapping[str, str]:
+    if not path.name.isidentifier() or iskeyword(path.name) or path.name in _TAKEN:
+        reason = "begin with a letter, have only letters, digits and _, and not be that of another module"
+        raise InputError(f"{path}: programs import this folder, so its name must {reason}")
+    drawn = {}
+    if options.draws is not None:
+        drawn = vehicle.draws(options.draws, np.random.default_rng(options.seed or 0), forced=options.force)
+    paragraphs = card(vehicle)
+    columns = {name: column.tolist() for name, column in drawn.items()}
+    return mujoco_files(vehicle, path.name, {heading: paragraphs[heading] for heading in _OF_CARD}, columns)
+
+
+def _exported_file(vehicle: Vehicle, to: str, path: Path, inputs: list[Path], options: Options) -> Exported:
+    """Write the model for Gazebo, or the robot description."""
+    check_targets([path], inputs)
+    check_written(path, GAZEBO_MODEL)
+    check_replaced([path], force=options.force)
+    model: Model = (
+        urdf_model(vehicle)
+        if to == "urdf"
+        else gazebo_model(vehicle, in_world=options.in_world, explicit=options.added_mass == "plugin")
+    )
+    write_whole(Output(path, model.text.encode()), force=options.force)
+    following = shell_words("gz", "sim", "-r", path) if options.in_world else ""
+    if to == "sdf" and not following:
+        following = "include it in a world, or give --world"
+    return Exported(path, "in Gazebo", model.notes, model.warnings, following)

@@ -1,0 +1,537 @@
+"""A vehicle in MuJoCo moves as its FMU does, and contacts, loads and payloads feel its whole mass.
+
+The motion of the FMU comes from its C code, and mass matrices from `verification/references`, which uses no formula of
+the package.
+"""
+
+import importlib
+import subprocess
+import sys
+from dataclasses import replace
+from functools import cache, partial
+from pathlib import Path
+from tempfile import mkdtemp
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rov_fmu
+from rov_fmu.bridges.gym import RovVectorEnv
+from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import delayed_name
+from rov_fmu.interface.model import VehicleModel
+from rov_fmu.io.messages import InputError
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import BARE, ROOT
+from tests.vehicles import VEHICLES, frictionless
+from verification.references.rigid_body import Body
+from verification.references.rigid_vehicle import body
+
+mujoco: Any = importlib.import_module("rov_fmu.bridges.mujoco_plugin").mujoco
+Array = NDArray[np.float64]
+REFERENCES = ROOT / "verification" / "references" / "vehicles"
+FILES = {
+    **SHIPPED,
+    **{name: ROOT / "tests" / "vehicle" / f"{name}.toml" for name in ("everything", "six_axes")},
+    **{name: REFERENCES / f"{name}.toml" for name in ("every_option", "identified", "thrust")},
+}
+FLIP = np.array([1.0, -1.0, -1.0])
+"""The signs of the components in MuJoCo's frames, relative to those of the FMU."""
+TILTS = {
+    "level": (1.0, 0.0, 0.0, 0.0),
+    "45° bow up": (np.cos(np.pi / 8), 0.0, -np.sin(np.pi / 8), 0.0),
+    "askew": (0.8, 0.3, -0.4, 0.33),
+}
+
+
+def package_of(vehicle: Vehicle) -> ModuleType:
+    """Return the package of a vehicle, written to a folder and imported from there as users do."""
+    folder = Path(mkdtemp(prefix=f"{vehicle.identifier}_"))
+    package = folder.name
+    for name, text in mujoco_files(vehicle, package, {"Where it holds": ["Here."]}, {}).items():
+        (folder / name).write_text(text, encoding="utf-8")
+    sys.path.insert(0, str(folder.parent))
+    try:
+        return importlib.import_module(package)
+    finally:
+        sys.path.remove(str(folder.parent))
+
+
+@cache
+def loaded(name: str) -> tuple[VehicleModel, ModuleType]:
+    vehicle = rov_fmu.load(FILES[name])
+    return vehicle, package_of(vehicle)
+
+
+def scene(package: ModuleType, timestep: float = 0.001) -> Any:
+    """Return the world of a vehicle, to which a test may add."""
+    spec = mujoco.MjSpec.from_file(str(package.FOLDER / "scene.xml"))
+    spec.option.timestep = timestep
+    return spec
+
+
+def turned(rov: Any, quaternion: tuple[float, ...]) -> None:
+    rov.data.qpos[3:7] = np.array(quaternion) / np.linalg.norm(quaternion)
+
+
+def rigid(vehicle: Vehicle) -> Body:
+    """Return a vehicle without commands as the rigid body of the reference."""
+    usual = vehicle.layout.usual_inputs
+    return body(vehicle, {**usual, **{delayed_name(name): usual[name] for name in vehicle.layout.commands}})
+
+
+def mass_of(vehicle: Vehicle, rov: Any) -> Array:
+    """Return the mass matrix of a vehicle in MuJoCo's coordinates: the velocity in the world, the rates in the body."""
+    turn = np.eye(6)
+    turn[:3, :3] = FLIP[:, None] * rov.data.xmat[rov.body].reshape(3, 3).T
+    turn[3:, 3:] = np.diag(FLIP)
+    return np.asarray(turn.T @ rigid(vehicle).mass.astype(float) @ turn)
+
+
+# ---- The motion ------------------------------------------------------------------------------------------------------
+
+
+def commands(vehicle: Vehicle, seconds: float) -> tuple[Array, dict[str, Array]]:
+    """Return switches every half second, and random commands up to half of the full ones."""
+    random, times = np.random.default_rng(3), np.arange(0.0, seconds, 0.5)
+    layout = vehicle.layout
+    return times, {
+        name: np.array([layout.command_of(x) for x in random.uniform(-0.5, 0.5, len(times))])
+        for name in layout.commands
+    }
+
+
+CURRENT = {"V_N": 0.2, "V_E": -0.1}
+
+
+def error(name: str, h: float, seconds: float = 10.0) -> float:
+    """Return the largest difference of positions, m, and of the attitude, in units of half the square of an angle."""
+    vehicle, package = loaded(name)
+    switches, given = commands(vehicle, seconds)
+    current = {axis: speed for axis, speed in CURRENT.items() if axis in vehicle.layout.inputs}
+    held = {axis: np.full(len(switches), speed) for axis, speed in current.items()}
+    times = np.arange(0.0, seconds + 1e-9, 0.1)
+    with np.errstate(all="ignore"):
+        run = vehicle.simulate(times, {"time": switches, **given, **held})
+    rov = package.load()
+    rov.model.opt.timestep = h
+    rov.inputs.update(current)
+    rov.data.qpos[:3] = 0.0
+    rov.data.qvel[:2] = current.get("V_N", 0.0), -current.get("V_E", 0.0)  # at rest in the water
+    actuators = [rov.model.actuator(u).id for u in given]
+    worst, steps = 0.0, round(0.1 / h)
+    for n, row in enumerate(np.repeat(np.array([*given.values()]).T, 5, axis=0)):
+        rov.data.ctrl[actuators] = row
+        for _ in range(steps):
+            rov.step()
+        place = [run[axis][n + 1] if axis in run else 0.0 for axis in "xyz"]
+        worst = max(worst, float(np.abs(rov.data.qpos[:3] - FLIP * place).max()))
+        if "psi" in run and "eta" not in run:
+            heading = np.array([np.cos(run["psi"][n + 1] / 2.0), 0.0, 0.0, -np.sin(run["psi"][n + 1] / 2.0)])
+            worst = max(worst, 1.0 - abs(float(heading @ rov.data.qpos[3:7])))
+        if "eta" in run:
+            e, a, b, c = (run[part][n + 1] for part in ("eta", "epsilon_1", "epsilon_2", "epsilon_3"))
+            worst = max(worst, 1.0 - abs(float(np.array([e, a, -b, -c]) @ rov.data.qpos[3:7])))
+    return worst
+
+
+MOVES = [
+    pytest.mark.filterwarnings("ignore:.*turns over:UserWarning", "ignore:.*no signal:UserWarning"),
+    pytest.mark.parametrize("name", FILES),
+]
+
+
+def moves(test: Any) -> Any:
+    """Run a test for all vehicles, some of which turn over."""
+    for mark in MOVES:
+        test = mark(test)
+    return test
+
+
+@moves
+def test_it_moves_as_the_fmu_with_errors_of_second_order(name: str) -> None:
+    coarse, fine = error(name, 0.005, 2.0), error(name, 0.0025, 2.0)
+    assert coarse < 1e-3
+    assert coarse / fine == pytest.approx(4.0, rel=0.3)
+
+
+@pytest.mark.long
+@moves
+def test_after_ten_seconds_it_is_within_a_millimetre_at_4_ms_and_a_hundredth_at_1_ms(name: str) -> None:
+    assert error(name, 0.004) < 1e-3
+    assert error(name, 0.001) < 1e-5
+
+
+def test_ballast_changes_the_motion_as_in_the_fmu() -> None:
+    vehicle, package = loaded("bluerov2")
+    ballast = {"m_rov": 14.0, "F_0_w": 3.0, "alpha_w": 0.5, "beta_u": 0.8}
+    rov = package.load()
+    rov.data.qpos[:3] = 0.0
+    rov.coefficients |= ballast
+    rov.data.ctrl[:] = 0.2
+    while rov.data.time < 0.999:
+        rov.step()
+    run = vehicle.with_(**ballast).simulate([0.0, 1.0], dict.fromkeys(vehicle.layout.commands, 0.2))
+    assert rov.data.qpos[:3] == pytest.approx(FLIP * [run[axis][-1] for axis in "xyz"], abs=1e-5)
+    assert rov.forces["F_1"] == pytest.approx(run["F_1"][-1], rel=1e-6)
+
+
+def test_two_vehicles_in_one_world_and_one_after_a_reset_move_as_one_alone() -> None:
+    _, package = loaded("bluerov2_heavy")
+    alone = package.load()
+    spec = scene(package, 0.002)
+    other = mujoco.MjSpec.from_file(str(package.FOLDER / "vehicle.xml"))
+    spec.attach(other, prefix="other_", frame=spec.worldbody.add_frame(pos=[0.0, 3.0, 0.0]))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    both = [package.Rov(model, data, prefix) for prefix in ("", "other_")]
+
+    def fly(step: Any, data: Any) -> None:
+        for n in range(300):
+            data.ctrl[:] = 0.3 * np.sin(0.01 * n + np.arange(len(data.ctrl)) % 8)
+            step()
+
+    fly(alone.step, alone.data)
+    fly(partial(package.step, *both), data)
+    end = alone.data.qpos.copy()
+    assert data.qpos[:7] == pytest.approx(end, abs=1e-12)
+    assert data.qpos[7:] == pytest.approx(end + np.eye(7)[1] * 3.0, abs=1e-12)
+    mujoco.mj_resetData(alone.model, alone.data)
+    fly(alone.step, alone.data)
+    assert (alone.data.qpos == end).all()
+
+
+# ---- The mass --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("tilt", TILTS)
+@pytest.mark.parametrize("payload", [0.0, 2.0])
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "every_option", "six_axes"])
+def test_a_force_from_outside_feels_the_whole_mass_and_that_of_a_payload(name: str, payload: float, tilt: str) -> None:
+    vehicle, package = loaded(name)
+    spec, at, wrench = scene(package), np.array([0.1, 0.05, -0.2]), np.array([10.0, 3.0, -4.0, 1.0, 0.5, -0.3])
+    if payload:
+        child = spec.body(vehicle.identifier).add_body(pos=at, gravcomp=1.0)
+        child.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0.0, 0.0], mass=payload, contype=0, conaffinity=0)
+
+    def acceleration(*forces: float) -> Array:
+        rov = package.Rov(spec.compile())
+        turned(rov, TILTS[tilt])
+        rov.data.qfrc_applied[:6] = forces
+        rov.step()
+        whole = mass_of(vehicle, rov)
+        if payload:
+            cross = np.cross(np.eye(3), at)
+            own = payload * np.block([[np.eye(3), -cross], [cross, -cross @ cross + 0.4 * 0.05**2 * np.eye(3)]])
+            turn = np.eye(6)
+            turn[:3, :3] = rov.data.xmat[rov.body].reshape(3, 3).T
+            whole = whole + turn.T @ own @ turn
+        return np.asarray(whole @ rov.data.qacc[:6])
+
+    assert acceleration(*wrench) - acceleration(*np.zeros(6)) == pytest.approx(wrench, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("angle", [0.0, np.pi / 4.0, 1.2])
+def test_a_body_that_a_constraint_welds_to_the_origin_adds_its_mass(angle: float) -> None:
+    """The Heavy, without drag and weight, is pitched and pushed with 10 N to the north for 60 ms."""
+    vehicle, package = loaded("bluerov2_heavy")
+    spec = scene(package)
+    spec.option.iterations, spec.option.tolerance = 200, 1e-14
+    other = spec.worldbody.add_body(name="payload", pos=[0.0, 0.0, -2.0], gravcomp=1.0)
+    other.add_freejoint()
+    other.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.05, 0.0, 0.0], mass=2.0, contype=0, conaffinity=0)
+    stiff = {"solref": [0.002, 1.0], "solimp": [0.9999, 0.9999, 0.001, 0.5, 2.0]}
+    names = {"name1": vehicle.identifier, "name2": "payload", "objtype": mujoco.mjtObj.mjOBJ_BODY}
+    spec.add_equality(type=mujoco.mjtEq.mjEQ_WELD, **names, **stiff)
+    rov = package.Rov(spec.compile(), **{**frictionless(vehicle).coefficients, "W": 0.0, "B": 0.0})
+    for first in (3, 10):
+        rov.data.qpos[first : first + 4] = np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0
+    rov.data.xfrc_applied[rov.body, 0] = 10.0
+    speeds = []
+    for _ in range(60):
+        rov.step()
+        speeds.append(rov.data.qvel[0])
+    along, across = (vehicle["m_rov"] + vehicle[m_a] + 2.0 for m_a in ("m_a_u", "m_a_w"))
+    expected = 10.0 * (np.cos(angle) ** 2 / along + np.sin(angle) ** 2 / across)
+    assert np.polyfit(0.001 * np.arange(60), speeds, 1)[0] == pytest.approx(expected, rel=2e-4)
+
+
+def test_the_figures_of_the_heavy() -> None:
+    """10 N forward give 10 / (13.5 + 6.36) m/s²; at 45° of pitch, half of the inverse of each mass counts."""
+    _, package = loaded("bluerov2_heavy")
+    found = []
+    for tilt, push in (("level", 0.0), ("level", 10.0), ("45° bow up", 0.0), ("45° bow up", 10.0)):
+        rov = package.load()
+        turned(rov, TILTS[tilt])
+        rov.data.xfrc_applied[rov.body, 0] = push
+        rov.step()
+        found.append(rov.data.qacc[0])
+    assert found[1] - found[0] == pytest.approx(0.50352, abs=1e-5)
+    assert found[3] - found[2] == pytest.approx(0.40714, abs=1e-5)
+
+
+@pytest.mark.parametrize("tilt", TILTS)
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "six_axes"])
+def test_a_wall_feels_mass_and_added_mass(name: str, tilt: str) -> None:
+    """Without weight and drag, the momentum of body and water, R M nu, changes by the impulse of the wall alone."""
+    vehicle, package = loaded(name)
+    still = frictionless(vehicle).with_(**{name: 0.0 for name in ("W", "B") if name in vehicle.coefficients})
+    spec = scene(package, 0.0005)
+    spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 3.0, 3.0], pos=[0.5, 0.0, -2.0])
+    rov = package.Rov(spec.compile(), **still.coefficients)
+    turned(rov, TILTS[tilt])
+    rov.data.qvel[0] = 0.5
+
+    def momentum() -> Array:
+        mujoco.mj_kinematics(rov.model, rov.data)
+        return np.asarray(mass_of(still, rov) @ rov.data.qvel)[:3]
+
+    before, impulse = momentum(), np.zeros(3)
+    for _ in range(2000):
+        rov.step()
+        impulse += 0.0005 * rov.data.qfrc_constraint[:3]
+    assert impulse[0] < -0.5 * 13.5
+    assert momentum() - before == pytest.approx(impulse, abs=1e-3 * abs(impulse[0]))
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "every_option", "videoray"])
+def test_a_vehicle_that_lacks_an_axis_is_held_along_it(name: str) -> None:
+    vehicle, package = loaded(name)
+    rov = package.load()
+    rov.data.qvel[:] = 0.1, 0.05, 0.05, 0.2, 0.2, 0.2
+    for _ in range(1000):
+        rov.data.xfrc_applied[rov.body] = 5.0, 5.0, 0.0, 1.0, 1.0, 0.0
+        rov.step()
+    held = [n for n, v in enumerate("uvwpqr") if v not in vehicle.layout.velocities]
+    R = rov.data.xmat[rov.body].reshape(3, 3)
+    nu = np.concatenate([R.T @ rov.data.qvel[:3], rov.data.qvel[3:]])
+    assert nu[held] == pytest.approx(0.0, abs=5e-4)
+    if 3 in held:
+        assert R[2, 2] == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(np.delete(nu, held)).max() > 0.05
+
+
+# ---- Energy and stability --------------------------------------------------------------------------------------------
+
+
+def energy(vehicle: Vehicle, rov: Any) -> float:
+    """Return the kinetic energy of body and water, and the potential energy of weight and buoyancy, J.
+
+    It is 0 at rest if both are equal and the centre of buoyancy is above that of mass.
+    """
+    mujoco.mj_kinematics(rov.model, rov.data)
+    of = rigid(vehicle)
+    lever = FLIP * (of.weight * of.centre_of_gravity - of.buoyancy * of.centre_of_buoyancy).astype(float)
+    potential = rov.data.xmat[rov.body][6:] @ lever + np.linalg.norm(lever)
+    return float(0.5 * rov.data.qvel @ mass_of(vehicle, rov) @ rov.data.qvel + potential)
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "six_axes"])
+def test_the_energy_of_a_vehicle_without_thrust_does_not_grow(name: str) -> None:
+    """With drag it falls; without drag, weight and buoyancy rock the vehicle, and it stays."""
+    vehicle, package = loaded(name)
+    loads = {key: 0.0 for key in vehicle.coefficients if key.startswith("F_0")}
+    vehicle = vehicle.with_(**loads, B=vehicle["W"])
+    for some, most, least in ((vehicle, 0.5, 0.0), (frictionless(vehicle), 1.0001, 0.9999)):
+        rov = package.load(**some.coefficients)
+        rov.model.opt.timestep = 0.004
+        rov.model.geom_contype[:] = 0
+        turned(rov, TILTS["askew"])
+        rov.data.qvel[:] = 0.5, 0.3, -0.2, 0.4, -0.3, 0.5
+        energies = [energy(some, rov)]
+        for _ in range(40):
+            for _ in range(25):
+                rov.step()
+            energies.append(energy(some, rov))
+        assert np.diff(energies).max() < 1e-5 * energies[0]
+        assert least < energies[-1] / energies[0] < most
+
+
+def test_a_still_vehicle_stays_still() -> None:
+    vehicle, package = loaded("bluerov2_heavy")
+    rov = package.load(B=vehicle["W"])
+    for _ in range(500):
+        rov.step()
+    assert rov.data.qvel == pytest.approx(0.0, abs=1e-12)
+
+
+def tumble(name: str, steps: int) -> tuple[float, int]:
+    """Let a vehicle tumble between walls under random commands. Return its largest velocity, and the contacts."""
+    vehicle, package = loaded(name)
+    spec, layout = scene(package, 0.004), vehicle.layout
+    for n in range(8):
+        angle = n * np.pi / 4.0
+        at, facing = (
+            [0.8 * np.cos(angle), 0.8 * np.sin(angle), -2.0],
+            [np.cos(angle / 2.0), 0.0, 0.0, np.sin(angle / 2.0)],
+        )
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 1.0, 2.0], pos=at, quat=facing)
+    for height in (-1.4, -2.6):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[3.0, 3.0, 0.1], pos=[0.0, 0.0, height])
+    rov, random = package.Rov(spec.compile()), np.random.default_rng(0)
+    fastest, contacts = 0.0, 0
+    for n in range(steps):
+        if n % 10 == 0:
+            rov.data.ctrl[:] = [layout.command_of(x) for x in random.uniform(-1.0, 1.0, len(rov.data.ctrl))]
+        rov.step()
+        fastest, contacts = max(fastest, float(np.abs(rov.data.qvel).max())), contacts + rov.data.ncon
+    assert rov.data.time == pytest.approx(0.004 * steps), "MuJoCo resets a simulation that becomes unstable"
+    assert not any(warning.number for warning in rov.data.warning)
+    assert np.abs(rov.data.qpos[:3] - [0.0, 0.0, -2.0]).max() < 1.0, "it is still between the walls"
+    return fastest, contacts
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "videoray"])
+def test_contacts_under_random_commands_stay_finite(name: str) -> None:
+    fastest, contacts = tumble(name, 1500)
+    assert fastest < 10.0
+    assert contacts
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", FILES)
+def test_contacts_stay_finite_for_1e5_steps(name: str) -> None:
+    fastest, contacts = tumble(name, 100_000)
+    assert fastest < 20.0
+    assert contacts
+
+
+# ---- What it refuses -------------------------------------------------------------------------------------------------
+
+
+def _without_joint(spec: Any) -> None:
+    spec.delete(spec.joint("videoray"))
+
+
+def _without_child(spec: Any) -> None:
+    spec.delete(spec.body("videoray_thrusters"))
+
+
+def _with_gravity(spec: Any) -> None:
+    spec.body("videoray").gravcomp = 0.0
+
+
+def _with_fluid(spec: Any) -> None:
+    spec.option.density = 1000.0
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (_without_joint, "body videoray: must be in <worldbody> and have a <freejoint>"),
+        (_without_child, "body videoray: must contain another body"),
+        (_with_gravity, 'body videoray: must have gravcomp="1"'),
+        (_with_fluid, "option: density and viscosity must be 0"),
+    ],
+)
+def test_a_model_that_the_equation_cannot_move_is_one_line(change: Any, message: str) -> None:
+    _, package = loaded("videoray")
+    spec = scene(package)
+    change(spec)
+    with pytest.raises(ValueError, match=message):
+        package.Rov(spec.compile())
+
+
+def test_a_mujoco_whose_contacts_would_not_feel_the_added_mass_is_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mujoco.MjData, "qM", None, raising=False)
+    with pytest.raises(ValueError, match=r"^MuJoCo .*: must be 3\.17 or later"):
+        loaded("videoray")[1].load()
+
+
+@pytest.mark.parametrize("name", ["bluerov2", "every_option"])
+@pytest.mark.parametrize("impossible", [{"m_rov": -50.0}, {"beta_u": 0.0}])
+def test_ballast_that_no_body_has_is_one_line(name: str, impossible: dict[str, float]) -> None:
+    rov = loaded(name)[1].load()
+    rov.step()
+    rov.coefficients |= impossible
+    with pytest.raises(ValueError, match=r"^coefficients: the mass matrix must be positive definite"):
+        rov.step()
+
+
+def test_an_unknown_coefficient_or_input_is_one_line() -> None:
+    _, package = loaded("videoray")
+    with pytest.raises(ValueError, match=r"^a_d_v: the vehicle has no such coefficient or input$"):
+        package.load(a_d_v=1.0)
+    rov = package.load()
+    rov.step()
+    rov.inputs["Y_ext"] = 1.0
+    with pytest.raises(ValueError, match=r"^Y_ext: the vehicle has no such coefficient or input$"):
+        rov.step()
+
+
+def test_a_vehicle_without_thrusters_moves_by_loads() -> None:
+    bare = rov_fmu.load(BARE)
+    rov = package_of(bare.with_(replace(bare.layout, thrusters=(), curves=()))).load()
+    rov.inputs["Z_ext"] = 5.0
+    rov.step()
+    assert rov.data.qacc[2] == pytest.approx(-5.0 / bare["m_rov"], rel=1e-2)
+    assert rov.forces == {}
+
+
+def test_a_simulation_that_becomes_unstable_begins_anew() -> None:
+    rov = loaded("bluerov2")[1].load()
+    start = rov.data.qpos.copy()
+    rov.step()
+    rov.data.qfrc_applied[0] = 1e13
+    with pytest.MonkeyPatch.context() as patched:
+        patched.chdir(mkdtemp())  # MuJoCo writes a log there
+        rov.step()
+    assert rov.data.time == 0.002, "it has begun anew, and taken a step"
+    assert rov.data.qpos == pytest.approx(start, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", [*VEHICLES, "bare"])
+def test_every_kind_of_vehicle_moves_or_is_refused_in_one_line(name: str) -> None:
+    bare = rov_fmu.load(BARE)
+    vehicle = bare.with_(VEHICLES[name].layout, **VEHICLES[name].coefficients) if name != "bare" else bare
+    if "m_rov" not in vehicle.coefficients:
+        with pytest.raises(InputError, match=r"^bare: has no surge.*a body in MuJoCo must have$"):
+            mujoco_files(vehicle, "rov", {}, {})
+        return
+    rov = package_of(vehicle).load()
+    for command, value in vehicle.layout.example(vehicle.layout.axes[0].axis).items():
+        rov.data.actuator(command).ctrl = value
+    for _ in range(20):
+        rov.step()
+    assert np.abs(rov.data.qvel).max() > 1e-4
+
+
+# ---- The folder ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="pictures are drawn with EGL")
+def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path) -> None:
+    assert main(["export", "bluerov2", "--to", "mujoco", "-o", str(tmp_path / "rov")]) == 0
+    program = "import runpy, sys; sys.modules['rov_fmu'] = None; sys.argv[1:] = ['rov.png']; runpy.run_module('rov')"
+    subprocess.run([sys.executable, "-c", program], cwd=tmp_path, check=True, timeout=60)
+    picture = (tmp_path / "rov.png").read_bytes()
+    assert picture.startswith(b"\x89PNG\r\n\x1a\n")
+    assert int.from_bytes(picture[16:20]) == 1280
+
+
+@pytest.fixture(scope="module")
+def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("draws") / "refit"
+    assert main(["export", "videoray_refit", "--to", "mujoco", "-o", str(folder), "--draws", "4", "--seed", "1"]) == 0
+    return folder
+
+
+def test_draws_are_those_of_the_environment_with_the_same_seed(drawn: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(drawn.parent)
+    package = importlib.import_module("refit")
+    sets = package.draws()
+    environment = RovVectorEnv(rov_fmu.load("videoray_refit"), 4)
+    environment.reset(seed=1)
+    assert len(sets) == 4
+    assert {name: [one[name] for one in sets] for name in sets[0]} == {
+        name: column[:, 0].tolist() for name, column in environment.coefficients.items()
+    }
+    rov = package.load(**sets[2])
+    assert rov.coefficients["a_d_u"] == sets[2]["a_d_u"]
+    assert "100" not in (drawn / "README.md").read_text(encoding="utf-8").partition("sets of")[0][-5:]
+    assert "surge: good." in (drawn / "README.md").read_text(encoding="utf-8")
