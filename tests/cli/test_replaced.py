@@ -133,7 +133,7 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
 _TUNE = f"tune {BARE} --axis heave --command 0.3 --v-ss 0.2"
-# What each option writes, in the folder {f}. A study and the files beside an FMU have names of their own.
+# What each option writes, in the folder {f}. A study, an exported folder and the files beside an FMU name their files.
 WRITING = {
     ("build", "output"): ("rov.fmu", f"build {BARE} --platform host -o {{f}}/rov.fmu"),
     ("build", "osp"): ("bare_OspModelDescription.xml", f"build {BARE} --platform host --osp -o {{f}}/rov.fmu"),
@@ -142,6 +142,8 @@ WRITING = {
     ("fly", "output"): ("fly.html", f"fly {BARE} -o {{f}}/fly.html"),
     ("sitl", "log"): ("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
     ("sdf", "output"): ("rov.sdf", f"sdf {BARE} -o {{f}}/rov.sdf"),
+    ("export", "output"): ("rov.sdf", f"export {BARE} --to sdf -o {{f}}/rov.sdf"),
+    ("export", "folder"): ("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
     ("prove", "report"): ("proof.html", "prove {fmu} --report {f}/proof.html"),
     ("study", "output"): ("study.html", "study {f}/plan.toml -o {f}"),
     ("study", "run"): ("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
@@ -155,7 +157,7 @@ READING = {
     *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("identify", "folder"), ("tune", "points")},
 }
 """The arguments and options that name a file to read."""
-AGAIN = [key for key in WRITING if key[0] in ("simulate", "fly", "sdf", "tune")]
+AGAIN = [key for key in WRITING if key[0] in ("simulate", "fly", "sdf", "export", "tune")]
 """What is quick enough to be written several times."""
 
 
@@ -166,7 +168,7 @@ def test_every_file_that_a_command_writes_is_known_here() -> None:
         for parameter in command.params
         if isinstance(parameter.type, click.Path)
     }
-    assert named - READING == {key for key in WRITING if key not in (("build", "osp"), ("study", "run"))}
+    assert named - READING == WRITING.keys() - {("build", "osp"), ("export", "folder"), ("study", "run")}
     assert {name for name, command in _commands.commands.items() for p in command.params if p.name == "force"} == {
         name for name, _ in WRITING
     }
