@@ -8,9 +8,8 @@ import numpy as np
 from scipy.stats.qmc import Sobol
 
 from rov_fmu.c.filter import DivergedError, Run
-from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.likelihood.curves import NO_SHAPES, Shapes
+from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
@@ -186,7 +185,7 @@ def _predicted(
                 predicted=measured - off,
                 deviation=deviation,
                 unchanged=_unchanged(record.time[at], measured, span),
-                noise=objective.table.get(z.tolist(), "white noise", m.channel.quantity.name),
+                noise=objective.table.get(z, "white noise", m.channel.quantity.name),
                 error=float(np.sqrt(np.mean(off**2))),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 compared=measured - compared.innovations[at] if compared else None,
@@ -261,28 +260,29 @@ def answers(
     table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
-        rest = shapes.motion(vehicle, axis, 0.0)
+        rest = shapes.motions(vehicle, axis, np.zeros(1))
         if not pushes:
-            return np.array([_response(shapes.motion(vehicle, axis, c), rest) for c in ANSWERED])
-        full = shapes.motion(vehicle, axis, 1.0)
-        return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C)), rest) for push in pushes])
+            return _responses(shapes.motions(vehicle, axis, np.array(ANSWERED)), rest)
+        full = shapes.motions(vehicle, axis, np.ones(1)).of
+        push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
+        return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
 
     def logarithms(z: Array) -> Array:
-        fitted = values(*table.model(z.tolist()))
+        fitted = values(*table.model(z))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(np.abs(fitted)).ravel()
+            return np.log(np.abs(fitted)).reshape(3 * len(fitted), -1)
 
     with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
-        slopes = posterior.slopes(logarithms, posterior.of_vehicle)
+        slopes = posterior.slopes(logarithms)
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
     variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-    variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
+    variances[:, :2] += (_OF_THRUST * table.get(posterior.z, "slow gain")) ** 2
     sizes = np.abs(pushes or ANSWERED)
     variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
     of_file = values(vehicle, NO_SHAPES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z).reshape(of_file.shape)) / QUANTILE
+        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z[:, None]).reshape(of_file.shape)) / QUANTILE
     errors = np.maximum(np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0), EXACT / QUANTILE)
     found = []
     for command, error, (V, rise, stop) in zip(ANSWERED, errors, of_file.tolist(), strict=True):
@@ -309,8 +309,8 @@ def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[floa
         return ()
 
     def push(vehicle: Vehicle, command: float) -> float:
-        at_rest, pushed = (NO_SHAPES.motion(vehicle, axis, c).C for c in (0.0, command))
-        return pushed - at_rest
+        at_rest, pushed = NO_SHAPES.motions(vehicle, axis, np.array([0.0, command])).of["C"].tolist()
+        return float(pushed - at_rest)
 
     return tuple(push(own, command) / push(wrench, 1.0) for command in ANSWERED)
 
@@ -323,24 +323,23 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     """
     known = vehicle.uncertainty
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
-    rovs = [vehicle, *(vehicle.replaced(dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
-    rests = [NO_SHAPES.motion(rov, axis, 0.0) for rov in rovs]
+    drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
+    rovs = vehicle.replaced(dict(zip(known.names, drawn.T, strict=True)))
+    pushed, rest = (NO_SHAPES.motions(rovs, axis, np.array(some)) for some in (ANSWERED, (0.0,)))
+    responses = _responses(pushed, rest).reshape(len(ANSWERED), 3, -1)
     found = []
-    for command in ANSWERED:
-        pushed = (NO_SHAPES.motion(rov, axis, command) for rov in rovs)
-        values = np.array([_response(one, rest) for one, rest in zip(pushed, rests, strict=True)])
-        low, high = np.quantile(values[1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=0).tolist()
-        if not known.names:
-            low = high = values[0].tolist()
-        steady, rise, stop = zip(values[0].tolist(), zip(low, high, strict=True), strict=True)
+    for command, values in zip(ANSWERED, responses, strict=True):
+        ends = np.quantile(values[:, 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=1) if known.names else values.T
+        low, high = ends[0].tolist(), ends[-1].tolist()
+        steady, rise, stop = zip(values[:, 0].tolist(), zip(low, high, strict=True), strict=True)
         found.append(Answer(axis, command, steady, rise, stop))
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
-def _response(motion: AxisAlone, rest: AxisAlone) -> tuple[float, float, float]:
-    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
-    V = motion.steady_velocity()
-    return V, motion.time_constant(), rest.stopping_way(V, _STOPPED)
+def _responses(motions: Motions, rest: Motions) -> Array:
+    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force: commands x 3, or commands x 3 x n."""
+    V, Tau = motions.response()
+    return np.stack([V, Tau, rest.stopping_way(V, _STOPPED)], axis=1)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------

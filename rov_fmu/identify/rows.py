@@ -61,6 +61,6 @@ def held_out_rows(fit: Fit) -> HeldOut:
             last=False,
         ).z
         some = [rows[n] for n in members]
-        for row, value in zip(some, modelled(some, *objective.table.model(z.tolist())).tolist(), strict=True):
+        for row, value in zip(some, modelled(some, *objective.table.model(z)).tolist(), strict=True):
             found[row.quantity, row.subject.name, row.command] = value
     return found

@@ -18,7 +18,7 @@ is the square of their noise.
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache, partial
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -36,6 +36,8 @@ _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
 _TOGETHER = 8
 """The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
+_LEAST_DELAY = 1e-9
+"""A lag that differs from none, s."""
 OUTLYING = 3.0
 """The size of an innovation, in standard deviations, from which it counts less (as in filter.c)."""
 
@@ -63,27 +65,30 @@ class TableRow:
 
 
 def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_lag: float = 0.0) -> Array:
-    """Return the values of some rows by the model, in the unit of each row.
+    """Return the values of m rows by the model, in the unit of each row; m x n for n vehicles.
 
     A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
     """
-    found = np.zeros(len(rows))
-    motion_of = cache(partial(shapes.motion, vehicle))
-    forces: dict[Curve, list[int]] = {}
+    found: dict[int, Array] = {}
+    of: dict[Curve | Axis, list[int]] = {}
     for n, row in enumerate(rows):
-        if isinstance(row.subject, Curve):
-            forces.setdefault(row.subject, []).append(n)
+        of.setdefault(row.subject, []).append(n)
+    for subject, places in of.items():
+        commands = np.array([rows[n].command for n in places])
+        if isinstance(subject, Curve):
+            found |= zip(places, shapes.forces(vehicle, subject, commands), strict=True)
             continue
-        motion = motion_of(row.subject, row.command)
-        found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
-        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
-        lag = max((vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag), default=0.0)
-        if row.quantity == "Tau" and lag > 0.0:
-            load = motion_of(row.subject, 0.0).C
-            found[n] = measured_time_constant(motion, load, lag)
-    for curve, places in forces.items():
-        found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
-    return found
+        motions = shapes.motions(vehicle, subject, commands)
+        V_ss, Tau = motions.response()
+        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(subject)}
+        lags = [vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag]
+        lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
+        if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
+            load = shapes.motions(vehicle, subject, np.zeros(1)).of["C"]
+            Tau = np.where(lag > 0.0, measured_time_constant(motions, load, np.maximum(lag, _LEAST_DELAY)), Tau)
+        for n, *pair in zip(places, V_ss, Tau, strict=True):
+            found[n] = pair[rows[n].quantity == "Tau"]
+    return np.array([found[n] for n in range(len(rows))])
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,6 +122,14 @@ class Data:
         return gradient, 2.0 * (A.T * weight) @ A + B.T @ B
 
 
+def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
+    """Return a column of coordinates for each move of one of them."""
+    found = np.repeat(z[:, None], len(moves), axis=1)
+    for n, (k, step) in enumerate(moves):
+        found[k, n] += step
+    return found
+
+
 def cost(innovations: Array, variances: Array) -> float:
     """Return the sum over the samples of log S + rho(eps^2 / S)."""
     u = innovations**2 / variances
@@ -146,7 +159,7 @@ class Objective:
 
         The other options are those of `Filter.run`. Raises DivergedError.
         """
-        parameters = (table or self.table).of_log(z.tolist(), self.logs[number])
+        parameters = (table or self.table).of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
@@ -172,11 +185,12 @@ class Objective:
             return [job.result() for job in jobs]
 
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
-        """Return the innovations of all or some rows of tables and their variances."""
+        """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
         rows = self.rows if rows is None else rows
         least_lag = LEAST_LAG if self.logs else 0.0
-        off = np.array([row.measured for row in rows]) - modelled(rows, *self.table.model(z.tolist()), least_lag)
-        noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
+        measured = np.array([row.measured for row in rows])
+        off = (measured - modelled(rows, *self.table.model(z), least_lag).T).T
+        noise = np.array([self.table.get(z, "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 
     def prior(self, z: Array) -> float:
@@ -254,11 +268,7 @@ class Objective:
         moves = [(k, own.step) for k, own in zip(places, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        sets = []
-        for k, step in moves:
-            moved = z.copy()
-            moved[k] += step
-            sets.append(self.table.of_log(moved.tolist(), self.logs[n]))
+        sets = self.table.of_log(changed(z, moves), self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=frozen), strict=True))
         for k, own in zip(places, parameters, strict=True):
             above, below = runs[k, own.step], runs.get((k, -own.step), run)
@@ -270,16 +280,20 @@ class Objective:
                 into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
-        off, variances = self.row_values(z)
+        places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
+        moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps, strict=True)]
+        off, _ = self.row_values(changed(z, [(0, 0.0), *moves]))
+        _, variances = self.row_values(z)
         slopes, log_slopes = np.zeros((len(off), len(z))), np.zeros((len(off), len(z)))
+        up, down = np.split(off[:, 1:], 2, axis=1)
+        slopes[:, places] = (up - down) / (2.0 * steps)
         for k, parameter in enumerate(self.table.parameters):
             if parameter.kind == "row noise":
                 log_slopes[:, k] = [2.0 * (row.noise == parameter.of) for row in self.rows]
-            elif places := [n for n, row in enumerate(self.rows) if row.depends_on(parameter, self.table.layout)]:
-                some = [self.rows[n] for n in places]
-                up, down = z.copy(), z.copy()
-                up[k] += parameter.step
-                down[k] -= parameter.step
-                change = self.row_values(up, some)[0] - self.row_values(down, some)[0]
-                slopes[places, k] = change / (2.0 * parameter.step)
-        return Data(off, variances, slopes, log_slopes)
+        return Data(off[:, 0], variances, slopes, log_slopes)
+
+    @cached_property
+    def _of_rows(self) -> list[int]:
+        """The places of the parameters of the motion that change the values of rows."""
+        layout, rows = self.table.layout, {(row.subject, row.quantity): row for row in self.rows}.values()
+        return [k for k, p in enumerate(self.table.parameters) if any(row.depends_on(p, layout) for row in rows)]

@@ -165,7 +165,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
     `guessed` names the axes whose prior of the drag follows from the data: they have the drag of a body of their mass.
     """
     one, record = objective.logs[number], objective.records[number]
-    parameters = objective.table.of_log(objective.mean.tolist(), one)
+    parameters = objective.table.of_log(objective.mean, one)
     usual = dict(parameters.coefficients)
     for axis in (form.axis for form in one.layout.axes if form.axis.name in guessed):
         volume = usual[axis.inertia] / _DENSITY

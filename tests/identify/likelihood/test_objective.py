@@ -14,6 +14,7 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, total
 from rov_fmu.tank.arrays import Array
+from tests.c.sets import one_set
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
 from tests.recordings import run, write_log
@@ -74,8 +75,8 @@ def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
         _, information = total(objective, place, objective.data(place, runs))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
-    def one_by_one(self: Filter, record: Record, sets: Sequence[Parameters], first: Run, **how: bool) -> list[Run]:
-        return [self.run(record, one, repeated=first, **how) for one in sets]
+    def one_by_one(self: Filter, record: Record, sets: Parameters, first: Run, **how: bool) -> list[Run]:
+        return [self.run(record, one_set(sets, n), repeated=first, **how) for n in range(sets.count)]
 
     in_lanes = errors()
     monkeypatch.setattr(Filter, "run_many", one_by_one)
