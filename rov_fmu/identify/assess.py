@@ -10,10 +10,10 @@ from scipy.stats.qmc import Sobol
 from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
-from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
-from rov_fmu.identify.likelihood.solve import Minimum, minimise, total
+from rov_fmu.identify.likelihood.solve import Minimum, refits
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -51,8 +51,6 @@ _EXPONENT = 0.15
 of the command and the velocity that are known to about a tenth each."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
-_REFIT_STEPS = 6
-"""The steps of a fit without one log, which begins at the fit to all."""
 _STOPPED = 0.1
 _DRAWS = 256
 """The number of vehicles that are drawn from the estimates of a vehicle file."""
@@ -70,7 +68,7 @@ _MOVING = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _LeftOut:
     """A part of the data that is left out: a log, or a half of the only log."""
 
     log: int
@@ -78,31 +76,33 @@ class _Part:
     words: str
 
 
-def predictions(
-    objective: Objective, best: Minimum, posterior: Posterior, against: Vehicle | None = None
-) -> Iterator[Prediction]:
+def predictions(objective: Objective, best: Minimum, against: Vehicle | None = None) -> Iterator[Prediction]:
     """Yield the prediction of each quantity of each log by a fit to all other data, and by a vehicle to compare with.
 
     That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
     """
     other = _other(objective.table, against)
-    count = len(objective.logs)
-    for n, one in enumerate(objective.logs):
-        if count > 1:
-            others = [other for other in objective.logs if other is not one]
-            rest = Objective(objective.table, others, objective.rows, thinned=True)
-            again = minimise(rest, posterior.z, most=_REFIT_STEPS, with_noise=False, last=False)
-            words = "the other log" if count == 2 else f"the other {count - 1} logs"
-            _, information = total(objective, again.z, [data for m, data in enumerate(best.data) if m != n])
-            covariance = Posterior.of(objective.table, again.z, information).averaged.covariance
-            covariance = _with_currents(objective, best, covariance, n)
-            part = _Part(n, slice(None), words)
-            yield from _predicted(objective, part, cautious(objective, again.z), covariance, other)
-            continue
-        half = len(best.data[n].innovations) // 2
-        for part in (_Part(n, slice(half, None), "the first half"), _Part(n, slice(half), "the second half")):
-            z, covariance = _without(objective, best, part)
-            yield from _predicted(objective, part, cautious(objective, z), covariance, other)
+    left_out = [*_left_out(objective)]
+    found = refits(objective, best, [rest for _, rest in left_out])
+    for (part, _), without in zip(left_out, found, strict=True):
+        covariance = Posterior.of(objective.table, without.z, without.information).averaged.covariance
+        if len(objective.logs) > 1:
+            covariance = _with_currents(objective, best, covariance, part.log)
+        yield from _predicted(objective, part, cautious(objective, without.z), covariance, other)
+
+
+def _left_out(objective: Objective) -> Iterator[tuple[_LeftOut, Part]]:
+    """Yield what is left out, and the rest of the data."""
+    logs, rows = objective.whole.logs, objective.whole.rows
+    if len(logs) == 1:
+        half = len(objective.records[0].time) // 2
+        first, second = slice(half), slice(half, None)
+        yield _LeftOut(0, second, "the first half"), Part(logs, rows, first)
+        yield _LeftOut(0, first, "the second half"), Part(logs, rows, second)
+    elif logs:
+        words = "the other log" if len(logs) == 2 else f"the other {len(logs) - 1} logs"
+        for n in logs:
+            yield _LeftOut(n, slice(None), words), Part([m for m in logs if m != n], rows)
 
 
 def _other(table: Table, against: Vehicle | None) -> Table | None:
@@ -131,16 +131,6 @@ def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> floa
     return _LEAST_CURRENT**2 + float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
 
 
-def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, Array]:
-    """Return the parameters and their covariance by the information of all data but a part of a log."""
-    whole, everything = total(objective, best.z, best.data)
-    gradient, information = best.data[part.log].information(part.chosen)
-    gradient, rest = whole - gradient, everything - information
-    values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
-    inverse = (vectors / np.maximum(values, 2.0 * np.min(1.0 / objective.deviation**2))) @ vectors.T
-    return np.clip(best.z - inverse @ gradient, objective.low, objective.high), 2.0 * inverse
-
-
 def cautious(objective: Objective, z: Array) -> Array:
     """Return the parameters with at least the least change of thrust."""
     moved = z.copy()
@@ -151,7 +141,7 @@ def cautious(objective: Objective, z: Array) -> Array:
 
 
 def _predicted(
-    objective: Objective, part: _Part, z: Array, covariance: Array, other: Table | None
+    objective: Objective, part: _LeftOut, z: Array, covariance: Array, other: Table | None
 ) -> Iterator[Prediction]:
     """Yield the predictions of one part over its whole length, and of its positions over a shorter time."""
     one, record = objective.logs[part.log], objective.records[part.log]

@@ -46,7 +46,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     on_progress("predicting what was left out", 0.85)
-    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior, against)]
+    predicted = [*assess.predictions(fit.objective, fit.best, against)]
     runs = followed(fit.objective, fit.best.z)
     unexplained = disturbances(fit.objective, fit.best, fit.posterior, runs)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]

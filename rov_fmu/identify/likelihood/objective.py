@@ -17,8 +17,10 @@ is the square of their noise.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -34,6 +36,9 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
+_Result = TypeVar("_Result")
+Samples = tuple[Array, Array]
+"""Innovations and their variances."""
 _TOGETHER = 8
 """The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
 _LEAST_DELAY = 1e-9
@@ -108,6 +113,15 @@ class Data:
         empty = np.zeros((len(run.innovations), parameters))
         return cls(run.innovations, run.variances, empty, empty.copy())
 
+    def part(self, chosen: Sequence[int]) -> "Data":
+        """Return some of the samples."""
+        own = self.innovations, self.variances, self.slopes, self.log_slopes
+        return Data(*(array[[*chosen]] for array in own))
+
+    def at(self, innovations: Array, variances: Array) -> "Data":
+        """Return other innovations with the same derivatives."""
+        return replace(self, innovations=innovations, variances=variances)
+
     @property
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
@@ -137,6 +151,23 @@ def cost(innovations: Array, variances: Array) -> float:
     return float(np.sum(np.log(variances) + np.where(u > OUTLYING**2, beyond, u)))
 
 
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the data: logs and rows by their indices, and the samples of each of these logs that count."""
+
+    logs: Sequence[int]
+    rows: Sequence[int]
+    chosen: slice = field(default_factory=lambda: slice(None))
+
+
+def in_threads(jobs: Sequence[Callable[[], _Result]]) -> list[_Result]:
+    """Return the results of functions, which run on all cores."""
+    if min(len(jobs), cores := usable_cores()) < 2:
+        return [job() for job in jobs]
+    with ThreadPoolExecutor(cores) as pool:
+        return [future.result() for future in [pool.submit(job) for job in jobs]]
+
+
 class Objective:
     """J for some logs and rows of tables."""
 
@@ -151,6 +182,16 @@ class Objective:
         p = table.parameters
         self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
         self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
+        self.whole = Part(range(len(logs)), range(len(rows)))
+
+    def of(self, part: Part) -> "Objective":
+        """Return J for a part of the data."""
+        found = copy(self)
+        found.logs, found.records = [self.logs[n] for n in part.logs], [self.records[n] for n in part.logs]
+        found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
+        found.whole = Part(range(len(part.logs)), range(len(part.rows)), part.chosen)
+        found.__dict__.pop("_of_rows", None)
+        return found
 
     # ---- One log ----
 
@@ -178,11 +219,9 @@ class Objective:
 
     def runs(self, z: Array, earlier: Sequence[Run] | None = None) -> list[Run]:
         """Run the filter through all logs, with the steps of earlier runs if they are given."""
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            jobs = [
-                pool.submit(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))
-            ]
-            return [job.result() for job in jobs]
+        return in_threads(
+            [partial(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))]
+        )
 
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
@@ -199,13 +238,44 @@ class Objective:
 
     def value(self, z: Array, runs: Sequence[Run]) -> float:
         """Return J for the runs of some parameters."""
-        total = self.prior(z)
-        for run in runs:
-            total += cost(run.innovations, run.variances)
-        if self.rows:
-            off, variances = self.row_values(z)
-            total += cost(off, variances)
+        found = [(run.innovations, run.variances) for run in runs]
+        return self._sum(z, [*found, self.row_values(z)] if self.rows else found, self.whole.chosen)
+
+    def _sum(self, z: Array, samples: Sequence[Samples], chosen: slice) -> float:
+        """Return J for the samples of each log, and then those of the rows."""
+        logs, rows = samples[: len(self.logs)], samples[len(self.logs) :]
+        costs = [cost(off[chosen], S[chosen]) for off, S in logs] + [cost(*some) for some in rows]
+        total = self.prior(z) + sum(costs)
         return total if np.isfinite(total) else np.inf
+
+    def trials(self, z: Array, parts: Sequence[Part], earlier: Sequence[Run]) -> list[tuple[float, list[Samples]]]:
+        """Return J for n sets of parameters (p x n), each for a part of the data, with the samples of this part.
+
+        The filter takes the steps of earlier runs. All sets run through a log together, in the lanes of vectors. J is
+        infinite where a motion diverges.
+        """
+        of_log = [[k for k, part in enumerate(parts) if n in part.logs] for n in range(len(self.logs))]
+        jobs = [
+            (n, some[at : at + _TOGETHER]) for n, some in enumerate(of_log) for at in range(0, len(some), _TOGETHER)
+        ]
+
+        def run(n: int, places: Sequence[int]) -> list[Run | None]:
+            parameters = self.table.of_log(z[:, places], self.logs[n])
+            return self.filters[n].run_many(self.records[n], parameters, earlier[n], frozen=False)
+
+        runs: list[list[Run | None]] = [[] for _ in parts]
+        for (_, places), found in zip(jobs, in_threads([partial(run, *job) for job in jobs]), strict=True):
+            for k, one in zip(places, found, strict=True):
+                runs[k].append(one)
+        off, S = self.row_values(z) if self.rows else (np.zeros((0, 0)), np.zeros((0, 0)))
+        trials = []
+        for k, part in enumerate(parts):
+            samples = [(one.innovations, one.variances) for one in runs[k] if one]
+            rows = [(off[[*part.rows], k], S[[*part.rows], k])] if part.rows else []
+            is_whole = len(samples) == len(part.logs)
+            value = self.of(part)._sum(z[:, k], [*samples, *rows], part.chosen) if is_whole else np.inf
+            trials.append((value, [*samples, *rows]))
+        return trials
 
     def data(
         self,
@@ -241,9 +311,7 @@ class Objective:
                 for first in range(0, len(places), _TOGETHER):
                     some = places[first : first + _TOGETHER]
                     work.append(partial(self.differentiate, z, n, some, run, found[n], frozen=frozen, exact=exact))
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            for job in [pool.submit(one) for one in work]:
-                job.result()
+        in_threads(work)
         if self.rows:
             found.append(self._rows_data(z))
         return found

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rov_fmu.c.filter import DivergedError, Run
-from rov_fmu.identify.likelihood.objective import Data, Objective
+from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples
 from rov_fmu.tank.arrays import Array
 
 Chosen = NDArray[np.bool_]
@@ -24,6 +24,9 @@ _REJECTED, _NEAR = 3, 5.0
 """A search ends when so many steps in turn do not reduce J, although a small reduction is expected: J has kinks where a
 change of a command coincides with a sample."""
 _FIRST_DAMPING, _MOST_DAMPING = 30.0, 1e8
+_REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
+"""The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
+step from which the next one has new derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,6 +83,62 @@ def minimise(
     return Minimum(place.z, place.value, place.runs, data, information)
 
 
+def refits(objective: Objective, best: Minimum, parts: Sequence[Part]) -> list[Minimum]:
+    """Minimise J for some parts of the data, each from the minimum for all data. The noise stays.
+
+    All fits take their damped steps together, so that the lanes of the filter are full. The derivatives are those at
+    the minimum for all data, which are exact, as long as a fit is near it. A fit to most of the data needs two steps.
+    """
+    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    fits = [_Refit(objective.of(part), part, best) for part in parts]
+    for _ in range(_REFIT_STEPS):
+        active = [fit for fit in fits if fit.proposes(of_motion)]
+        if not active:
+            break
+        moved = np.array([fit.moved for fit in active]).T
+        for fit, trial in zip(active, objective.trials(moved, [fit.part for fit in active], best.runs), strict=True):
+            fit.judge(*trial)
+    return [Minimum(fit.z, fit.value, fit.runs, fit.data, fit.information) for fit in fits]
+
+
+class _Refit:
+    """A fit to a part of the data, between two steps."""
+
+    def __init__(self, objective: Objective, part: Part, best: Minimum) -> None:
+        self.objective, self.part, self.z = objective, part, best.z
+        self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
+        self.data = [best.data[n] for n in part.logs]
+        if part.rows:
+            self.data.append(best.data[-1].part(part.rows))
+        self.value = objective.value(self.z, self.runs)
+        _, self.information = total(objective, self.z, self.data)
+        self.damping, self.gain = 0.0, np.inf
+
+    def proposes(self, free: Chosen) -> bool:
+        """Find the next step, which changes no parameter by more than the largest change. Return False at the end."""
+        gradient, information = total(self.objective, self.z, self.data)
+        while True:
+            self.moved = _step(self.objective, self.z, gradient, information, free, self.damping)
+            change = self.moved - self.z
+            if np.max(np.abs(change) / self.objective.deviation) <= _LARGEST:
+                break
+            self.damping = max(4.0 * self.damping, 1e-3)
+        self.expected = -float(gradient @ change + 0.5 * change @ information @ change)
+        return self.expected > _REFIT_ENOUGH and self.damping < _MOST_DAMPING
+
+    def judge(self, value: float, samples: Sequence[Samples]) -> None:
+        """Take the step if J falls, with new derivatives if it falls by much. Otherwise, the next step is shorter."""
+        if not value < self.value:
+            self.damping = max(8.0 * self.damping, 1.0)
+            return
+        gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
+        if gain < _REFIT_FAR:
+            self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
+        else:
+            self.runs = self.objective.runs(self.z, self.runs)
+            self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
+
+
 @dataclass(frozen=True, eq=False)
 class _Place:
     """A value of the parameters with its J."""
@@ -123,8 +182,8 @@ def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, 
     weight = 1.0 / objective.deviation**2
     size = len(z)
     gradient, information = np.zeros(size), np.zeros((size, size))
-    for some in data:
-        g, H = some.information()
+    for n, some in enumerate(data):
+        g, H = some.information(objective.whole.chosen if n < len(objective.logs) else slice(None))
         gradient, information = gradient + g, information + H
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)
