@@ -212,17 +212,10 @@ def _slopes(
 ) -> Array:
     """Return the derivatives of the predictions of a log with respect to the parameters of the motion, n x p."""
     found = np.zeros((len(objective.records[number].time), len(z)))
-    for k, parameter in enumerate(objective.table.parameters):
-        if not parameter.of_motion or not objective.concerns(parameter, number):
-            continue
-        step = 0.3 * np.sqrt(max(covariance[k, k], 0.0)) + 1e-9
-        up, down = z.copy(), z.copy()
-        up[k] += step
-        down[k] -= step
-        above, below = (
-            objective.run(moved, number, begin=begin, span=span, repeated=run, frozen=True) for moved in (up, down)
-        )
-        found[:, k] = (above.innovations - below.innovations) / (2.0 * step)
+    parameters = enumerate(objective.table.parameters)
+    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
+    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
+    found[:, places] = objective.changes(z, number, places, steps, run, begin, span)
     return found
 
 

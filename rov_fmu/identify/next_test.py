@@ -129,11 +129,11 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     free = proposed.run(z, number, begin=0.0)
     proposed.records[number] = replace(record, value=-free.innovations)
     run = proposed.run(z, number)
-    data = Data.of(run, len(z))
     parameters = enumerate(objective.table.parameters)
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
-    proposed.differentiate(z, number, concerned, run, data)
-    return data.information()[1]
+    data = Data.of(run, concerned, len(z))
+    proposed.differentiate(z, number, range(len(concerned)), run, data, exact=False)
+    return data.information(slice(None))[1]
 
 
 class _Proposed(Objective):

@@ -77,7 +77,7 @@ class Shapes:
 
         The commands are m, or m x n if each vehicle has its own.
         """
-        if curve not in self.of:
+        if curve not in self.of or not self.of[curve].any():
             return commands
         coordinates, weights = self.of[curve], _weights(commands)
         eta = weights @ coordinates if commands.ndim == 1 else (weights * coordinates.T).sum(axis=-1)
@@ -94,7 +94,7 @@ class Shapes:
 
         For n vehicles, these are n x rows x inputs.
         """
-        if not self.of:
+        if not any(coordinates.any() for coordinates in self.of.values()):
             return inputs
         names, changed = [*layout.inputs], dict[int, Array]()
         for name, curve in layout.curve_of.items():

@@ -1,4 +1,5 @@
-"""The fit: two starts on few samples, the better one to the end on all, and the posterior there."""
+"""The fit: a start on few samples, another one if noise takes the place of the model, the better one to the end on all
+samples, and the posterior there."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +10,7 @@ import numpy as np
 
 from rov_fmu.c.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning, table_of
+from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
@@ -30,6 +31,9 @@ _STARTS: tuple[Mapping[str, float], ...] = (
 
 With much noise, J has few minima far from the data.
 """
+_LOUD = 1.0
+"""The second start is tried if a slow process ends so many deviations of its prior above its usual size. The motion is
+then hardly explained by the model, and another minimum may explain it."""
 _CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
 """The start if the motion diverges from both others: a heavier vehicle with less drag."""
 
@@ -65,7 +69,7 @@ class Fit:
 def fit_all(
     folder: Path, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
-    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples.
+    """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends.
@@ -74,16 +78,20 @@ def fit_all(
     table = table_of(known, logs, noises)
     quick = Objective(table, logs, rows, thinned=True)
     full = Objective(table, logs, rows)
+    starts = [
+        quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
+        for louder in (*_STARTS, _CAREFUL)
+    ]
     ends: list[Minimum] = []
-    for n, louder in enumerate((*_STARTS, _CAREFUL)):
-        if n == len(_STARTS) and ends:
+    for n, start in enumerate(starts):
+        is_enough = len(ends) == n and not any(_is_loud(table, end.z) for end in ends)
+        if ends and (n == len(_STARTS) or is_enough):
             break
 
         def show(step: int, n: int = n) -> None:
-            words = f"start {n + 1} of 2" if n < len(_STARTS) else "a more careful start"
-            on_progress(words, 0.25 * min(n, 1) + 0.25 * min(step / 20.0, 1.0))
+            words = f"start {n + 1}" if n < len(_STARTS) else "a more careful start"
+            on_progress(words, 0.1 * min(n, 1) + 0.2 * min(step / 20.0, 1.0))
 
-        start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
         try:
             ends.append(_least(quick, start, show, _QUICK))
         except DivergedError:
@@ -97,15 +105,19 @@ def fit_all(
 
     near = _least(full, _scaled(full, ends[0].z), show_full, ENOUGH)
     for curve in known.measured_curves:
-        other = replace(known, bent=known.bent | {curve})
+        other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
-        found = minimise(objective, near.z, enough=_QUICK, last=False)
-        if _evidence(objective, found) > _evidence(full, near) + KEPT:
+
+        def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
+            return _evidence(objective, value, information) > needed
+
+        found = minimise(objective, near.z, enough=_QUICK, last=False, promises=bends)
+        if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     best = minimise(full, _scaled(full, near.z), most=2)
     posterior = Posterior.of(full.table, best.z, best.information)
-    difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
+    difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
     if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
         difference = 0.0
@@ -133,10 +145,15 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     return min(end, other, key=lambda found: found.value)
 
 
-def _evidence(objective: Objective, best: Minimum) -> float:
+def _is_loud(table: Table, z: Array) -> bool:
+    """Return True if a slow process is much larger than usual."""
+    return any(p.is_slow_size and z[n] - p.mean > _LOUD * p.deviation for n, p in enumerate(table.parameters))
+
+
+def _evidence(objective: Objective, value: float, information: Array) -> float:
     """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
     widths = np.diag(objective.deviation)
-    return -best.value - float(np.linalg.slogdet(widths @ best.information @ widths).logabsdet)
+    return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
 
 
 def _scaled(objective: Objective, z: Array) -> Array:

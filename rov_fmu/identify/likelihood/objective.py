@@ -98,25 +98,32 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The innovations of one log, or those of all rows of tables, with their derivatives. n samples, p parameters."""
+    """The innovations of one log, or those of all rows of tables, with their derivatives.
+
+    n samples, and the k of p parameters that may change them.
+    """
 
     innovations: Array
     variances: Array
     slopes: Array
-    """n x p: the derivatives of the innovations."""
+    """n x k: the derivatives of the innovations."""
     log_slopes: Array
-    """n x p: the derivatives of log S."""
+    """n x k: the derivatives of log S."""
+    places: Sequence[int]
+    """k: the parameters."""
+    parameters: int
+    """p."""
 
     @classmethod
-    def of(cls, run: Run, parameters: int) -> "Data":
+    def of(cls, run: Run, places: Sequence[int], parameters: int) -> "Data":
         """Return the innovations of a run, with derivatives of 0."""
-        empty = np.zeros((len(run.innovations), parameters))
-        return cls(run.innovations, run.variances, empty, empty.copy())
+        empty = np.zeros((len(run.innovations), len(places)))
+        return cls(run.innovations, run.variances, empty, empty.copy(), places, parameters)
 
     def part(self, chosen: Sequence[int]) -> "Data":
         """Return some of the samples."""
-        own = self.innovations, self.variances, self.slopes, self.log_slopes
-        return Data(*(array[[*chosen]] for array in own))
+        keys = ("innovations", "variances", "slopes", "log_slopes")
+        return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
 
     def at(self, innovations: Array, variances: Array) -> "Data":
         """Return other innovations with the same derivatives."""
@@ -126,14 +133,16 @@ class Data:
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
 
-    def information(self, chosen: Array | slice = slice(None)) -> tuple[Array, Array]:
-        """Return the gradient and the Fisher information of the part of J that some samples contribute."""
+    def information(self, chosen: slice) -> tuple[Array, Array]:
+        """Return the gradient and the Fisher information of the part of J that some samples contribute: p, p x p."""
         u = self.normalised[chosen]
         weight = np.minimum(1.0, OUTLYING**2 / np.maximum(u * u, 1e-300))
         A = self.slopes[chosen] / np.sqrt(self.variances[chosen])[:, None]
         B = self.log_slopes[chosen]
-        gradient = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
-        return gradient, 2.0 * (A.T * weight) @ A + B.T @ B
+        gradient, information = np.zeros(self.parameters), np.zeros((self.parameters, self.parameters))
+        gradient[self.places] = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
+        information[np.ix_(self.places, self.places)] = 2.0 * (A.T * weight) @ A + B.T @ B
+        return gradient, information
 
 
 def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
@@ -178,7 +187,8 @@ class Objective:
         self.table, self.logs, self.rows = table, logs, rows
         self.records = [one.thinned if thinned else one.record for one in logs]
         steps = _QUICK_STEPS if thinned else {}
-        self.filters = [Filter(one.vehicle(table.base), **steps) for one in logs]
+        filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
+        self.filters = [filters[one.layout] for one in logs]
         p = table.parameters
         self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
         self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
@@ -202,6 +212,25 @@ class Objective:
         """
         parameters = (table or self.table).of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
+
+    def changes(
+        self, z: Array, n: int, places: Sequence[int], steps: Array, run: Run, begin: float, span: float
+    ) -> Array:
+        """Return the derivatives of the predictions of a log with respect to some parameters, by steps to both sides.
+
+        They are those of `run`, whose gains the filter keeps. Raises DivergedError.
+        """
+        moves = [(k, sign * step) for k, step in zip(places, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
+
+        def some(first: int) -> list[Run | None]:
+            sets = self.table.of_log(changed(z, moves[first : first + _TOGETHER]), self.logs[n])
+            return self.filters[n].run_many(self.records[n], sets, run, frozen=True, begin=begin, span=span)
+
+        jobs = [partial(some, first) for first in range(0, len(moves), _TOGETHER)]
+        ends = [one.innovations for runs in in_threads(jobs) for one in runs if one]
+        if len(ends) < len(moves):
+            raise DivergedError
+        return np.array([(up - down) / (2.0 * h) for up, down, h in zip(ends[::2], ends[1::2], steps, strict=True)]).T
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
         """Return False where a parameter certainly does not change what is predicted of a log."""
@@ -295,21 +324,21 @@ class Objective:
         with frozen gains had the wrong sign. Without derivatives with respect to the noise, those of earlier data are
         returned, or 0.
         """
-        found = [Data.of(run, len(z)) for run in runs]
-        work: list[Callable[[], None]] = []
+        parameters = self.table.parameters
+        found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
+            places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
+            found.append(Data.of(run, places, len(z)))
             chosen: dict[bool, list[int]] = {False: [], True: []}
-            for k, parameter in enumerate(self.table.parameters):
-                if not self.concerns(parameter, n):
-                    continue
-                if with_noise or parameter.of_motion:
-                    chosen[parameter.keeps_gains and not exact].append(k)
+            for column, k in enumerate(places):
+                if with_noise or parameters[k].of_motion:
+                    chosen[parameters[k].keeps_gains and not exact].append(column)
                 elif earlier:
-                    found[n].slopes[:, k] = earlier[n].slopes[:, k]
-                    found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
-            for frozen, places in chosen.items():
-                for first in range(0, len(places), _TOGETHER):
-                    some = places[first : first + _TOGETHER]
+                    found[n].slopes[:, column] = earlier[n].slopes[:, column]
+                    found[n].log_slopes[:, column] = earlier[n].log_slopes[:, column]
+            for frozen, columns in chosen.items():
+                for first in range(0, len(columns), _TOGETHER):
+                    some = columns[first : first + _TOGETHER]
                     work.append(partial(self.differentiate, z, n, some, run, found[n], frozen=frozen, exact=exact))
         in_threads(work)
         if self.rows:
@@ -320,45 +349,46 @@ class Objective:
         self,
         z: Array,
         n: int,
-        places: Sequence[int],
+        columns: Sequence[int],
         run: Run,
         into: Data,
         *,
         frozen: bool = False,
         exact: bool = True,
     ) -> None:
-        """Compute the derivatives of the innovations of a log with respect to parameters, within their lower bounds.
+        """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
         The filter runs with the changes of all these parameters at once, and with `frozen` keeps the gains of the run.
         Exact derivatives are differences to both sides.
         """
-        parameters = [self.table.parameters[k] for k in places]
-        moves = [(k, own.step) for k, own in zip(places, parameters, strict=True)]
+        parameters = [self.table.parameters[into.places[column]] for column in columns]
+        moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
         sets = self.table.of_log(changed(z, moves), self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=frozen), strict=True))
-        for k, own in zip(places, parameters, strict=True):
+        for column, own in zip(columns, parameters, strict=True):
+            k = into.places[column]
             above, below = runs[k, own.step], runs.get((k, -own.step), run)
             if above is None or below is None:
                 raise DivergedError
             width = own.step if below is run else 2.0 * own.step
-            into.slopes[:, k] = (above.innovations - below.innovations) / width
+            into.slopes[:, column] = (above.innovations - below.innovations) / width
             if not frozen:
-                into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
+                into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
         places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
         moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps, strict=True)]
         off, _ = self.row_values(changed(z, [(0, 0.0), *moves]))
         _, variances = self.row_values(z)
-        slopes, log_slopes = np.zeros((len(off), len(z))), np.zeros((len(off), len(z)))
+        noises = [k for k, one in enumerate(self.table.parameters) if one.kind == "row noise"]
+        names = [self.table.parameters[k].of for k in noises]
         up, down = np.split(off[:, 1:], 2, axis=1)
-        slopes[:, places] = (up - down) / (2.0 * steps)
-        for k, parameter in enumerate(self.table.parameters):
-            if parameter.kind == "row noise":
-                log_slopes[:, k] = [2.0 * (row.noise == parameter.of) for row in self.rows]
-        return Data(off[:, 0], variances, slopes, log_slopes)
+        of_noise = np.array([[2.0 * (row.noise == name) for name in names] for row in self.rows])
+        slopes = np.hstack([(up - down) / (2.0 * steps), np.zeros_like(of_noise)])
+        log_slopes = np.hstack([np.zeros((len(off), len(places))), of_noise])
+        return Data(off[:, 0], variances, slopes, log_slopes, [*places, *noises], len(z))
 
     @cached_property
     def _of_rows(self) -> list[int]:

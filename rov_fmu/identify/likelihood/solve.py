@@ -52,12 +52,14 @@ def minimise(
     enough: float = ENOUGH,
     with_noise: bool = True,
     last: bool = True,
+    promises: Callable[[float, Array], bool] | None = None,
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
     Every other step moves all parameters, and the others those of the motion alone, which takes a fifth of the time.
     The fit ends when a step of all parameters reduces J by less than `enough`. Without the noise, its parameters keep
-    their values. Only the `last` fit has exact data and information; those of others may be of the step before.
+    their values. Only the `last` fit has exact data and information; those of others may be of the step before. The fit
+    ends early where J within reach, with the information, promises nothing.
     """
     of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
     z = np.clip(start, objective.low, objective.high)
@@ -77,6 +79,8 @@ def minimise(
             break
         damping = _FIRST_DAMPING if has_failed else damping
         data = objective.data(place.z, place.runs, data, with_noise=with_noise and count % 2 == 0, exact=False)
+        if promises and count % 2 == 0 and not promises(*_within_reach(objective, place, data)):
+            break
     if last:
         data = objective.data(place.z, place.runs, data, with_noise=with_noise)
     _, information = total(objective, place.z, data)
@@ -146,6 +150,13 @@ class _Place:
     z: Array
     value: float
     runs: Sequence[Run]
+
+
+def _within_reach(objective: Objective, place: _Place, data: Sequence[Data]) -> tuple[float, Array]:
+    """Return the J that is left if a step reduces it by twice what is expected, and the information."""
+    gradient, information = total(objective, place.z, data)
+    change = _step(objective, place.z, gradient, information, np.ones(len(place.z), bool), 0.0) - place.z
+    return place.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
 
 
 def _search(
