@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
+from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise, minimum_at
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, silent
@@ -115,7 +115,7 @@ def fit_all(
         if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    best = minimise(full, _scaled(full, near.z), most=2)
+    best = minimum_at(full, _scaled(full, near.z))
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)

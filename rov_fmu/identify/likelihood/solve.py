@@ -27,6 +27,8 @@ _FIRST_DAMPING, _MOST_DAMPING = 30.0, 1e8
 _REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
 """The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
 step from which the next one has new derivatives."""
+_EXACT, _ROUNDS = 1e-3, 4
+"""The expected reduction of J by a step at which the fit to all data ends, and how often it has new derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,16 +89,41 @@ def minimise(
     return Minimum(place.z, place.value, place.runs, data, information)
 
 
-def refits(objective: Objective, best: Minimum, parts: Sequence[Part]) -> list[Minimum]:
-    """Minimise J for some parts of the data, each from the minimum for all data. The noise stays.
+def minimum_at(objective: Objective, z: Array) -> Minimum:
+    """Return the minimum next to a place, by steps with exact derivatives. The result has those of its place."""
+
+    def at(z: Array) -> Minimum:
+        runs = objective.runs(z)
+        data = objective.data(z, runs)
+        return Minimum(z, objective.value(z, runs), runs, data, total(objective, z, data)[1])
+
+    best = at(np.clip(z, objective.low, objective.high))
+    for _ in range(_ROUNDS):
+        (end,) = refits(objective, best, [objective.whole], with_noise=True, enough=_EXACT)
+        if end.value > best.value - _REFIT_ENOUGH:
+            break
+        best = min(best, at(end.z), key=lambda found: found.value)
+    return best
+
+
+def refits(
+    objective: Objective,
+    best: Minimum,
+    parts: Sequence[Part],
+    *,
+    with_noise: bool = False,
+    enough: float = _REFIT_ENOUGH,
+) -> list[Minimum]:
+    """Minimise J for some parts of the data, each from the minimum for all data, without the noise by default.
 
     All fits take their damped steps together, so that the lanes of the filter are full. The derivatives are those at
-    the minimum for all data, which are exact, as long as a fit is near it. A fit to most of the data needs two steps.
+    the minimum for all data, which are exact, as long as a fit is near it. A fit to most of the data needs two steps. A
+    fit ends when a step is expected to reduce J by less than `enough`.
     """
-    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    free = np.array([with_noise or parameter.of_motion for parameter in objective.table.parameters])
     fits = [_Refit(objective.of(part), part, best) for part in parts]
     for _ in range(_REFIT_STEPS):
-        active = [fit for fit in fits if fit.proposes(of_motion)]
+        active = [fit for fit in fits if fit.proposes(free) > enough]
         if not active:
             break
         moved = np.array([fit.moved for fit in active]).T
@@ -116,10 +143,10 @@ class _Refit:
             self.data.append(best.data[-1].part(part.rows))
         self.value = objective.value(self.z, self.runs)
         _, self.information = total(objective, self.z, self.data)
-        self.damping, self.gain = 0.0, np.inf
+        self.damping = 0.0
 
-    def proposes(self, free: Chosen) -> bool:
-        """Find the next step, which changes no parameter by more than the largest change. Return False at the end."""
+    def proposes(self, free: Chosen) -> float:
+        """Find the next step, which changes no parameter by more than the largest change, and the expected gain."""
         gradient, information = total(self.objective, self.z, self.data)
         while True:
             self.moved = _step(self.objective, self.z, gradient, information, free, self.damping)
@@ -127,8 +154,7 @@ class _Refit:
             if np.max(np.abs(change) / self.objective.deviation) <= _LARGEST:
                 break
             self.damping = max(4.0 * self.damping, 1e-3)
-        self.expected = -float(gradient @ change + 0.5 * change @ information @ change)
-        return self.expected > _REFIT_ENOUGH and self.damping < _MOST_DAMPING
+        return -float(gradient @ change + 0.5 * change @ information @ change)
 
     def judge(self, value: float, samples: Sequence[Samples]) -> None:
         """Take the step if J falls, with new derivatives if it falls by much. Otherwise, the next step is shorter."""
