@@ -13,19 +13,22 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise, minimum_at
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import Progress, silent
+from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
-_QUICK = 4.0
-"""The reduction of J by a step at which a quick fit ends."""
+_QUICK = 8.0
+"""The reduction of J by new derivatives at which a quick fit ends."""
+_MOST = 8
+"""The most derivatives of the fit to all samples. Where it needs more, sizes of noise change on and on, and answers do
+not."""
 _STARTS: tuple[Mapping[str, float], ...] = (
-    {"slow": 1.0, "white": 2.0},
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
+    {"slow": 1.0, "white": 2.0},
 )
 """Two starts: how many deviations of their priors some kinds of parameters are above their means, by their first word.
 
@@ -88,10 +91,8 @@ def fit_all(
         if ends and (n == len(_STARTS) or is_enough):
             break
 
-        def show(step: int, n: int = n) -> None:
-            words = f"start {n + 1}" if n < len(_STARTS) else "a more careful start"
-            on_progress(words, 0.1 * min(n, 1) + 0.2 * min(step / 20.0, 1.0))
-
+        words = f"start {n + 1}" if n < len(_STARTS) else "a more careful start"
+        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
             ends.append(_least(quick, start, show, _QUICK))
         except DivergedError:
@@ -100,22 +101,22 @@ def fit_all(
         raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
     ends.sort(key=lambda end: end.value)
 
-    def show_full(step: int) -> None:
-        on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
-
-    near = _least(full, _scaled(full, ends[0].z), show_full, ENOUGH)
-    for curve in known.measured_curves:
+    show = moving(on_progress, "all samples", 0.3, 0.7)
+    near = minimise(full, _scaled(full, ends[0].z), show, most=_MOST, last=False)
+    for n, curve in enumerate(known.measured_curves):
         other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
 
         def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
             return _evidence(objective, value, information) > needed
 
-        found = minimise(objective, near.z, enough=_QUICK, last=False, promises=bends)
+        low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
+        show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
+        found = minimise(objective, near.z, show, enough=_QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    best = minimum_at(full, _scaled(full, near.z))
+    best = minimise(full, _scaled(full, near.z), moving(on_progress, "exact derivatives", 0.8, 0.88), most=1)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
@@ -141,7 +142,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, enough=enough, last=False)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
     return min(end, other, key=lambda found: found.value)
 
 

@@ -317,29 +317,26 @@ class Objective:
     ) -> list[Data]:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
-        Exact ones contain the changes of the gains of the filter, and are differences to both sides. The others guide
-        the steps of a fit: their gains are frozen, and they are differences to one side, which takes a twentieth of the
-        time. They are no measure of the information: their errors make the common scale of all forces, which the motion
-        does not tell, look determined. Where the model does not explain a log, half of the components of a gradient
-        with frozen gains had the wrong sign. Without derivatives with respect to the noise, those of earlier data are
-        returned, or 0.
+        Exact ones are differences to both sides, and the others, which guide the steps of a fit, to one side. Without
+        derivatives with respect to the noise, those of earlier data are returned, or 0. All contain the changes of the
+        gains of the filter. Without these, the common scale of all forces, which the motion does not tell, would look
+        determined, and where the model does not explain a log, half of a gradient would have the wrong sign.
         """
         parameters = self.table.parameters
         found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
             places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
             found.append(Data.of(run, places, len(z)))
-            chosen: dict[bool, list[int]] = {False: [], True: []}
+            columns = []
             for column, k in enumerate(places):
                 if with_noise or parameters[k].of_motion:
-                    chosen[parameters[k].keeps_gains and not exact].append(column)
+                    columns.append(column)
                 elif earlier:
                     found[n].slopes[:, column] = earlier[n].slopes[:, column]
                     found[n].log_slopes[:, column] = earlier[n].log_slopes[:, column]
-            for frozen, columns in chosen.items():
-                for first in range(0, len(columns), _TOGETHER):
-                    some = columns[first : first + _TOGETHER]
-                    work.append(partial(self.differentiate, z, n, some, run, found[n], frozen=frozen, exact=exact))
+            for first in range(0, len(columns), _TOGETHER):
+                some = columns[first : first + _TOGETHER]
+                work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
         in_threads(work)
         if self.rows:
             found.append(self._rows_data(z))
@@ -353,20 +350,19 @@ class Objective:
         run: Run,
         into: Data,
         *,
-        frozen: bool = False,
         exact: bool = True,
     ) -> None:
         """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
-        The filter runs with the changes of all these parameters at once, and with `frozen` keeps the gains of the run.
-        Exact derivatives are differences to both sides.
+        The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
+        sides.
         """
         parameters = [self.table.parameters[into.places[column]] for column in columns]
         moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
         sets = self.table.of_log(changed(z, moves), self.logs[n])
-        runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=frozen), strict=True))
+        runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
         for column, own in zip(columns, parameters, strict=True):
             k = into.places[column]
             above, below = runs[k, own.step], runs.get((k, -own.step), run)
@@ -374,8 +370,7 @@ class Objective:
                 raise DivergedError
             width = own.step if below is run else 2.0 * own.step
             into.slopes[:, column] = (above.innovations - below.innovations) / width
-            if not frozen:
-                into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
+            into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
         places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])

@@ -112,15 +112,6 @@ class Parameter:
     unit: str = "1"
 
     @property
-    def keeps_gains(self) -> bool:
-        """True if the gains of the filter are frozen for the derivative that guides a step of the fit.
-
-        A slow change of the thrust makes up for the scale of the thrust, as far as the gains let it. Frozen gains give
-        the derivative by the scale the wrong sign where this change is large.
-        """
-        return self.of_motion and self.kind != "thrust scale"
-
-    @property
     def is_slow_size(self) -> bool:
         """True for the size of a slow process."""
         return self.kind in SLOW
