@@ -18,7 +18,7 @@ _MOST_NAMES = 20
 NO_FILE = "there is no such file"
 """The reason if a file is missing."""
 
-_USUAL_STEPS = 10.0
+_USUAL_STEPS = 5.0
 """The number of steps with which most of a part of the work is done whose number of steps is not known."""
 
 Progress = Callable[[str, float], None]

@@ -18,7 +18,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-from . import picture, runs, taylor
+from . import kalman, picture, runs, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import Steps
@@ -87,6 +87,9 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             for cores in sorted({1, usable_cores()}):
                 found = [taylor.many_vehicles(one, h, effort.repetitions, cores) for h in taylor.STEPS]
                 yield taylor.section(one.name, found, limit)
+    with say("the filter of the identification"):
+        for one in (rov, load_vehicle(SHIPPED["bluerov2"])):
+            yield kalman.section(one, min(effort.repetitions, 5))
     with say("many instances and runs"):
         native, unzipped = folder / "native.fmu", folder / "native"
         build(rov, native, platforms=["host"])

@@ -26,7 +26,7 @@ _QUICK = 8.0
 _MOST = 8
 """The most derivatives of the fit to all samples. Where it needs more, sizes of noise change on and on, and answers do
 not."""
-_STARTS: tuple[Mapping[str, float], ...] = (
+STARTS: tuple[Mapping[str, float], ...] = (
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
     {"slow": 1.0, "white": 2.0},
 )
@@ -81,17 +81,14 @@ def fit_all(
     table = table_of(known, logs, noises)
     quick = Objective(table, logs, rows, thinned=True)
     full = Objective(table, logs, rows)
-    starts = [
-        quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
-        for louder in (*_STARTS, _CAREFUL)
-    ]
+    starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
     ends: list[Minimum] = []
     for n, start in enumerate(starts):
         is_enough = len(ends) == n and not any(_is_loud(table, end.z) for end in ends)
-        if ends and (n == len(_STARTS) or is_enough):
+        if ends and (n == len(STARTS) or is_enough):
             break
 
-        words = f"start {n + 1}" if n < len(_STARTS) else "a more careful start"
+        words = f"start {n + 1}" if n < len(STARTS) else "a more careful start"
         show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
             ends.append(_least(quick, start, show, _QUICK))
@@ -144,6 +141,13 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
         return end
     other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
     return min(end, other, key=lambda found: found.value)
+
+
+def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
+    """Return the means of the priors, but for some kinds of parameters, which are so many deviations above them."""
+    kinds = [parameter.kind.split()[0] for parameter in objective.table.parameters]
+    above = np.array([louder.get(kind, 0.0) for kind in kinds])
+    return np.asarray(objective.mean + objective.deviation * above)
 
 
 def _is_loud(table: Table, z: Array) -> bool:
