@@ -336,7 +336,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"
     assert all(p.error < share * p.unchanged for p in heave.predictions)
-    assert heave.coverage > 0.8
+    assert heave.coverage > 0.75
 
 
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------

@@ -31,7 +31,7 @@ from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
-_CLEAR, _NEXT = 10.0, 6.0
+_CLEAR, _NEXT = 9.0, 6.0
 """The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
