@@ -1,6 +1,7 @@
 """Minimise the objective by Fisher scoring, damped in units of the prior (Levenberg-Marquardt)."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -66,12 +67,14 @@ def minimise(
     failed, data = 0, list[Data]()
     for count in range(1, most + 1):
         on_step(count)
-        data = objective.data(place.z, place.runs, exact=False)
-        if promises and not promises(*_within_reach(objective, place, data)):
-            break
         try:
+            data = objective.data(place.z, place.runs, exact=False)
+            if promises and not promises(*_within_reach(objective, place, data)):
+                break
             place = _place(objective, _descended(objective, place, data))
         except DivergedError:
+            if not data:
+                raise
             break
         gain = best.value - place.value
         if gain > 0.0:
@@ -168,7 +171,7 @@ class _Refit:
         while True:
             self.moved = _step(self.objective, self.z, gradient, information, free, self.damping)
             change = self.moved - self.z
-            if np.max(np.abs(change) / self.objective.deviation) <= _LARGEST:
+            if not np.max(np.abs(change) / self.objective.deviation) > _LARGEST:
                 break
             self.damping = max(4.0 * self.damping, 1e-3)
         return -float(gradient @ change + 0.5 * change @ information @ change)
@@ -179,11 +182,11 @@ class _Refit:
             self.damping = max(8.0 * self.damping, 1.0)
             return
         gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
-        if gain < _REFIT_FAR:
-            self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
-        else:
-            self.runs = self.objective.runs(self.z, self.runs)
-            self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
+        self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
+        if gain > _REFIT_FAR:
+            with suppress(DivergedError):
+                self.runs = self.objective.runs(self.z, self.runs)
+                self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
 
 
 def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
