@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import delayed_name
-from rov_fmu.equation.expression import ARRAYS, Expression, Name, compiled
+from rov_fmu.equation.expression import ARRAYS, Expression, Name, array_functions, compiled
 from rov_fmu.equation.layout import Layout, ThrustTable
 from rov_fmu.equation.step import cubic
 from rov_fmu.equation.terms import Equation, equation_of
@@ -167,8 +167,7 @@ def _of_arrays(library: Any, stack: Callable[[Sequence[Any]], Any]) -> _Library:
         place = library.searchsorted(library.asarray(knots[1:-1]), x, side="right")
         return [library.asarray(column)[place] for column in columns]
 
-    named = {"pow": library.power, "both": library.logical_and, "either": library.logical_or, "where": library.where}
-    return _library(library, stack, named, interval)
+    return _library(stack, array_functions(library), interval)
 
 
 @cache
@@ -181,14 +180,14 @@ def _casadi() -> _Library:
         return [*casadi.Function("interval", [t], pieces)(x)]
 
     named = {"pow": casadi.power, "both": casadi.logic_and, "either": casadi.logic_or, "where": casadi.if_else}
-    return _library(casadi, lambda parts: casadi.vertcat(*parts), named, interval)
+    named |= {name: getattr(casadi, name) for name in ("sin", "cos", "sqrt")}
+    return _library(lambda parts: casadi.vertcat(*parts), named, interval)
 
 
 def _library(
-    module: Any, stack: Callable[[Sequence[Any]], Any], named: Mapping[str, Any], interval: Callable[..., Any]
+    stack: Callable[[Sequence[Any]], Any], named: Mapping[str, Callable[..., Any]], interval: Callable[..., Any]
 ) -> _Library:
     def size(x: Any) -> Any:
         return named["where"](x < 0.0, -x, x)  # with the derivative 1 at 0, as in the engine
 
-    alike = {name: getattr(module, name) for name in ("sin", "cos", "sqrt")}
-    return _Library({**alike, **named, "abs": size, "interval": interval}, stack)
+    return _Library({**named, "abs": size, "interval": interval}, stack)

@@ -23,6 +23,8 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intc]
+Number = float | Array
+"""A number, or an array of one for each set of parameters."""
 
 STATE, OVER_GROUND, ANGLE = range(3)
 """What a sensor measures: a state, a velocity over ground along an axis of the body, or an angle of the attitude."""
@@ -75,15 +77,15 @@ class Record:
 class Slow:
     """A slow process: its stationary standard deviation and its time constant (s). Size 0: there is none."""
 
-    size: float = 0.0
-    time_constant: float = 10.0
+    size: Number = 0.0
+    time_constant: Number = 10.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Parameters:
-    """One set of parameters of the filter."""
+    """One set of parameters of the filter, or several: each number may be an array with a value for each set."""
 
-    coefficients: Mapping[str, float]
+    coefficients: Mapping[str, Number]
     """The coefficients of the vehicle, and inputs that are constant, such as the current V_N and V_E."""
     forces: tuple[Slow, ...]
     """The slow force along each axis of the layout, N or N m."""
@@ -91,26 +93,28 @@ class Parameters:
     """The slow change of the logarithm of all thrust."""
     drifts: tuple[Slow, Slow, Slow]
     """The slow velocity over ground to the north, to the east and down, m/s."""
-    white: tuple[float, ...]
+    white: tuple[Number, ...]
     """The standard deviation of the white noise of each sensor."""
     noise: tuple[Slow, ...]
     """The coloured noise of each sensor."""
-    levers: tuple[tuple[float, ...], ...] = ()
+    levers: tuple[tuple[Number, ...], ...] = ()
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
-    lags: tuple[float | None, ...] = ()
+    lags: tuple[Number | None, ...] = ()
     """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
-    offset: float = 0.0
+    offset: Number = 0.0
     """How much later than its row a command acts, s."""
-    width: float = 0.0
+    width: Number = 0.0
     """The length of the window within which it acts, relative to the time between two rows."""
-    units: Mapping[str, float] = field(default_factory=dict)
+    units: Mapping[str, Number] = field(default_factory=dict)
     """The unit of a state by its name, or of the slow force along an axis by the name of the axis; 1 for all others.
 
     Gains are kept in these units. If the units grow with the scale of all forces, this scale changes nothing that a run
     with frozen gains predicts, as it should be.
     """
     inputs: Array | None = None
-    """The rows of inputs, if they are others than those of the record."""
+    """The rows of inputs, if they are others than those of the record: sets x rows x inputs, or equal for all sets."""
+    count: int = 1
+    """The number of sets."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,20 +207,32 @@ class Filter:
         asked = (n, states) if with_states else (0, 0)
         found = Run(np.zeros(n), np.zeros(0 if frozen else n), pieces, gains, np.zeros(asked), np.zeros(asked))
         mode = _Mode(0 if repeated is None else 2 if frozen else 1, begin, min(span, 1e300))
-        if self._run(FILTER_FILE, record, [parameters], mode, [found]):
+        if self._run(FILTER_FILE, record, parameters, mode, [found]):
             raise DivergedError
         return found
 
-    def run_many(self, record: Record, sets: Sequence[Parameters], repeated: Run, *, frozen: bool) -> list[Run | None]:
+    def run_many(
+        self,
+        record: Record,
+        parameters: Parameters,
+        repeated: Run,
+        *,
+        frozen: bool,
+        begin: float = -1.0,
+        span: float = inf,
+    ) -> list[Run | None]:
         """Run through a log with several sets of parameters, each in a lane of the processor's vectors.
 
         All have the same slow processes, and repeat the steps of an earlier run and, with `frozen`, its gains. They
-        compute no gains of their own. A run that diverges is None and leaves the others alone.
+        compute no gains of their own. A run that diverges is None and leaves the others alone. `begin` and `span` are
+        those of `run`.
         """
         n, gains = len(record.time), repeated.gains if frozen else np.zeros((0, 0))
-        found = [Run(np.zeros(n), np.zeros(0 if frozen else n), repeated.pieces, gains) for _ in sets]
-        mode = _Mode(2 if frozen else 1, -1.0, 0.0)
-        failed = self._run(FILTER_LANES_FILE, record, sets, mode, found)
+        found = [
+            Run(np.zeros(n), np.zeros(0 if frozen else n), repeated.pieces, gains) for _ in range(parameters.count)
+        ]
+        mode = _Mode(2 if frozen else 1, begin, min(span, 1e300))
+        failed = self._run(FILTER_LANES_FILE, record, parameters, mode, found)
         return [None if k in failed else run for k, run in enumerate(found)]
 
     def _library(self, file: Path) -> tuple[Callable[..., None], list[int]]:
@@ -228,23 +244,23 @@ class Filter:
             self._libraries[file] = library.run_filter, list(sizes)
         return self._libraries[file]
 
-    def _run(
-        self, file: Path, record: Record, sets: Sequence[Parameters], mode: _Mode, runs: Sequence[Run]
-    ) -> set[int]:
+    def _run(self, file: Path, record: Record, parameters: Parameters, mode: _Mode, runs: Sequence[Run]) -> set[int]:
         """Run through a log with sets of parameters, write the runs, and return the indices of those that diverge."""
         run, (*_, held, whole, lanes) = self._library(file)
-        log, failed = self._record(record, sets[0]), set[int]()
+        log, failed = self._record(record, parameters), set[int]()
+        numbers, inputs = self._numbers(parameters), _inputs(record, parameters)
         memory = np.zeros((whole + len(record.told) * held) // 8 + 8)
         aligned = ctypes.c_void_p(-(-memory.ctypes.data // 64) * 64)
         where = ctypes.c_void_p(self._where.ctypes.data)
-        for first in range(0, len(sets), lanes):
-            places = [min(first + lane, len(sets) - 1) for lane in range(lanes)]
-            arrays = [(self._numbers(one), _inputs(record, one)) for one in (sets[k] for k in places)]
+        for first in range(0, len(runs), lanes):
+            places = [min(first + lane, len(runs) - 1) for lane in range(lanes)]
             results = [
                 (one.innovations, one.variances, one.pieces, one.gains, one.states, one.deviations)
                 for one in (runs[k] for k in places)
             ]
-            given = (_Set * lanes)(*(_Set(*(array.ctypes.data for array in own)) for own in arrays))
+            given = (_Set * lanes)(
+                *(_Set(*(array.ctypes.data + k * array.strides[0] for array in (numbers, inputs))) for k in places)
+            )
             outputs = (_Output * lanes)(
                 *(_Output(*(array.ctypes.data if array.size else None for array in own)) for own in results)
             )
@@ -254,32 +270,39 @@ class Filter:
         return failed
 
     def _numbers(self, parameters: Parameters) -> Array:
-        """Return the struct `parameters` of filter.c as an array."""
-        at = np.zeros(self.variables)
+        """Return the struct `parameters` of filter.c for each set, as a row of an array."""
+        at: list[Number] = [0.0] * self.variables
         for name, value in parameters.coefficients.items():
             if name in self._places:
                 at[self._places[name]] = value
-        idle = [Slow()] * (MOST_SENSORS - len(parameters.noise))
-        slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise, *idle]
-        white = [*parameters.white, *(1.0 for _ in idle)]
-        levers = np.zeros((MOST_SENSORS, len(DRIFTS)))
-        levers[: len(parameters.levers)] = parameters.levers or AT_ORIGIN
-        sizes, constants = [one.size for one in slow], [one.time_constant for one in slow]
-        lags = np.zeros(MOST_SENSORS)
-        lags[: len(parameters.lags)] = [lag or 0.0 for lag in parameters.lags]
-        units = np.ones(self.states)
+        rest = MOST_SENSORS - len(parameters.noise)
+        slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise, *[Slow()] * rest]
+        levers = [*parameters.levers, *[AT_ORIGIN] * (MOST_SENSORS - len(parameters.levers))]
+        lags = [lag if lag is not None else 0.0 for lag in parameters.lags]
+        units: list[Number] = [1.0] * self.states
         axes = [form.axis.name for form in self.layout.axes]
         for first, names in ((0, self.vehicle_states), (self.force, axes)):
             units[first : first + len(names)] = [parameters.units.get(name, 1.0) for name in names]
-        return np.concatenate(
-            [at, sizes, constants, white, lags, levers.ravel(), units, [parameters.offset, parameters.width]]
-        )
+        columns = [
+            *at,
+            *(one.size for one in slow),
+            *(one.time_constant for one in slow),
+            *(*parameters.white, *[1.0] * rest),
+            *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
+            *(part for lever in levers for part in lever),
+            *units,
+            *(parameters.offset, parameters.width),
+        ]
+        found = np.empty((parameters.count, len(columns)))
+        for n, column in enumerate(columns):
+            found[:, n] = column
+        return found
 
     def _record(self, record: Record, parameters: Parameters) -> _Record:
         """Return the struct `record`, which is made once for each log and set of states with a covariance."""
         slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise]
         lagging = [lag is not None for lag in parameters.lags] or [False] * len(record.sensors)
-        acting = (*lagging, *(one.size > 0.0 for one in slow))
+        acting = (*lagging, *(bool(np.all(one.size > 0.0)) for one in slow))
         found = self._records.get((record, acting))
         if found is None:  # another thread may have made it meanwhile, and its arrays must stay alive
             found = self._records.setdefault((record, acting), self._arrays(record, acting))
@@ -324,10 +347,9 @@ class Filter:
 
 
 def _inputs(record: Record, parameters: Parameters) -> Array:
-    """Return the rows of inputs. The C code reads as many as the record has."""
+    """Return the rows of inputs of each set. The C code reads as many as the record has."""
     found = np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
-    assert found.shape == record.inputs.shape
-    return found
+    return np.broadcast_to(found, (parameters.count, *record.inputs.shape))
 
 
 def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:

@@ -12,7 +12,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from math import e, inf, isfinite, log
+from math import e, inf
 
 from .attitude import entry
 from .catalogue import REVERSE
@@ -49,6 +49,14 @@ def closed_form() -> dict[str, Expression]:
         "V_ss": where(D > 0.0, 2.0 * C / (B + D), without_drag),
         "Tau": where(D > 0.0, 2.0 * call("atanh", RISE / (1.0 + (1.0 / e) * (B / D))) / D, inf),
     }
+
+
+def way_formula() -> Expression:
+    """Return the way from the velocity v until `share` of it without any force: the integral of 1 / (A |v| + B)."""
+    A, B, share, speed = Name("A"), Name("B"), Name("share"), call("abs", Name("v"))
+    quadratic = call("log", (A * speed + B) / (A * share * speed + B)) / A
+    linear = where(B > 0.0, (1.0 - share) * speed / B, inf)
+    return where(A > 0.0, where(speed > 0.0, where(speed < inf, quadratic, inf), 0.0), linear)
 
 
 def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
@@ -90,7 +98,7 @@ def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     return {"C": formulas["C"], **drag, **closed_form()}
 
 
-_closed_form = compiled(closed_form())
+_closed_form, _way = compiled(closed_form()), compiled({"way": way_formula()})
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:
@@ -142,9 +150,6 @@ class AxisAlone:
         return float(_closed_form({"A": A, "B": B, "C": self.C})[name])
 
     def stopping_way(self, v: float, share: float) -> float:
-        """Return the way from v until `share` of it without any force, m or rad: the integral of 1 / (A |v| + B)."""
+        """Return the way from v until `share` of it without any force, m or rad."""
         A, B = self.drag(v)
-        speed = abs(v)
-        if A > 0.0 and isfinite(speed) and speed > 0.0:
-            return log((A * speed + B) / (A * share * speed + B)) / A
-        return (1.0 - share) * speed / B if B > 0.0 else inf
+        return float(_way({"A": A, "B": B, "v": v, "share": share})["way"])

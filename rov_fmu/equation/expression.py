@@ -464,6 +464,13 @@ def compiled(
     return evaluate
 
 
+def array_functions(library: Any) -> dict[str, Callable[..., Any]]:
+    """Return the functions of formulas in ARRAYS, of NumPy or of a library that has the same names."""
+    other = {"pow": "power", "both": "logical_and", "either": "logical_or", "atanh": "arctanh", "atan2": "arctan2"}
+    names = {name: name for name in (*FUNCTIONS, "where")} | other
+    return {name: getattr(library, theirs) for name, theirs in names.items()}
+
+
 # ---- Derivatives -----------------------------------------------------------------------------------------------------
 
 

@@ -8,13 +8,12 @@ import numpy as np
 from scipy.stats.qmc import Sobol
 
 from rov_fmu.c.filter import DivergedError, Run
-from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.likelihood.curves import NO_SHAPES, Shapes
-from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
+from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
-from rov_fmu.identify.likelihood.solve import Minimum, minimise, total
+from rov_fmu.identify.likelihood.solve import Minimum, refits
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -52,8 +51,6 @@ _EXPONENT = 0.15
 of the command and the velocity that are known to about a tenth each."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
-_REFIT_STEPS = 6
-"""The steps of a fit without one log, which begins at the fit to all."""
 _STOPPED = 0.1
 _DRAWS = 256
 """The number of vehicles that are drawn from the estimates of a vehicle file."""
@@ -71,7 +68,7 @@ _MOVING = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class _Part:
+class _LeftOut:
     """A part of the data that is left out: a log, or a half of the only log."""
 
     log: int
@@ -79,31 +76,33 @@ class _Part:
     words: str
 
 
-def predictions(
-    objective: Objective, best: Minimum, posterior: Posterior, against: Vehicle | None = None
-) -> Iterator[Prediction]:
+def predictions(objective: Objective, best: Minimum, against: Vehicle | None = None) -> Iterator[Prediction]:
     """Yield the prediction of each quantity of each log by a fit to all other data, and by a vehicle to compare with.
 
     That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
     """
     other = _other(objective.table, against)
-    count = len(objective.logs)
-    for n, one in enumerate(objective.logs):
-        if count > 1:
-            others = [other for other in objective.logs if other is not one]
-            rest = Objective(objective.table, others, objective.rows, thinned=True)
-            again = minimise(rest, posterior.z, most=_REFIT_STEPS, with_noise=False, last=False)
-            words = "the other log" if count == 2 else f"the other {count - 1} logs"
-            _, information = total(objective, again.z, [data for m, data in enumerate(best.data) if m != n])
-            covariance = Posterior.of(objective.table, again.z, information).averaged.covariance
-            covariance = _with_currents(objective, best, covariance, n)
-            part = _Part(n, slice(None), words)
-            yield from _predicted(objective, part, cautious(objective, again.z), covariance, other)
-            continue
-        half = len(best.data[n].innovations) // 2
-        for part in (_Part(n, slice(half, None), "the first half"), _Part(n, slice(half), "the second half")):
-            z, covariance = _without(objective, best, part)
-            yield from _predicted(objective, part, cautious(objective, z), covariance, other)
+    left_out = [*_left_out(objective)]
+    found = refits(objective, best, [rest for _, rest in left_out])
+    for (part, _), without in zip(left_out, found, strict=True):
+        covariance = Posterior.of(objective.table, without.z, without.information).averaged.covariance
+        if len(objective.logs) > 1:
+            covariance = _with_currents(objective, best, covariance, part.log)
+        yield from _predicted(objective, part, cautious(objective, without.z), covariance, other)
+
+
+def _left_out(objective: Objective) -> Iterator[tuple[_LeftOut, Part]]:
+    """Yield what is left out, and the rest of the data."""
+    logs, rows = objective.whole.logs, objective.whole.rows
+    if len(logs) == 1:
+        half = len(objective.records[0].time) // 2
+        first, second = slice(half), slice(half, None)
+        yield _LeftOut(0, second, "the first half"), Part(logs, rows, first)
+        yield _LeftOut(0, first, "the second half"), Part(logs, rows, second)
+    elif logs:
+        words = "the other log" if len(logs) == 2 else f"the other {len(logs) - 1} logs"
+        for n in logs:
+            yield _LeftOut(n, slice(None), words), Part([m for m in logs if m != n], rows)
 
 
 def _other(table: Table, against: Vehicle | None) -> Table | None:
@@ -132,16 +131,6 @@ def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> floa
     return _LEAST_CURRENT**2 + float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
 
 
-def _without(objective: Objective, best: Minimum, part: _Part) -> tuple[Array, Array]:
-    """Return the parameters and their covariance by the information of all data but a part of a log."""
-    whole, everything = total(objective, best.z, best.data)
-    gradient, information = best.data[part.log].information(part.chosen)
-    gradient, rest = whole - gradient, everything - information
-    values, vectors = np.linalg.eigh(0.5 * (rest + rest.T))
-    inverse = (vectors / np.maximum(values, 2.0 * np.min(1.0 / objective.deviation**2))) @ vectors.T
-    return np.clip(best.z - inverse @ gradient, objective.low, objective.high), 2.0 * inverse
-
-
 def cautious(objective: Objective, z: Array) -> Array:
     """Return the parameters with at least the least change of thrust."""
     moved = z.copy()
@@ -152,7 +141,7 @@ def cautious(objective: Objective, z: Array) -> Array:
 
 
 def _predicted(
-    objective: Objective, part: _Part, z: Array, covariance: Array, other: Table | None
+    objective: Objective, part: _LeftOut, z: Array, covariance: Array, other: Table | None
 ) -> Iterator[Prediction]:
     """Yield the predictions of one part over its whole length, and of its positions over a shorter time."""
     one, record = objective.logs[part.log], objective.records[part.log]
@@ -186,7 +175,7 @@ def _predicted(
                 predicted=measured - off,
                 deviation=deviation,
                 unchanged=_unchanged(record.time[at], measured, span),
-                noise=objective.table.get(z.tolist(), "white noise", m.channel.quantity.name),
+                noise=objective.table.get(z, "white noise", m.channel.quantity.name),
                 error=float(np.sqrt(np.mean(off**2))),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 compared=measured - compared.innovations[at] if compared else None,
@@ -223,17 +212,10 @@ def _slopes(
 ) -> Array:
     """Return the derivatives of the predictions of a log with respect to the parameters of the motion, n x p."""
     found = np.zeros((len(objective.records[number].time), len(z)))
-    for k, parameter in enumerate(objective.table.parameters):
-        if not parameter.of_motion or not objective.concerns(parameter, number):
-            continue
-        step = 0.3 * np.sqrt(max(covariance[k, k], 0.0)) + 1e-9
-        up, down = z.copy(), z.copy()
-        up[k] += step
-        down[k] -= step
-        above, below = (
-            objective.run(moved, number, begin=begin, span=span, repeated=run, frozen=True) for moved in (up, down)
-        )
-        found[:, k] = (above.innovations - below.innovations) / (2.0 * step)
+    parameters = enumerate(objective.table.parameters)
+    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
+    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
+    found[:, places] = objective.changes(z, number, places, steps, run, begin, span)
     return found
 
 
@@ -261,28 +243,29 @@ def answers(
     table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
-        rest = shapes.motion(vehicle, axis, 0.0)
+        rest = shapes.motions(vehicle, axis, np.zeros(1))
         if not pushes:
-            return np.array([_response(shapes.motion(vehicle, axis, c), rest) for c in ANSWERED])
-        full = shapes.motion(vehicle, axis, 1.0)
-        return np.array([_response(replace(full, C=rest.C + push * (full.C - rest.C)), rest) for push in pushes])
+            return _responses(shapes.motions(vehicle, axis, np.array(ANSWERED)), rest)
+        full = shapes.motions(vehicle, axis, np.ones(1)).of
+        push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
+        return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
 
     def logarithms(z: Array) -> Array:
-        fitted = values(*table.model(z.tolist()))
+        fitted = values(*table.model(z))
         with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(np.abs(fitted)).ravel()
+            return np.log(np.abs(fitted)).reshape(3 * len(fitted), -1)
 
     with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
-        slopes = posterior.slopes(logarithms, posterior.of_vehicle)
+        slopes = posterior.slopes(logarithms)
     slopes = np.where(np.isfinite(slopes), slopes, 0.0)
     variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
     # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-    variances[:, :2] += (_OF_THRUST * table.get(posterior.z.tolist(), "slow gain")) ** 2
+    variances[:, :2] += (_OF_THRUST * table.get(posterior.z, "slow gain")) ** 2
     sizes = np.abs(pushes or ANSWERED)
     variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
     of_file = values(vehicle, NO_SHAPES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z).reshape(of_file.shape)) / QUANTILE
+        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z[:, None]).reshape(of_file.shape)) / QUANTILE
     errors = np.maximum(np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0), EXACT / QUANTILE)
     found = []
     for command, error, (V, rise, stop) in zip(ANSWERED, errors, of_file.tolist(), strict=True):
@@ -309,8 +292,8 @@ def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[floa
         return ()
 
     def push(vehicle: Vehicle, command: float) -> float:
-        at_rest, pushed = (NO_SHAPES.motion(vehicle, axis, c).C for c in (0.0, command))
-        return pushed - at_rest
+        at_rest, pushed = NO_SHAPES.motions(vehicle, axis, np.array([0.0, command])).of["C"].tolist()
+        return float(pushed - at_rest)
 
     return tuple(push(own, command) / push(wrench, 1.0) for command in ANSWERED)
 
@@ -323,24 +306,23 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     """
     known = vehicle.uncertainty
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
-    rovs = [vehicle, *(vehicle.with_(**dict(zip(known.names, row, strict=True))) for row in drawn.tolist())]
-    rests = [NO_SHAPES.motion(rov, axis, 0.0) for rov in rovs]
+    drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
+    rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
+    pushed, rest = (NO_SHAPES.motions(rovs, axis, np.array(some)) for some in (ANSWERED, (0.0,)))
+    responses = _responses(pushed, rest).reshape(len(ANSWERED), 3, -1)
     found = []
-    for command in ANSWERED:
-        pushed = (NO_SHAPES.motion(rov, axis, command) for rov in rovs)
-        values = np.array([_response(one, rest) for one, rest in zip(pushed, rests, strict=True)])
-        low, high = np.quantile(values[1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=0).tolist()
-        if not known.names:
-            low = high = values[0].tolist()
-        steady, rise, stop = zip(values[0].tolist(), zip(low, high, strict=True), strict=True)
+    for command, values in zip(ANSWERED, responses, strict=True):
+        ends = np.quantile(values[:, 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=1) if known.names else values.T
+        low, high = ends[0].tolist(), ends[-1].tolist()
+        steady, rise, stop = zip(values[:, 0].tolist(), zip(low, high, strict=True), strict=True)
         found.append(Answer(axis, command, steady, rise, stop))
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 
-def _response(motion: AxisAlone, rest: AxisAlone) -> tuple[float, float, float]:
-    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force."""
-    V = motion.steady_velocity()
-    return V, motion.time_constant(), rest.stopping_way(V, _STOPPED)
+def _responses(motions: Motions, rest: Motions) -> Array:
+    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force: commands x 3, or commands x 3 x n."""
+    V, Tau = motions.response()
+    return np.stack([V, Tau, rest.stopping_way(V, _STOPPED)], axis=1)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------

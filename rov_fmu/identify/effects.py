@@ -66,13 +66,13 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
             if later is not None and later in posterior.absent:
                 total[later] = 1.0
         offset, error = float(total @ posterior.z), float(np.sqrt(total @ posterior.covariance @ total))
-        width = table.get(posterior.z.tolist(), "logging width", one.log.file) * one.interval
+        width = table.get(posterior.z, "logging width", one.log.file) * one.interval
         yield Logging(one.log.file, one.interval, offset, around(offset, error), width)
 
 
 def sensors_of(fit: Fit) -> Iterator[Sensor]:
     """Yield the noise and the outliers of each measured quantity over all logs."""
-    z, table = fit.best.z.tolist(), fit.posterior.table
+    z, table = fit.best.z, fit.posterior.table
     counts: dict[str, int] = {}
     outlying: dict[str, list[bool]] = {}
     first: dict[str, SampledChannel] = {}

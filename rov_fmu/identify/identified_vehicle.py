@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.given import GivenVehicle
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.result import Coefficient, Interval
@@ -41,7 +43,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     given, kept = tests.given, fit.kept
     layout = _layout(tests, fit)
     own = replace(layout, has_fixed_names=False)  # the names that the vehicle has when its file is read
-    values = _in_file(fit, kept.z)
+    values = {name: float(value) for name, value in _in_file(fit, kept.z).items()}
     values |= {  # a file has no smaller exponent
         c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
     }
@@ -175,10 +177,10 @@ METHOD = (
 _SOURCE = "Identified from the tests, as the method says"
 
 
-def _in_file(fit: Fit, z: Array) -> dict[str, float]:
+def _in_file(fit: Fit, z: Array) -> dict[str, Any]:
     """Return the coefficients of the vehicle file for the coordinates of the parameters."""
     table = fit.kept.table
-    coefficients = table.coefficients(z.tolist())
+    coefficients = table.coefficients(z)
     for one in _quadratics(fit, z):
         coefficients |= one.coefficients
     return coefficients | {name: table.base[name] for name in table.exact}
@@ -187,7 +189,7 @@ def _in_file(fit: Fit, z: Array) -> dict[str, float]:
 def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
     """Yield the curves of the file for those that bend. A file has no shapes of curves: it has the nearest ones."""
     table, (low, high) = fit.kept.table, fit.command_range
-    vehicle, shapes = table.model(z.tolist())
+    vehicle, shapes = table.model(z)
     for curve in fit.known.curves:
         if curve.name in shapes.of:
             bands = shapes.dead_bands[curve.name]
@@ -196,13 +198,10 @@ def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
 
 def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change."""
-    z, changed = fit.posterior.z, dict[str, None]()
-    before = _in_file(fit, z)
-    for n in fit.posterior.of_vehicle:
-        moved = z.copy()
-        moved[n] += 0.1 * fit.posterior.table.parameters[n].deviation + 0.01
-        changed |= dict.fromkeys(name for name, value in _in_file(fit, moved).items() if value != before[name])
-    return [name for name in vehicle.coefficients if name in changed]
+    parameters = fit.posterior.table.parameters
+    moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in fit.posterior.of_vehicle]
+    values = _in_file(fit, changed(fit.posterior.z, [(0, 0.0), *moves]))
+    return [name for name in vehicle.coefficients if np.ptp(values[name]) > 0.0]
 
 
 def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
@@ -213,23 +212,22 @@ def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
     scale of the forces of other curves is an assumption, whose error is much larger than their misfit.
     """
 
-    def values(z: Array) -> Array:
-        coefficients = _in_file(fit, z)
-        return np.array([coefficients[name] for name in names])
-
     def measured(z: Array) -> list[Quadratic]:
         some = (one for one in _quadratics(fit, z) if one.curve.name in fit.known.measured_curves)
         return [one for one in some if {*one.coefficients} <= {*names}]
 
-    def misfit(n: int, z: Array) -> Array:
-        return measured(z)[n].misfit
+    def values(z: Array) -> Array:
+        coefficients, misfits = _in_file(fit, z), [one.misfit for one in measured(z)]
+        return np.vstack([*(np.broadcast_to(coefficients[name], z.shape[1]) for name in names), *misfits])
 
     found, covariance, prior = fit.averaged.numbers(values)
-    for n, one in enumerate(measured(fit.averaged.z)):
-        off, errors, _ = fit.averaged.numbers(partial(misfit, n))
+    first, own = len(names), slice(len(names))
+    for one in measured(fit.averaged.z[:, None]):
+        here = slice(first, first := first + len(one.misfit))
         places = [names.index(name) for name in one.coefficients]
-        covariance[np.ix_(places, places)] += one.covariance(float(np.mean(off**2 + np.diag(errors))))
-    return found, covariance, prior
+        mean_square = float(np.mean(found[here] ** 2 + np.diag(covariance[here, here])))
+        covariance[np.ix_(places, places)] += one.covariance(mean_square)
+    return found[own], covariance[own, own], prior[own, own]
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
@@ -237,7 +235,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     table = fit.kept.table
     present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in fit.posterior.absent}
     base, own = tests.given.base, tests.given.description.known
-    coefficients = table.coefficients(fit.kept.z.tolist())
+    coefficients: dict[str, float] = table.coefficients(fit.kept.z)
 
     def has(part: Part, key: str) -> bool:
         name = part.coefficient(key)

@@ -22,7 +22,7 @@ from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import Progress, silent
+from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
@@ -46,8 +46,12 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         own = ", ".join(sorted(tests.given.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
-    on_progress("predicting what was left out", 0.85)
-    predicted = [*assess.predictions(fit.objective, fit.best, fit.posterior, against)]
+    show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
+    show(0)
+    predicted = []
+    for prediction in assess.predictions(fit.objective, fit.best, against):
+        predicted.append(prediction)
+        show(len(predicted))
     runs = followed(fit.objective, fit.best.z)
     unexplained = disturbances(fit.objective, fit.best, fit.posterior, runs)
     slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
@@ -61,7 +65,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     of_file = with_own_inputs(vehicle, tests.given)
     axes = []
     for n, axis in enumerate(known.fitted):
-        on_progress(f"what to measure next of {axis.name}", 0.9 + 0.1 * n / len(known.fitted))
+        on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
         one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out, effects)
         if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
             strongest = fit.command_range[1]

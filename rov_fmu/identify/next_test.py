@@ -10,6 +10,7 @@ from rov_fmu.c.filter import DivergedError, Record
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import COMMANDS, EXACT
+from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import Answer, NextTest
@@ -35,21 +36,17 @@ def next_test(
     """
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
 
-    def motion(z: Array, command: float) -> AxisAlone:
-        vehicle, shapes = posterior.table.model(z.tolist())
-        return shapes.motion(vehicle, axis, command)
-
-    def speed(z: Array, command: float) -> float:
-        return motion(z, command).steady_velocity()
-
-    speeds = np.array([speed(posterior.z, c) for c in COMMANDS])
-    if number is None or not (np.isfinite(speeds).all() and speeds.all()):
-        return None
+    def motions(z: Array, commands: Sequence[float]) -> Motions:
+        vehicle, shapes = posterior.table.model(z)
+        return shapes.motions(vehicle, axis, np.array(commands))
 
     def logarithms(z: Array) -> Array:
-        return np.log(np.abs([speed(z, c) for c in COMMANDS]))
+        return np.log(np.abs(motions(z, COMMANDS).response()[0]))
 
-    slopes = posterior.slopes(logarithms, posterior.of_vehicle)
+    speeds, _ = motions(posterior.z, COMMANDS).response()
+    if number is None or not (np.isfinite(speeds).all() and speeds.all()):
+        return None
+    slopes = posterior.slopes(logarithms)
     known = _widths(slopes, posterior.covariance)
     shown = {a.command: 0.5 * (a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in answers}
     rest = np.array([max(shown.get(c, 0.0) ** 2 - one**2, 0.0) for c, one in zip(COMMANDS, known, strict=True)])
@@ -59,7 +56,8 @@ def next_test(
     root = posterior.errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     found = []
     for strength in _STRENGTHS:
-        hold = _hold([motion(posterior.z, c) for c in (0.0, strength, -strength)], axis, limits)
+        held = motions(posterior.z, (0.0, strength, -strength)).of.items()
+        hold = _hold([AxisAlone.of({key: float(each[n]) for key, each in held}) for n in range(3)], axis, limits)
         if strength > limits.command_max or hold < 2.0:
             continue
         try:
@@ -131,11 +129,11 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     free = proposed.run(z, number, begin=0.0)
     proposed.records[number] = replace(record, value=-free.innovations)
     run = proposed.run(z, number)
-    data = Data.of(run, len(z))
     parameters = enumerate(objective.table.parameters)
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
-    proposed.differentiate(z, number, concerned, run, data)
-    return data.information()[1]
+    data = Data.of(run, concerned, len(z))
+    proposed.differentiate(z, number, range(len(concerned)), run, data, exact=False)
+    return data.information(slice(None))[1]
 
 
 class _Proposed(Objective):

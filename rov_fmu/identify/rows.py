@@ -9,13 +9,10 @@ from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.beginning import QUANTITIES, Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
-from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.likelihood.objective import Part, TableRow, modelled
+from rov_fmu.identify.likelihood.solve import refits
 from rov_fmu.identify.result import Point
 from rov_fmu.vehicle.vehicle import Vehicle
-
-_ROW_STEPS = 10
-"""The steps of a fit without the rows of one command."""
 
 HeldOut = Mapping[tuple[str, str, float], float]
 """The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
@@ -51,16 +48,9 @@ def held_out_rows(fit: Fit) -> HeldOut:
     for n, row in enumerate(rows):
         kind = "force" if row.quantity == "force" else "motion"
         groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
-    for members in groups.values():
-        others = [row for n, row in enumerate(rows) if n not in members]
-        z = minimise(
-            Objective(objective.table, objective.logs, others, thinned=True),
-            fit.best.z,
-            most=_ROW_STEPS,
-            with_noise=False,
-            last=False,
-        ).z
+    parts = [Part(objective.whole.logs, [n for n in objective.whole.rows if n not in out]) for out in groups.values()]
+    for members, without in zip(groups.values(), refits(objective, fit.best, parts), strict=True):
         some = [rows[n] for n in members]
-        for row, value in zip(some, modelled(some, *objective.table.model(z.tolist())).tolist(), strict=True):
+        for row, value in zip(some, modelled(some, *objective.table.model(without.z)).tolist(), strict=True):
             found[row.quantity, row.subject.name, row.command] = value
     return found

@@ -24,6 +24,10 @@ _EVERY = 10.0
 """The time between two lines about running work in a pipe, s."""
 
 
+_TELLING = 0.05
+"""The share of the work from which the time that is left is told."""
+
+
 class Parts:
     """The parts of a command's work, on a terminal or in a pipe."""
 
@@ -31,8 +35,8 @@ class Parts:
         self._display = display
         self._running: dict[str, tuple[float, TaskID | None]] = {}
         """When each running part began, s, and its line on a terminal."""
-        self._steps: dict[str, str] = {}
-        """The step that each running part is at, in a pipe."""
+        self._steps: dict[str, tuple[str, float]] = {}
+        """The step that each running part is at, in a pipe, and the share that is done."""
         self._lock = Lock()
 
     def begin(self, *names: str) -> OnProgress:
@@ -61,7 +65,7 @@ class Parts:
         if self._display and task is not None:
             self._display.update(task, completed=min(share, 0.999), description=one_line(step), count=words)
         with self._lock:
-            self._steps[name] = f"{step}, {words}"
+            self._steps[name] = f"{step}, {words}", share
 
     @property
     def is_shown(self) -> bool:
@@ -76,11 +80,13 @@ class Parts:
             print_message(f"rov-fmu: {message}")
 
     def print_running(self) -> None:
-        """Print a line about each running part: its step, and for how long it has been running."""
+        """Print a line about each running part: its step, for how long it has been running, and how long it will."""
         with self._lock:
-            lines = [(self._steps.get(name, name), began) for name, (began, _) in self._running.items()]
-        for words, began in lines:
-            self.print(f"{words} ({perf_counter() - began:.0f} s so far)")
+            lines = [(*self._steps.get(name, (name, 0.0)), began) for name, (began, _) in self._running.items()]
+        for words, share, began in lines:
+            so_far = perf_counter() - began
+            left = f", about {so_far * (1.0 / share - 1.0):.0f} s left" if share > _TELLING else ""
+            self.print(f"{words} ({so_far:.0f} s so far{left})")
 
 
 @contextmanager

@@ -16,6 +16,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axis_alone
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.c.sets import one_set
 from tests.vehicles import VIDEORAY, extended
 from verification.references.kalman import Belief, Sample, run
 
@@ -402,19 +403,20 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
         known = parameters(k, 3, forces=(Slow(0.1),) * 3, gain=Slow(0.2, 5.0), coefficients=dict(k.coefficients))
     else:
         log, known = measured(k, record((DEPTH, VELOCITY), sampled())), with_all(k)
-    random, of_both = np.random.default_rng(7), Filter(k)
-
-    def moved() -> Parameters:
-        changed = {name: value * random.uniform(0.9, 1.1) for name, value in known.coefficients.items()}
-        louder = tuple(sigma * random.uniform(0.5, 2.0) for sigma in known.white)
-        offset, width = random.uniform(-0.1, 0.1), random.uniform(0.0, 1.0)
-        return replace(known, coefficients=changed, white=louder, offset=offset, width=width)
-
-    sets = [moved() for _ in range(11)]
+    random, of_both, count = np.random.default_rng(7), Filter(k), 11
+    sets = replace(
+        known,
+        coefficients={name: value * random.uniform(0.9, 1.1, count) for name, value in known.coefficients.items()},
+        white=tuple(sigma * random.uniform(0.5, 2.0, count) for sigma in known.white),
+        offset=random.uniform(-0.1, 0.1, count),
+        width=random.uniform(0.0, 1.0, count),
+        count=count,
+    )
     first = of_both.run(log, replace(known, width=0.5))
-    alone = [of_both.run(log, one, repeated=first, frozen=frozen) for one in sets]
-    bad = replace(sets[5], coefficients={**sets[5].coefficients, "m_rov": np.nan})
-    found = of_both.run_many(log, [*sets[:5], bad, *sets[6:]], first, frozen=frozen)
+    alone = [of_both.run(log, one_set(sets, n), repeated=first, frozen=frozen) for n in range(count)]
+    masses = np.where(np.arange(count) == 5, np.nan, sets.coefficients["m_rov"])
+    bad = replace(sets, coefficients={**sets.coefficients, "m_rov": masses})
+    found = of_both.run_many(log, bad, first, frozen=frozen)
     assert [n for n, run in enumerate(found) if run is None] == [5]
     for one, expected in zip(found, alone, strict=True):
         if one is not None:

@@ -16,10 +16,10 @@ from tests.vehicles import VIDEORAY
 
 HELD_OUT = {
     ("surge", "V_ss"): 0.061,
-    ("heave", "V_ss"): 0.113,
-    ("heave", "Tau"): 0.099,
-    ("yaw", "V_ss"): 0.167,
-    ("yaw", "Tau"): 0.144,
+    ("heave", "V_ss"): 0.122,
+    ("heave", "Tau"): 0.103,
+    ("yaw", "V_ss"): 0.151,
+    ("yaw", "Tau"): 0.133,
 }
 """The largest RMS relative errors of predictions by a fit without the rows of the same thrust: as measured, plus 3 %.
 

@@ -14,6 +14,7 @@ from lxml import etree
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.benchmarks import taylor
 from verification.benchmarks.jobs import Job, Measured
+from verification.benchmarks.kalman import Case
 from verification.benchmarks.plain_c import (
     ADAMS,
     BDF,
@@ -206,3 +207,13 @@ def test_heyoka_takes_at_least_the_steps_that_were_asked_for(vehicle: Vehicle, s
     assert seconds > 0.0
     assert taken >= 1.0
     assert finite
+
+
+@pytest.mark.long
+def test_the_filters_of_the_benchmark_have_the_same_innovations(vehicle: Vehicle) -> None:
+    """The filter in C, in lanes and alone, and one that is written with NumPy."""
+    case = Case(vehicle, held=2)
+    lanes, alone, by_hand = case.ours(8)(), case.ours(1)(), case.by_hand()
+    assert len(lanes) == 8
+    for found in (*lanes, *alone):
+        assert found == pytest.approx(by_hand[0], abs=1e-5)

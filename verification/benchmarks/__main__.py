@@ -18,7 +18,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-from . import picture, runs, simulators, taylor
+from . import kalman, picture, runs, simulators, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import Steps
@@ -90,6 +90,9 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
     with say("simulators"):
         for one in (rov, load_vehicle(SHIPPED["bluerov2"]), heavy):
             yield simulators.section(one, effort.manoeuvres)
+    with say("the filter of the identification"):
+        for one in (rov, load_vehicle(SHIPPED["bluerov2"])):
+            yield kalman.section(one, min(effort.repetitions, 5))
     with say("many instances and runs"):
         native, unzipped = folder / "native.fmu", folder / "native"
         build(rov, native, platforms=["host"])

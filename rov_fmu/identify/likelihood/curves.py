@@ -7,17 +7,21 @@ would be off by 1 % of the thrust for published curves.) eta has a Gaussian prio
 deviations ahead and astern are correlated by one half.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, lru_cache
-from math import exp, inf, isfinite
+from math import inf
+from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline, CubicSpline
+from scipy.interpolate import CubicSpline
 
-from rov_fmu.equation.alone import RISE, AxisAlone
+from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, way_formula
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.expression import ARRAYS, array_functions, compiled
+from rov_fmu.equation.layout import Curve, Layout, ThrustTable
+from rov_fmu.equation.terms import equation_of
+from rov_fmu.equation.thrust import curve_formulas
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -51,16 +55,10 @@ def _spline() -> CubicSpline:
 
 
 def _weights(commands: Array) -> Array:
-    """Return the derivatives of eta at some commands with respect to the coordinates of a curve: n x COUNT."""
-    own, is_astern = _spline()(np.maximum(np.abs(commands), KNOTS[0])), (commands < 0.0)[:, None]
-    knots = np.hstack([np.where(is_astern, 0.0, own), np.where(is_astern, own, 0.0)])
+    """Return the derivatives of eta at some commands with respect to the coordinates of a curve: ... x COUNT."""
+    own, is_astern = _spline()(np.maximum(np.abs(commands), KNOTS[0])), (commands < 0.0)[..., None]
+    knots = np.concatenate([np.where(is_astern, 0.0, own), np.where(is_astern, own, 0.0)], axis=-1)
     return np.asarray(knots @ _root() / _POWER)
-
-
-@lru_cache(4096)
-def _weights_of_one(command: float) -> Array:
-    """Return the derivatives at one command. A fit asks for those of the rows of its tables again and again."""
-    return _weights(np.array([command]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,94 +73,188 @@ class Shapes:
     """The curves that do not deviate astern."""
 
     def commands(self, curve: str, commands: Array) -> Array:
-        """Return the commands of the prior curve that act like some commands of a curve."""
-        if curve not in self.of:
+        """Return the commands of the prior curve that act like some commands of a curve: m, or m x n for n vehicles.
+
+        The commands are m, or m x n if each vehicle has its own.
+        """
+        if curve not in self.of or not self.of[curve].any():
             return commands
-        size, is_astern = np.abs(commands), commands < 0.0
-        weights = _weights_of_one(float(commands[0])) if len(commands) == 1 else _weights(commands)
-        eta = weights @ self.of[curve]
+        coordinates, weights = self.of[curve], _weights(commands)
+        eta = weights @ coordinates if commands.ndim == 1 else (weights * coordinates.T).sum(axis=-1)
+        c = commands.reshape(*commands.shape, *[1] * (coordinates.ndim - commands.ndim))
+        size, is_astern = np.abs(c), c < 0.0
         if curve in self.exact_astern:
             eta = np.where(is_astern, 0.0, eta)
         band = np.where(is_astern, *reversed(self.dead_bands.get(curve, (0.0, 0.0))))
         bent = np.maximum(eta, _WEAKEST - 1.0) * np.maximum(size - band, 0.0)
-        return np.asarray(np.sign(commands) * np.clip(size + bent, 0.0, 1.0))
+        return np.asarray(np.sign(c) * np.clip(size + bent, 0.0, 1.0))
 
     def inputs(self, layout: Layout, inputs: Array) -> Array:
-        """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'."""
-        if not self.of:
+        """Return rows of inputs with the commands of the prior curves. The inputs of the layout are its thrusters'.
+
+        For n vehicles, these are n x rows x inputs.
+        """
+        if not any(coordinates.any() for coordinates in self.of.values()):
             return inputs
-        found, names = inputs.copy(), [*layout.inputs]
+        names, changed = [*layout.inputs], dict[int, Array]()
         for name, curve in layout.curve_of.items():
             place = names.index(f"u_{name}")
-            found[:, place] = self.commands(curve.name, inputs[:, place])
+            changed[place] = self.commands(curve.name, inputs[:, place]).T
+        found = np.empty((*np.broadcast_shapes(*(some.shape[:-1] for some in changed.values())), *inputs.shape))
+        found[...] = inputs
+        for place, commands in changed.items():
+            found[..., place] = commands
         return found
 
     def forces(self, vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
-        """Return the steady thrust of all thrusters that a curve describes together, for some commands, N."""
-        acting = self.commands(curve.name, commands).tolist()
-        return curve.together * np.array([vehicle.curve_force(curve, command) for command in acting])
+        """Return the steady thrust of all thrusters that a curve describes together, for m commands, N.
 
-    def motion(self, vehicle: Vehicle, axis: Axis, command: float) -> AxisAlone:
-        """Return the equation of an axis alone under a held command, once the thrust is steady."""
+        It is m x n if the coefficients of the vehicle are arrays of n values.
+        """
+        values: dict[str, Any] = {**vehicle.coefficients, **vehicle.layout.usual_inputs}
+        values["u_one"] = _column(self.commands(curve.name, commands), vehicle)
+        *_, force = _thrust_of(curve)(values).values()
+        return np.asarray(curve.together * force)
+
+    def motions(self, vehicle: Vehicle, axis: Axis, commands: Array) -> "Motions":
+        """Return the equation of an axis alone under each of m held commands, once the thrust is steady."""
         layout = vehicle.layout
-        inputs = dict(layout.usual_inputs)
-        for name, value in layout.driving(axis, command).items():
-            curve = layout.curve_of.get(name.removeprefix("u_"))
-            acting = self.commands(curve.name, np.array([value])) if curve else [value]
-            inputs[name] = inputs[delayed_name(name)] = float(acting[0])
-        return vehicle.alone(axis, inputs)
+        inputs: dict[str, Any] = dict(layout.usual_inputs)
+        driving = [layout.driving(axis, command) for command in commands.tolist()]
+        for name in driving[0]:
+            acting = np.array([of_command[name] for of_command in driving])
+            if curve := layout.curve_of.get(name.removeprefix("u_")):
+                acting = self.commands(curve.name, acting)
+            inputs[name] = _column(acting, vehicle)
+        if layout.has_dead_time:
+            inputs |= {delayed_name(name): inputs[name] for name in layout.commands}
+        found = _alone_of(layout, axis)({**vehicle.coefficients, **inputs})
+        shape = np.broadcast_shapes(np.shape(_column(commands, vehicle)), *map(np.shape, vehicle.coefficients.values()))
+        return Motions({key: np.broadcast_to(found[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")})
+
+
+def _column(commands: Array, vehicle: Vehicle) -> Array:
+    """Return m commands as a column if the coefficients of a vehicle are arrays."""
+    is_many = commands.ndim == 1 and any(np.ndim(value) for value in vehicle.coefficients.values())
+    return commands[:, None] if is_many else commands
+
+
+_IN_ARRAYS = array_functions(np)
+_closed_form = compiled({**closed_form(), "way": way_formula()}, _IN_ARRAYS, ARRAYS)
+
+
+def _tables(tables: Iterable[ThrustTable]) -> dict[str, Callable[..., Any]]:
+    return _IN_ARRAYS | {table.function: np.vectorize(table.force, otypes=[float]) for table in tables}
+
+
+@lru_cache
+def _thrust_of(curve: Curve) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    return compiled(curve_formulas(curve), _tables(curve.tables), ARRAYS)
+
+
+@lru_cache
+def _alone_of(layout: Layout, axis: Axis) -> Callable[[Mapping[str, Any]], dict[str, Any]]:
+    equation = equation_of(layout)
+    formulas = {**equation.parameters, **equation.thrust, **alone_formulas(layout, axis.velocity)}
+    return compiled(formulas, _tables(equation.tables.values()), ARRAYS)
 
 
 NO_SHAPES = Shapes({})
 
 
-def measured_time_constant(motion: AxisAlone, load: float, T: float) -> float:
-    """Return the time from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
+@dataclass(frozen=True, eq=False)
+class Motions:
+    """The motion of one axis alone, as `AxisAlone`, for many commands and vehicles at once: arrays of one shape."""
 
-    There is no closed form: the motion takes Runge-Kutta steps whose length is proportional to Tau + T. The result is
+    of: Mapping[str, Array]
+    """By the keys of `alone_formulas`."""
+
+    def drag(self, v: Array) -> tuple[Array, Array]:
+        """Return A and B for velocities."""
+        A, B = (np.where(v < 0.0, self.of[key + REVERSE], self.of[key]) for key in "AB")
+        return A, B
+
+    def acceleration(self, v: Array) -> Array:
+        """Return v', (18)."""
+        A, B = self.drag(v)
+        return np.asarray(self.of["C"] - (B + A * np.abs(v)) * v)
+
+    def response(self) -> tuple[Array, Array]:
+        """Return V_ss, and Tau of (17), from rest."""
+        found = self._closed_form(self.of["C"])
+        return found["V_ss"], found["Tau"]
+
+    def stopping_way(self, v: Array, share: float) -> Array:
+        """Return the way from v until `share` of it without any force, m or rad."""
+        return self._closed_form(v, share)["way"]
+
+    def _closed_form(self, v: Array, share: float = 1.0) -> dict[str, Array]:
+        A, B = self.drag(v)
+        with np.errstate(all="ignore"):  # both alternatives of a choice are computed
+            return _closed_form({"A": A, "B": B, "C": self.of["C"], "v": v, "share": share})
+
+
+def measured_time_constant(motions: Motions, load: Array, T: Array) -> Array:
+    """Return the times from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
+
+    There is no closed form: the motions take Runge-Kutta steps whose length is proportional to Tau + T. The result is
     infinite if V_ss is not reached.
     """
-    Tau, goal = motion.time_constant(), RISE * motion.steady_velocity()
-    if not isfinite(Tau):
-        return Tau
-    h, v = (Tau + T) / 50.0, 0.0
+    V_ss, Tau = motions.response()
+    goal, h, lagging = RISE * V_ss, (Tau + T) / 50.0, motions.of["C"] - load
+    v, found = np.zeros(goal.shape), np.full(goal.shape, inf)
 
-    def rate(t: float, v: float) -> float:
-        return motion.acceleration(v) - (motion.C - load) * exp(-t / T)
+    def rate(t: Array, v: Array) -> Array:
+        return np.asarray(motions.acceleration(v) - lagging * np.exp(-t / T))
 
+    waits = np.isfinite(Tau)
     for n in range(1000):
         t = n * h
         k_1 = rate(t, v)
         k_2 = rate(t + 0.5 * h, v + 0.5 * h * k_1)
         k_3 = rate(t + 0.5 * h, v + 0.5 * h * k_2)
         after = v + h / 6.0 * (k_1 + 2.0 * (k_2 + k_3) + rate(t + h, v + h * k_3))
-        if abs(after) >= abs(goal) and after * goal > 0.0:
-            between = CubicHermiteSpline([t, t + h], [v, after], [k_1, rate(t + h, after)])
-            return float(between.solve(goal, extrapolate=False)[0])
+        reached = waits & (np.abs(after) >= np.abs(goal)) & (after * goal > 0.0)
+        if reached.any():
+            share = _crossing(*(x[reached] for x in (v, after, h * k_1, h * rate(t + h, after), goal)))
+            found[reached] = t[reached] + h[reached] * share
+        waits &= ~reached
         v = after
-    return inf
+        if not waits.any():
+            break
+    return found
+
+
+def _crossing(low: Array, high: Array, before: Array, after: Array, goal: Array) -> Array:
+    """Return where, from 0 to 1, cubics with these values and slopes at the ends pass a goal (Newton's method)."""
+    rise = high - low
+    square, cube = 3.0 * rise - 2.0 * before - after, before + after - 2.0 * rise
+    t = (goal - low) / rise
+    for _ in range(8):
+        t = t - (low + t * (before + t * (square + t * cube)) - goal) / (before + t * (2.0 * square + t * 3.0 * cube))
+    return t
 
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """The a_t and b_t of one direction that are nearest to a thrust curve over n commands."""
+    """The a_t and b_t of one direction that are nearest to a thrust curve over m commands; or those of n vehicles."""
 
     curve: Curve
-    coefficients: Mapping[str, float]
+    coefficients: Mapping[str, Any]
     """By the names of a_t and b_t."""
     misfit: Array
-    """Of the forces at the commands, relatively."""
+    """Of the forces at the commands, relatively: m, or m x n."""
     terms: Array
-    """n x 2: the forces for a coefficient of 1, relative to the curve."""
+    """The forces for a coefficient of 1, relative to the curve: m x 2, or n x m x 2."""
 
     def covariance(self, variance: float) -> Array:
         """Return the covariance of a_t and b_t with which the relative forces at the commands have a mean variance."""
-        mean_squares = self.terms.T @ self.terms / len(self.terms)
-        return np.asarray(variance / len(self.coefficients) * np.linalg.inv(mean_squares))
+        terms = self.terms.reshape(-1, self.terms.shape[-1])
+        return np.asarray(variance / len(self.coefficients) * np.linalg.inv(terms.T @ terms / len(terms)))
 
 
 def nearest(
-    curve: Curve, forces: Callable[[Array], Array], dead_bands: tuple[float, float], low: float, high: float
+    curve: Curve, forces: Callable[[Array], Array], dead_bands: tuple[Any, Any], low: float, high: float
 ) -> Iterator[Quadratic]:
     """Yield the quadratic curves that are nearest to a curve ahead and astern.
 
@@ -171,12 +263,13 @@ def nearest(
     for end, sign, c_0 in (("", 1.0, dead_bands[0]), (REVERSE, -1.0, dead_bands[1])):
         if f"a_t{end}" not in curve.keys:
             continue
-        least = max(low, c_0 + 0.05)
-        commands = np.linspace(least, max(high, least + 0.1), 40)
-        F = sign * forces(sign * commands)
-        beyond = commands - c_0
-        terms, one = np.column_stack([beyond**2, beyond]) / F[:, None], np.ones(len(F))
-        values = np.linalg.lstsq(terms, one, rcond=None)[0]
-        values[np.abs(values) < _ROUNDING * np.abs(values).max()] = 0.0
+        least = np.maximum(low, c_0 + 0.05)
+        commands = np.linspace(least, np.maximum(high, least + 0.1), 40)
+        F = (sign * forces(sign * commands)).T
+        beyond = (commands - c_0).T
+        terms = np.stack([beyond**2, beyond], axis=-1) / F[..., None]
+        values = np.linalg.pinv(terms).sum(axis=-1).T  # least squares of terms @ values = 1
+        values[np.abs(values) < _ROUNDING * np.abs(values).max(axis=0)] = 0.0
         names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
-        yield Quadratic(curve, dict(zip(names, values.tolist(), strict=True)), terms @ values - one, terms)
+        misfit = (terms @ values.T[..., None])[..., 0].T - 1.0
+        yield Quadratic(curve, dict(zip(names, values, strict=True)), misfit, terms)

@@ -1,4 +1,5 @@
-"""The fit: two starts on few samples, the better one to the end on all, and the posterior there."""
+"""The fit: a start on few samples, another one if noise takes the place of the model, the better one to the end on all
+samples, and the posterior there."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,27 +10,33 @@ import numpy as np
 
 from rov_fmu.c.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning, table_of
+from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import ENOUGH, Minimum, minimise
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import Progress, silent
+from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
-_QUICK = 4.0
-"""The reduction of J by a step at which a quick fit ends."""
-_STARTS: tuple[Mapping[str, float], ...] = (
-    {"slow": 1.0, "white": 2.0},
+_QUICK = 8.0
+"""The reduction of J by new derivatives at which a quick fit ends."""
+_MOST = 8
+"""The most derivatives of the fit to all samples. Where it needs more, sizes of noise change on and on, and answers do
+not."""
+STARTS: tuple[Mapping[str, float], ...] = (
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
+    {"slow": 1.0, "white": 2.0},
 )
 """Two starts: how many deviations of their priors some kinds of parameters are above their means, by their first word.
 
 With much noise, J has few minima far from the data.
 """
+_LOUD = 1.0
+"""The second start is tried if a slow process ends so many deviations of its prior above its usual size. The motion is
+then hardly explained by the model, and another minimum may explain it."""
 _CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
 """The start if the motion diverges from both others: a heavier vehicle with less drag."""
 
@@ -65,7 +72,7 @@ class Fit:
 def fit_all(
     folder: Path, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
-    """Fit all logs and tables: two starts on thinned logs, and the better one to the end on all samples.
+    """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends.
@@ -74,16 +81,15 @@ def fit_all(
     table = table_of(known, logs, noises)
     quick = Objective(table, logs, rows, thinned=True)
     full = Objective(table, logs, rows)
+    starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
     ends: list[Minimum] = []
-    for n, louder in enumerate((*_STARTS, _CAREFUL)):
-        if n == len(_STARTS) and ends:
+    for n, start in enumerate(starts):
+        is_enough = len(ends) == n and not any(_is_loud(table, end.z) for end in ends)
+        if ends and (n == len(STARTS) or is_enough):
             break
 
-        def show(step: int, n: int = n) -> None:
-            words = f"start {n + 1} of 2" if n < len(_STARTS) else "a more careful start"
-            on_progress(words, 0.25 * min(n, 1) + 0.25 * min(step / 20.0, 1.0))
-
-        start = quick.mean + quick.deviation * [louder.get(p.kind.split()[0], 0.0) for p in table.parameters]
+        words = f"start {n + 1}" if n < len(STARTS) else "a more careful start"
+        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
             ends.append(_least(quick, start, show, _QUICK))
         except DivergedError:
@@ -92,20 +98,24 @@ def fit_all(
         raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
     ends.sort(key=lambda end: end.value)
 
-    def show_full(step: int) -> None:
-        on_progress("all samples", 0.5 + 0.35 * min(step / 10.0, 1.0))
-
-    near = _least(full, _scaled(full, ends[0].z), show_full, ENOUGH)
-    for curve in known.measured_curves:
-        other = replace(known, bent=known.bent | {curve})
+    show = moving(on_progress, "all samples", 0.3, 0.7)
+    near = minimise(full, _scaled(full, ends[0].z), show, most=_MOST, last=False)
+    for n, curve in enumerate(known.measured_curves):
+        other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
-        found = minimise(objective, near.z, enough=_QUICK, last=False)
-        if _evidence(objective, found) > _evidence(full, near) + KEPT:
+
+        def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
+            return _evidence(objective, value, information) > needed
+
+        low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
+        show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
+        found = minimise(objective, near.z, show, enough=_QUICK, last=False, promises=bends)
+        if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    best = minimise(full, _scaled(full, near.z), most=2)
+    best = minimise(full, _scaled(full, near.z), moving(on_progress, "exact derivatives", 0.8, 0.88), most=1)
     posterior = Posterior.of(full.table, best.z, best.information)
-    difference = ends[-1].value - ends[0].value if len(ends) > 1 else np.inf
+    difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
     if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
         difference = 0.0
@@ -129,14 +139,26 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, enough=enough, last=False)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
     return min(end, other, key=lambda found: found.value)
 
 
-def _evidence(objective: Objective, best: Minimum) -> float:
+def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
+    """Return the means of the priors, but for some kinds of parameters, which are so many deviations above them."""
+    kinds = [parameter.kind.split()[0] for parameter in objective.table.parameters]
+    above = np.array([louder.get(kind, 0.0) for kind in kinds])
+    return np.asarray(objective.mean + objective.deviation * above)
+
+
+def _is_loud(table: Table, z: Array) -> bool:
+    """Return True if a slow process is much larger than usual."""
+    return any(p.is_slow_size and z[n] - p.mean > _LOUD * p.deviation for n, p in enumerate(table.parameters))
+
+
+def _evidence(objective: Objective, value: float, information: Array) -> float:
     """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
     widths = np.diag(objective.deviation)
-    return -best.value - float(np.linalg.slogdet(widths @ best.information @ widths).logabsdet)
+    return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
 
 
 def _scaled(objective: Objective, z: Array) -> Array:

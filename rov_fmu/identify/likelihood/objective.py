@@ -17,8 +17,10 @@ is the square of their noise.
 
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from functools import cache, partial
+from copy import copy
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from typing import TypeVar
 
 import numpy as np
 
@@ -34,8 +36,13 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
 """Longer steps of the filter for a quick fit to fewer samples."""
+_Result = TypeVar("_Result")
+Samples = tuple[Array, Array]
+"""Innovations and their variances."""
 _TOGETHER = 8
 """The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
+_LEAST_DELAY = 1e-9
+"""A lag that differs from none, s."""
 OUTLYING = 3.0
 """The size of an innovation, in standard deviations, from which it counts less (as in filter.c)."""
 
@@ -63,65 +70,113 @@ class TableRow:
 
 
 def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_lag: float = 0.0) -> Array:
-    """Return the values of some rows by the model, in the unit of each row.
+    """Return the values of m rows by the model, in the unit of each row; m x n for n vehicles.
 
     A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
     """
-    found = np.zeros(len(rows))
-    motion_of = cache(partial(shapes.motion, vehicle))
-    forces: dict[Curve, list[int]] = {}
+    found: dict[int, Array] = {}
+    of: dict[Curve | Axis, list[int]] = {}
     for n, row in enumerate(rows):
-        if isinstance(row.subject, Curve):
-            forces.setdefault(row.subject, []).append(n)
+        of.setdefault(row.subject, []).append(n)
+    for subject, places in of.items():
+        commands = np.array([rows[n].command for n in places])
+        if isinstance(subject, Curve):
+            found |= zip(places, shapes.forces(vehicle, subject, commands), strict=True)
             continue
-        motion = motion_of(row.subject, row.command)
-        found[n] = motion.steady_velocity() if row.quantity == "V_ss" else motion.time_constant()
-        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(row.subject)}
-        lag = max((vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag), default=0.0)
-        if row.quantity == "Tau" and lag > 0.0:
-            load = motion_of(row.subject, 0.0).C
-            found[n] = measured_time_constant(motion, load, lag)
-    for curve, places in forces.items():
-        found[places] = shapes.forces(vehicle, curve, np.array([rows[n].command for n in places]))
-    return found
+        motions = shapes.motions(vehicle, subject, commands)
+        V_ss, Tau = motions.response()
+        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(subject)}
+        lags = [vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag]
+        lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
+        if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
+            load = shapes.motions(vehicle, subject, np.zeros(1)).of["C"]
+            Tau = np.where(lag > 0.0, measured_time_constant(motions, load, np.maximum(lag, _LEAST_DELAY)), Tau)
+        for n, *pair in zip(places, V_ss, Tau, strict=True):
+            found[n] = pair[rows[n].quantity == "Tau"]
+    return np.array([found[n] for n in range(len(rows))])
 
 
 @dataclass(frozen=True, eq=False)
 class Data:
-    """The innovations of one log, or those of all rows of tables, with their derivatives. n samples, p parameters."""
+    """The innovations of one log, or those of all rows of tables, with their derivatives.
+
+    n samples, and the k of p parameters that may change them.
+    """
 
     innovations: Array
     variances: Array
     slopes: Array
-    """n x p: the derivatives of the innovations."""
+    """n x k: the derivatives of the innovations."""
     log_slopes: Array
-    """n x p: the derivatives of log S."""
+    """n x k: the derivatives of log S."""
+    places: Sequence[int]
+    """k: the parameters."""
+    parameters: int
+    """p."""
 
     @classmethod
-    def of(cls, run: Run, parameters: int) -> "Data":
+    def of(cls, run: Run, places: Sequence[int], parameters: int) -> "Data":
         """Return the innovations of a run, with derivatives of 0."""
-        empty = np.zeros((len(run.innovations), parameters))
-        return cls(run.innovations, run.variances, empty, empty.copy())
+        empty = np.zeros((len(run.innovations), len(places)))
+        return cls(run.innovations, run.variances, empty, empty.copy(), places, parameters)
+
+    def part(self, chosen: Sequence[int]) -> "Data":
+        """Return some of the samples."""
+        keys = ("innovations", "variances", "slopes", "log_slopes")
+        return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
+
+    def at(self, innovations: Array, variances: Array) -> "Data":
+        """Return other innovations with the same derivatives."""
+        return replace(self, innovations=innovations, variances=variances)
 
     @property
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
 
-    def information(self, chosen: Array | slice = slice(None)) -> tuple[Array, Array]:
-        """Return the gradient and the Fisher information of the part of J that some samples contribute."""
+    def information(self, chosen: slice) -> tuple[Array, Array]:
+        """Return the gradient and the Fisher information of the part of J that some samples contribute: p, p x p."""
         u = self.normalised[chosen]
         weight = np.minimum(1.0, OUTLYING**2 / np.maximum(u * u, 1e-300))
         A = self.slopes[chosen] / np.sqrt(self.variances[chosen])[:, None]
         B = self.log_slopes[chosen]
-        gradient = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
-        return gradient, 2.0 * (A.T * weight) @ A + B.T @ B
+        gradient, information = np.zeros(self.parameters), np.zeros((self.parameters, self.parameters))
+        gradient[self.places] = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
+        information[np.ix_(self.places, self.places)] = 2.0 * (A.T * weight) @ A + B.T @ B
+        return gradient, information
+
+
+def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
+    """Return a column of coordinates for each move of one of them."""
+    found = np.repeat(z[:, None], len(moves), axis=1)
+    for n, (k, step) in enumerate(moves):
+        found[k, n] += step
+    return found
 
 
 def cost(innovations: Array, variances: Array) -> float:
     """Return the sum over the samples of log S + rho(eps^2 / S)."""
     u = innovations**2 / variances
+    if not np.all(variances > 0.0):  # rounding, where a motion is about to diverge
+        return np.inf
     beyond = OUTLYING**2 * (1.0 + np.log(np.maximum(u, OUTLYING**2) / OUTLYING**2))
     return float(np.sum(np.log(variances) + np.where(u > OUTLYING**2, beyond, u)))
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A part of the data: logs and rows by their indices, and the samples of each of these logs that count."""
+
+    logs: Sequence[int]
+    rows: Sequence[int]
+    chosen: slice = field(default_factory=lambda: slice(None))
+
+
+def in_threads(jobs: Sequence[Callable[[], _Result]]) -> list[_Result]:
+    """Return the results of functions, which run on all cores."""
+    if min(len(jobs), cores := usable_cores()) < 2:
+        return [job() for job in jobs]
+    with ThreadPoolExecutor(cores) as pool:
+        return [future.result() for future in [pool.submit(job) for job in jobs]]
 
 
 class Objective:
@@ -134,10 +189,21 @@ class Objective:
         self.table, self.logs, self.rows = table, logs, rows
         self.records = [one.thinned if thinned else one.record for one in logs]
         steps = _QUICK_STEPS if thinned else {}
-        self.filters = [Filter(one.vehicle(table.base), **steps) for one in logs]
+        filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
+        self.filters = [filters[one.layout] for one in logs]
         p = table.parameters
         self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
         self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
+        self.whole = Part(range(len(logs)), range(len(rows)))
+
+    def of(self, part: Part) -> "Objective":
+        """Return J for a part of the data."""
+        found = copy(self)
+        found.logs, found.records = [self.logs[n] for n in part.logs], [self.records[n] for n in part.logs]
+        found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
+        found.whole = Part(range(len(part.logs)), range(len(part.rows)), part.chosen)
+        found.__dict__.pop("_of_rows", None)
+        return found
 
     # ---- One log ----
 
@@ -146,8 +212,27 @@ class Objective:
 
         The other options are those of `Filter.run`. Raises DivergedError.
         """
-        parameters = (table or self.table).of_log(z.tolist(), self.logs[number])
+        parameters = (table or self.table).of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
+
+    def changes(
+        self, z: Array, n: int, places: Sequence[int], steps: Array, run: Run, begin: float, span: float
+    ) -> Array:
+        """Return the derivatives of the predictions of a log with respect to some parameters, by steps to both sides.
+
+        They are those of `run`, whose gains the filter keeps. Raises DivergedError.
+        """
+        moves = [(k, sign * step) for k, step in zip(places, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
+
+        def some(first: int) -> list[Run | None]:
+            sets = self.table.of_log(changed(z, moves[first : first + _TOGETHER]), self.logs[n])
+            return self.filters[n].run_many(self.records[n], sets, run, frozen=True, begin=begin, span=span)
+
+        jobs = [partial(some, first) for first in range(0, len(moves), _TOGETHER)]
+        ends = [one.innovations for runs in in_threads(jobs) for one in runs if one]
+        if len(ends) < len(moves):
+            raise DivergedError
+        return np.array([(up - down) / (2.0 * h) for up, down, h in zip(ends[::2], ends[1::2], steps, strict=True)]).T
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
         """Return False where a parameter certainly does not change what is predicted of a log."""
@@ -165,18 +250,17 @@ class Objective:
 
     def runs(self, z: Array, earlier: Sequence[Run] | None = None) -> list[Run]:
         """Run the filter through all logs, with the steps of earlier runs if they are given."""
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            jobs = [
-                pool.submit(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))
-            ]
-            return [job.result() for job in jobs]
+        return in_threads(
+            [partial(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))]
+        )
 
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
-        """Return the innovations of all or some rows of tables and their variances."""
+        """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
         rows = self.rows if rows is None else rows
         least_lag = LEAST_LAG if self.logs else 0.0
-        off = np.array([row.measured for row in rows]) - modelled(rows, *self.table.model(z.tolist()), least_lag)
-        noise = np.array([self.table.get(z.tolist(), "row noise", row.noise) * row.scale for row in rows])
+        measured = np.array([row.measured for row in rows])
+        off = (measured - modelled(rows, *self.table.model(z), least_lag).T).T
+        noise = np.array([self.table.get(z, "row noise", row.noise) * row.scale for row in rows])
         return off, noise**2
 
     def prior(self, z: Array) -> float:
@@ -185,13 +269,44 @@ class Objective:
 
     def value(self, z: Array, runs: Sequence[Run]) -> float:
         """Return J for the runs of some parameters."""
-        total = self.prior(z)
-        for run in runs:
-            total += cost(run.innovations, run.variances)
-        if self.rows:
-            off, variances = self.row_values(z)
-            total += cost(off, variances)
+        found = [(run.innovations, run.variances) for run in runs]
+        return self._sum(z, [*found, self.row_values(z)] if self.rows else found, self.whole.chosen)
+
+    def _sum(self, z: Array, samples: Sequence[Samples], chosen: slice) -> float:
+        """Return J for the samples of each log, and then those of the rows."""
+        logs, rows = samples[: len(self.logs)], samples[len(self.logs) :]
+        costs = [cost(off[chosen], S[chosen]) for off, S in logs] + [cost(*some) for some in rows]
+        total = self.prior(z) + sum(costs)
         return total if np.isfinite(total) else np.inf
+
+    def trials(self, z: Array, parts: Sequence[Part], earlier: Sequence[Run]) -> list[tuple[float, list[Samples]]]:
+        """Return J for n sets of parameters (p x n), each for a part of the data, with the samples of this part.
+
+        The filter takes the steps of earlier runs. All sets run through a log together, in the lanes of vectors. J is
+        infinite where a motion diverges.
+        """
+        of_log = [[k for k, part in enumerate(parts) if n in part.logs] for n in range(len(self.logs))]
+        jobs = [
+            (n, some[at : at + _TOGETHER]) for n, some in enumerate(of_log) for at in range(0, len(some), _TOGETHER)
+        ]
+
+        def run(n: int, places: Sequence[int]) -> list[Run | None]:
+            parameters = self.table.of_log(z[:, places], self.logs[n])
+            return self.filters[n].run_many(self.records[n], parameters, earlier[n], frozen=False)
+
+        runs: list[list[Run | None]] = [[] for _ in parts]
+        for (_, places), found in zip(jobs, in_threads([partial(run, *job) for job in jobs]), strict=True):
+            for k, one in zip(places, found, strict=True):
+                runs[k].append(one)
+        off, S = self.row_values(z) if self.rows else (np.zeros((0, 0)), np.zeros((0, 0)))
+        trials = []
+        for k, part in enumerate(parts):
+            samples = [(one.innovations, one.variances) for one in runs[k] if one]
+            rows = [(off[[*part.rows], k], S[[*part.rows], k])] if part.rows else []
+            is_whole = len(samples) == len(part.logs)
+            value = self.of(part)._sum(z[:, k], [*samples, *rows], part.chosen) if is_whole else np.inf
+            trials.append((value, [*samples, *rows]))
+        return trials
 
     def data(
         self,
@@ -204,32 +319,27 @@ class Objective:
     ) -> list[Data]:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
-        Exact ones contain the changes of the gains of the filter, and are differences to both sides. The others guide
-        the steps of a fit: their gains are frozen, and they are differences to one side, which takes a twentieth of the
-        time. They are no measure of the information: their errors make the common scale of all forces, which the motion
-        does not tell, look determined. Where the model does not explain a log, half of the components of a gradient
-        with frozen gains had the wrong sign. Without derivatives with respect to the noise, those of earlier data are
-        returned, or 0.
+        Exact ones are differences to both sides, and the others, which guide the steps of a fit, to one side. Without
+        derivatives with respect to the noise, those of earlier data are returned, or 0. All contain the changes of the
+        gains of the filter. Without these, the common scale of all forces, which the motion does not tell, would look
+        determined, and where the model does not explain a log, half of a gradient would have the wrong sign.
         """
-        found = [Data.of(run, len(z)) for run in runs]
-        work: list[Callable[[], None]] = []
+        parameters = self.table.parameters
+        found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
-            chosen: dict[bool, list[int]] = {False: [], True: []}
-            for k, parameter in enumerate(self.table.parameters):
-                if not self.concerns(parameter, n):
-                    continue
-                if with_noise or parameter.of_motion:
-                    chosen[parameter.keeps_gains and not exact].append(k)
+            places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
+            found.append(Data.of(run, places, len(z)))
+            columns = []
+            for column, k in enumerate(places):
+                if with_noise or parameters[k].of_motion:
+                    columns.append(column)
                 elif earlier:
-                    found[n].slopes[:, k] = earlier[n].slopes[:, k]
-                    found[n].log_slopes[:, k] = earlier[n].log_slopes[:, k]
-            for frozen, places in chosen.items():
-                for first in range(0, len(places), _TOGETHER):
-                    some = places[first : first + _TOGETHER]
-                    work.append(partial(self.differentiate, z, n, some, run, found[n], frozen=frozen, exact=exact))
-        with ThreadPoolExecutor(usable_cores()) as pool:
-            for job in [pool.submit(one) for one in work]:
-                job.result()
+                    found[n].slopes[:, column] = earlier[n].slopes[:, column]
+                    found[n].log_slopes[:, column] = earlier[n].log_slopes[:, column]
+            for first in range(0, len(columns), _TOGETHER):
+                some = columns[first : first + _TOGETHER]
+                work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
+        in_threads(work)
         if self.rows:
             found.append(self._rows_data(z))
         return found
@@ -238,48 +348,47 @@ class Objective:
         self,
         z: Array,
         n: int,
-        places: Sequence[int],
+        columns: Sequence[int],
         run: Run,
         into: Data,
         *,
-        frozen: bool = False,
         exact: bool = True,
     ) -> None:
-        """Compute the derivatives of the innovations of a log with respect to parameters, within their lower bounds.
+        """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
-        The filter runs with the changes of all these parameters at once, and with `frozen` keeps the gains of the run.
-        Exact derivatives are differences to both sides.
+        The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
+        sides.
         """
-        parameters = [self.table.parameters[k] for k in places]
-        moves = [(k, own.step) for k, own in zip(places, parameters, strict=True)]
+        parameters = [self.table.parameters[into.places[column]] for column in columns]
+        moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        sets = []
-        for k, step in moves:
-            moved = z.copy()
-            moved[k] += step
-            sets.append(self.table.of_log(moved.tolist(), self.logs[n]))
-        runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=frozen), strict=True))
-        for k, own in zip(places, parameters, strict=True):
+        sets = self.table.of_log(changed(z, moves), self.logs[n])
+        runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
+        for column, own in zip(columns, parameters, strict=True):
+            k = into.places[column]
             above, below = runs[k, own.step], runs.get((k, -own.step), run)
             if above is None or below is None:
                 raise DivergedError
             width = own.step if below is run else 2.0 * own.step
-            into.slopes[:, k] = (above.innovations - below.innovations) / width
-            if not frozen:
-                into.log_slopes[:, k] = np.log(above.variances / below.variances) / width
+            into.slopes[:, column] = (above.innovations - below.innovations) / width
+            into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
-        off, variances = self.row_values(z)
-        slopes, log_slopes = np.zeros((len(off), len(z))), np.zeros((len(off), len(z)))
-        for k, parameter in enumerate(self.table.parameters):
-            if parameter.kind == "row noise":
-                log_slopes[:, k] = [2.0 * (row.noise == parameter.of) for row in self.rows]
-            elif places := [n for n, row in enumerate(self.rows) if row.depends_on(parameter, self.table.layout)]:
-                some = [self.rows[n] for n in places]
-                up, down = z.copy(), z.copy()
-                up[k] += parameter.step
-                down[k] -= parameter.step
-                change = self.row_values(up, some)[0] - self.row_values(down, some)[0]
-                slopes[places, k] = change / (2.0 * parameter.step)
-        return Data(off, variances, slopes, log_slopes)
+        places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
+        moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps, strict=True)]
+        off, _ = self.row_values(changed(z, [(0, 0.0), *moves]))
+        _, variances = self.row_values(z)
+        noises = [k for k, one in enumerate(self.table.parameters) if one.kind == "row noise"]
+        names = [self.table.parameters[k].of for k in noises]
+        up, down = np.split(off[:, 1:], 2, axis=1)
+        of_noise = np.array([[2.0 * (row.noise == name) for name in names] for row in self.rows])
+        slopes = np.hstack([(up - down) / (2.0 * steps), np.zeros_like(of_noise)])
+        log_slopes = np.hstack([np.zeros((len(off), len(places))), of_noise])
+        return Data(off[:, 0], variances, slopes, log_slopes, [*places, *noises], len(z))
+
+    @cached_property
+    def _of_rows(self) -> list[int]:
+        """The places of the parameters of the motion that change the values of rows."""
+        layout, rows = self.table.layout, {(row.subject, row.quantity): row for row in self.rows}.values()
+        return [k for k, p in enumerate(self.table.parameters) if any(row.depends_on(p, layout) for row in rows)]

@@ -8,7 +8,8 @@ change them. No deviation is estimated from one effect.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from math import exp, inf, log
+from math import inf, log
+from typing import Any
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.result import PLACED
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -110,15 +112,6 @@ class Parameter:
     unit: str = "1"
 
     @property
-    def keeps_gains(self) -> bool:
-        """True if the gains of the filter are frozen for the derivative that guides a step of the fit.
-
-        A slow change of the thrust makes up for the scale of the thrust, as far as the gains let it. Frozen gains give
-        the derivative by the scale the wrong sign where this change is large.
-        """
-        return self.of_motion and self.kind != "thrust scale"
-
-    @property
     def is_slow_size(self) -> bool:
         """True for the size of a slow process."""
         return self.kind in SLOW
@@ -171,31 +164,34 @@ class Table:
     def _places(self) -> dict[tuple[str, str, str], int]:
         return {(p.kind, p.of, p.part): n for n, p in enumerate(self.parameters)}
 
-    def get(self, z: Sequence[float], kind: str, of: str = "", part: str = "", default: float = 0.0) -> float:
+    # The coordinates of p parameters are an array of p numbers, or of p x n for n sets of parameters. All that follows
+    # from them is then a number, or an array of n.
+
+    def get(self, z: Array, kind: str, of: str = "", part: str = "", default: Any = 0.0) -> Any:
         """Return the number that a coordinate stands for, or a default where there is no such parameter."""
         place = self.place(kind, of, part)
         if place is None:
             return default
-        value = float(z[place])
-        return exp(value) if self.parameters[place].is_log else value
+        return np.exp(z[place]) if self.parameters[place].is_log else z[place]
 
-    def coefficients(self, z: Sequence[float]) -> dict[str, float]:
+    def coefficients(self, z: Array) -> dict[str, Any]:
         """Return all coefficients of the layout for the coordinates of the parameters."""
-        found = dict(self.base)
+        found: dict[str, Any] = dict(self.base)
         for form in self.layout.axes:
             self._axis(found, z, form)
         for curve in self.layout.curves:
             self._curve(found, z, curve)
         return found | {name: self.base[name] for name in self.exact}
 
-    def _axis(self, found: dict[str, float], z: Sequence[float], form: VehicleAxis) -> None:
+    def _axis(self, found: dict[str, Any], z: Array, form: VehicleAxis) -> None:
         axis = form.axis
         for key, kind in (("a_d", "quadratic drag"), ("b_d", "linear drag")):
             name = axis.coefficient(key)
             found[name] = self.get(z, kind, axis.name, default=found[name])
             astern = f"{key}{REVERSE}"
             if (reverse := axis.coefficient(astern)) in self.layout.coefficients:
-                found[reverse] = found[name] * self._ratio(reverse, name) * exp(self.get(z, "drag astern", axis.name))
+                ratio = self._ratio(reverse, name) * np.exp(self.get(z, "drag astern", axis.name))
+                found[reverse] = found[name] * ratio
         beta = axis.coefficient("beta")
         found[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
         if (load := form.coefficient("F_0")) in self.layout.coefficients:
@@ -205,9 +201,9 @@ class Table:
         """Return a coefficient astern of the base relative to that ahead; 1 if that ahead is 0."""
         return self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
 
-    def _curve(self, found: dict[str, float], z: Sequence[float], curve: Curve) -> None:
+    def _curve(self, found: dict[str, Any], z: Array, curve: Curve) -> None:
         scale = self.get(z, "thrust scale", curve.name, default=1.0)
-        reverse = exp(self.get(z, "reverse thrust", curve.name))
+        reverse = np.exp(self.get(z, "reverse thrust", curve.name))
         if "k_t" in curve.keys:
             found[curve.coefficient("k_t")] *= scale
         linear = self.get(z, "linear thrust", curve.name)
@@ -222,7 +218,8 @@ class Table:
             band, other = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
             found[band] = self.get(z, "dead band", curve.name, default=found[band])
             if other != band:
-                found[other] = found[band] * self._ratio(other, band) * exp(self.get(z, "dead band astern", curve.name))
+                ratio = self._ratio(other, band) * np.exp(self.get(z, "dead band astern", curve.name))
+                found[other] = found[band] * ratio
         if "d" in curve.keys and not curve.tables:
             lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
             full = found[curve.coefficient("a_t")] + found[curve.coefficient("b_t")]
@@ -231,40 +228,40 @@ class Table:
                 found[name] = self._ratio(name, ahead) * lost * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
-            found[lag] = max(self.get(z, "lag", default=found[lag]), LEAST_LAG)
+            found[lag] = np.maximum(self.get(z, "lag", default=found[lag]), LEAST_LAG)
         if "n_V" in curve.keys:
             found[curve.coefficient("n_V")] = self.get(z, "voltage", default=found[curve.coefficient("n_V")])
 
-    def force_unit(self, z: Sequence[float], axis: Axis) -> float:
+    def force_unit(self, z: Array, axis: Axis) -> Any:
         """Return what the size of a slow force is relative to, N or N m: full thrust, in proportion to the inertia.
 
         The data do not tell the scale of all forces.
         """
         return self.full.get(axis.name, 1.0) * self.get(z, "inertia", axis.name, default=1.0)
 
-    def model(self, z: Sequence[float]) -> tuple[Vehicle, Shapes]:
+    def model(self, z: Array) -> tuple[Vehicle, Shapes]:
         """Return the vehicle, and the deviations of the shapes of its curves."""
         coefficients = self.coefficients(z)
         return Vehicle(self.layout, coefficients), self._shapes(z, coefficients)
 
-    def _shapes(self, z: Sequence[float], coefficients: Mapping[str, float]) -> Shapes:
+    def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
         found, bands = {}, {}
         for curve in self.layout.curves:
             if (first := self.place("thrust shape", curve.name, "1")) is not None:
-                found[curve.name] = self.shape_deviation * np.array(z[first : first + COUNT])
+                found[curve.name] = self.shape_deviation * z[first : first + COUNT]
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
         return Shapes(found, bands, frozenset(reverse))
 
-    def of_log(self, z: Sequence[float], one: SampledLog) -> Parameters:
-        """Return the parameters of the filter for a log."""
+    def of_log(self, z: Array, one: SampledLog) -> Parameters:
+        """Return the sets of parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
         found = self.coefficients(z)
         shapes = self._shapes(z, found)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             found[name] = self.get(z, "current", file, part)
-        whole = self.get(z, "slow gain", default=0.0)
+        whole = self.get(z, "slow gain")
         axes = [form.axis for form in layout.axes]
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
         for thruster, curve in layout.curve_of.items():
@@ -298,12 +295,13 @@ class Table:
             offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
             width=self.get(z, "logging width", file),
             inputs=shapes.inputs(layout, one.record.inputs),
+            count=1 if z.ndim == 1 else z.shape[1],
         )
 
-    def _lag(self, z: Sequence[float], sensor: Sensor) -> float | None:
+    def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
         place = self.place("sensor lag", "", _with_same_lag(sensor))
-        return None if place is None else float(z[place])
+        return None if place is None else z[place]
 
 
 @dataclass(frozen=True)

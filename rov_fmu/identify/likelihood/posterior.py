@@ -11,6 +11,7 @@ from math import exp, log
 
 import numpy as np
 
+from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.result import KEPT, Interval
 from rov_fmu.tank.arrays import Array
@@ -119,15 +120,17 @@ class Posterior:
             found = Posterior(self.table, without.z + share * shift, covariance)
         return found
 
-    def slopes(self, function: Callable[[Array], Array], places: Sequence[int]) -> Array:
-        """Return the derivatives of m numbers with respect to the coordinates at some places, m x p."""
-        found = np.zeros((len(function(self.z)), len(self.z)))
-        for n in places:
-            step = 0.05 * self.errors[n] + 1e-9
-            up, down = self.z.copy(), self.z.copy()
-            up[n] += step
-            down[n] -= step
-            found[:, n] = (function(up) - function(down)) / (2.0 * step)
+    def slopes(self, function: Callable[[Array], Array]) -> Array:
+        """Return the derivatives of m numbers of the vehicle with respect to the p coordinates, m x p.
+
+        The function returns m x n numbers for p x n coordinates.
+        """
+        places = [*self.of_vehicle]
+        steps = 0.05 * self.errors[places] + 1e-9
+        moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps.tolist(), strict=True)]
+        up, down = np.split(function(changed(self.z, moves)), 2, axis=1)
+        found = np.zeros((len(up), len(self.z)))
+        found[:, places] = (up - down) / (2.0 * steps)
         return found
 
     @cached_property
@@ -136,10 +139,13 @@ class Posterior:
         return tuple(n for n, p in enumerate(self.table.parameters) if p.of_motion and p.log is None)
 
     def numbers(self, values: Callable[[Array], Array]) -> tuple[Array, Array, Array]:
-        """Return some numbers of the vehicle, their covariance, and their covariance by the prior."""
-        G = self.slopes(values, self.of_vehicle)
+        """Return some numbers of the vehicle, their covariance, and their covariance by the prior.
+
+        The function returns m x n numbers for p x n coordinates.
+        """
+        G = self.slopes(values)
         prior = np.array([p.deviation**2 for p in self.table.parameters])
-        return values(self.z), G @ self.covariance @ G.T, (G * prior) @ G.T
+        return values(self.z[:, None])[:, 0], G @ self.covariance @ G.T, (G * prior) @ G.T
 
 
 def around(value: float, error: float, *, positive: bool = False) -> Interval:

@@ -1,6 +1,7 @@
 """Minimise the objective by Fisher scoring, damped in units of the prior (Levenberg-Marquardt)."""
 
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,22 +9,28 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rov_fmu.c.filter import DivergedError, Run
-from rov_fmu.identify.likelihood.objective import Data, Objective
+from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples
 from rov_fmu.tank.arrays import Array
 
 Chosen = NDArray[np.bool_]
 
-MOST_STEPS = 40
-ENOUGH = 0.5
+MOST_STEPS = 30
+ENOUGH = 0.3
 """The fit ends when a step reduces J by less. 1 is one unit of 2 ln of the likelihood."""
-_LARGEST = 2.0
+_DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
+"""The dampings that are tried together, in units of the information of the prior."""
+_LARGEST = 4.0
 """The largest change in one step, in standard deviations of the prior."""
 _UP = 0.5
 """The largest growth of the logarithm of a slow process in one step: J grows like the square of the size."""
-_REJECTED, _NEAR = 3, 5.0
-"""A search ends when so many steps in turn do not reduce J, although a small reduction is expected: J has kinks where a
-change of a command coincides with a sample."""
-_FIRST_DAMPING, _MOST_DAMPING = 30.0, 1e8
+_WITH_SAME, _SLOW = 3, 0.3
+"""The most steps with the same derivatives, and the share of their reduction of J that another one must be worth."""
+_FAILURES = 2
+"""A search ends when new derivatives fail to reduce J so often in turn: J has kinks where a change of a command meets a
+sample, and is only nearly the same for other steps of the filter."""
+_REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
+"""The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
+step from which the next one has new derivatives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,37 +54,37 @@ def minimise(
     *,
     most: int = MOST_STEPS,
     enough: float = ENOUGH,
-    with_noise: bool = True,
     last: bool = True,
+    promises: Callable[[float, Array], bool] | None = None,
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    Every other step moves all parameters, and the others those of the motion alone, which takes a fifth of the time.
-    The fit ends when a step of all parameters reduces J by less than `enough`. Without the noise, its parameters keep
-    their values. Only the `last` fit has exact data and information; those of others may be of the step before.
+    The fit ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the
+    information, promises nothing. Only the `last` fit has exact data and information; those of others may be of the
+    step before.
     """
-    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
-    z = np.clip(start, objective.low, objective.high)
-    runs = objective.runs(z)
-    place = _Place(z, objective.value(z, runs), runs)
-    data = objective.data(z, runs, with_noise=with_noise, exact=False)
-    damping = _FIRST_DAMPING
+    place = best = _place(objective, np.clip(start, objective.low, objective.high))
+    failed, data = 0, list[Data]()
     for count in range(1, most + 1):
         on_step(count)
-        moves_noise = with_noise and count % 2 == 1
-        free = np.ones(len(z), bool) if moves_noise else of_motion
-        better, damping = _search(objective, place, data, free, damping, enough)
-        gain = place.value - better.value
-        place = better
-        has_failed, has_converged = damping >= _MOST_DAMPING, gain < enough and damping < 1.0
-        if (has_failed or has_converged) and (moves_noise or not with_noise):
+        try:
+            data = objective.data(place.z, place.runs, exact=False)
+            if promises and not promises(*_within_reach(objective, place, data)):
+                break
+            place = _place(objective, _descended(objective, place, data))
+        except DivergedError:
+            if not data:
+                raise
             break
-        damping = _FIRST_DAMPING if has_failed else damping
-        data = objective.data(place.z, place.runs, data, with_noise=with_noise and count % 2 == 0, exact=False)
+        gain = best.value - place.value
+        if gain > 0.0:
+            best = place
+        failed = 0 if gain > 0.0 else failed + 1
+        if 0.0 <= gain < enough or failed == _FAILURES:
+            break
     if last:
-        data = objective.data(place.z, place.runs, data, with_noise=with_noise)
-    _, information = total(objective, place.z, data)
-    return Minimum(place.z, place.value, place.runs, data, information)
+        data = objective.data(best.z, best.runs)
+    return Minimum(best.z, best.value, best.runs, data, total(objective, best.z, data)[1])
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,33 +96,97 @@ class _Place:
     runs: Sequence[Run]
 
 
-def _search(
-    objective: Objective, place: _Place, data: Sequence[Data], free: Chosen, damping: float, enough: float
-) -> tuple[_Place, float]:
-    """Return a place with a smaller J and the damping for the next step, or the same place if there is none."""
-    z = place.z
-    gradient, information = total(objective, z, data)
-    rejected = 0
-    while damping < _MOST_DAMPING:
-        moved = _step(objective, z, gradient, information, free, damping)
-        change = moved - z
-        if np.max(np.abs(change) / objective.deviation) > _LARGEST:
-            damping = max(4.0 * damping, 1e-3)
+def _place(objective: Objective, z: Array) -> _Place:
+    runs = objective.runs(z)
+    return _Place(z, objective.value(z, runs), runs)
+
+
+def _descended(objective: Objective, place: _Place, data: Sequence[Data]) -> Array:
+    """Return a place with a smaller J, after a few steps with the same derivatives, or the same place.
+
+    Each step is the best of some that are damped differently, which run in the lanes of the filter together.
+    """
+    z, value = place.z, place.value
+    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    for count in range(_WITH_SAME):
+        free = of_motion if count == 0 else np.ones(len(z), bool)
+        gradient, information = total(objective, z, data)
+        moved = []
+        for damping in _DAMPINGS:
+            change = _step(objective, z, gradient, information, free, damping) - z
+            moved.append(z + change / max(float(np.max(np.abs(change) / objective.deviation)) / _LARGEST, 1.0))
+        trials = objective.trials(np.array(moved).T, [objective.whole] * len(moved), place.runs)
+        least = min(range(len(moved)), key=lambda n: trials[n][0])
+        gain = value - trials[least][0]
+        if not gain > 0.0:
             continue
-        expected = -float(gradient @ change + 0.5 * change @ information @ change)
-        if rejected and (expected < enough or (rejected >= _REJECTED and expected < _NEAR)):
-            return place, 1e-3
-        try:
-            runs = objective.runs(moved)
-            value = objective.value(moved, runs)
-        except DivergedError:
-            value = np.inf
-        if value < place.value:
-            is_good = place.value - value > 0.5 * expected
-            return _Place(moved, value, runs), damping / 8.0 if is_good else damping
-        rejected += 1
-        damping = max(4.0 * damping, 1e-3)
-    return place, damping
+        z, value = moved[least], trials[least][0]
+        data = [old.at(*samples) for old, samples in zip(data, trials[least][1], strict=True)]
+        if count > 0 and gain < _SLOW * (place.value - value):
+            break
+    return z
+
+
+def _within_reach(objective: Objective, place: _Place, data: Sequence[Data]) -> tuple[float, Array]:
+    """Return the J that is left if a step reduces it by twice what is expected, and the information."""
+    gradient, information = total(objective, place.z, data)
+    change = _step(objective, place.z, gradient, information, np.ones(len(place.z), bool), 0.0) - place.z
+    return place.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
+
+
+def refits(objective: Objective, best: Minimum, parts: Sequence[Part]) -> list[Minimum]:
+    """Minimise J for some parts of the data, each from the minimum for all data, without the noise.
+
+    All fits take their damped steps together, so that the lanes of the filter are full. The derivatives are those at
+    the minimum for all data, which are exact, as long as a fit is near it. A fit to most of the data needs two steps.
+    """
+    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    fits = [_Refit(objective.of(part), part, best) for part in parts]
+    for _ in range(_REFIT_STEPS):
+        active = [fit for fit in fits if fit.proposes(of_motion) > _REFIT_ENOUGH]
+        if not active:
+            break
+        moved = np.array([fit.moved for fit in active]).T
+        for fit, trial in zip(active, objective.trials(moved, [fit.part for fit in active], best.runs), strict=True):
+            fit.judge(*trial)
+    return [Minimum(fit.z, fit.value, fit.runs, fit.data, fit.information) for fit in fits]
+
+
+class _Refit:
+    """A fit to a part of the data, between two steps."""
+
+    def __init__(self, objective: Objective, part: Part, best: Minimum) -> None:
+        self.objective, self.part, self.z = objective, part, best.z
+        self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
+        self.data = [best.data[n] for n in part.logs]
+        if part.rows:
+            self.data.append(best.data[-1].part(part.rows))
+        self.value = objective.value(self.z, self.runs)
+        _, self.information = total(objective, self.z, self.data)
+        self.damping = 0.0
+
+    def proposes(self, free: Chosen) -> float:
+        """Find the next step, which changes no parameter by more than the largest change, and the expected gain."""
+        gradient, information = total(self.objective, self.z, self.data)
+        while True:
+            self.moved = _step(self.objective, self.z, gradient, information, free, self.damping)
+            change = self.moved - self.z
+            if not np.max(np.abs(change) / self.objective.deviation) > _LARGEST:
+                break
+            self.damping = max(4.0 * self.damping, 1e-3)
+        return -float(gradient @ change + 0.5 * change @ information @ change)
+
+    def judge(self, value: float, samples: Sequence[Samples]) -> None:
+        """Take the step if J falls, with new derivatives if it falls by much. Otherwise, the next step is shorter."""
+        if not value < self.value:
+            self.damping = max(8.0 * self.damping, 1.0)
+            return
+        gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
+        self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
+        if gain > _REFIT_FAR:
+            with suppress(DivergedError):
+                self.runs = self.objective.runs(self.z, self.runs)
+                self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
 
 
 def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
@@ -123,8 +194,8 @@ def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, 
     weight = 1.0 / objective.deviation**2
     size = len(z)
     gradient, information = np.zeros(size), np.zeros((size, size))
-    for some in data:
-        g, H = some.information()
+    for n, some in enumerate(data):
+        g, H = some.information(objective.whole.chosen if n < len(objective.logs) else slice(None))
         gradient, information = gradient + g, information + H
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)

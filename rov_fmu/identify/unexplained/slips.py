@@ -22,6 +22,7 @@ import numpy as np
 from rov_fmu.c.filter import DivergedError, Slow
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.beginning import Tests, begin
+from rov_fmu.identify.likelihood.fit import STARTS, start_of
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
@@ -30,7 +31,7 @@ from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
-_CLEAR, _NEXT = 10.0, 6.0
+_CLEAR, _NEXT = 9.0, 6.0
 """The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
@@ -47,8 +48,6 @@ _DENSITY, _MOVING, _TURNING, _SLOWEST = 1000.0, 1.5, 6.0, 0.1
 axis 6 I r^2 / 2, both within a factor of 8. The drag becomes linear below 0.1 m/s or rad/s."""
 _UNHEEDED = 1e6
 """The factor of a sensor's noise with which it corrects nothing."""
-_STEPS = 12
-"""The most steps of the fit of one hypothesis."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,7 +123,7 @@ def _least(tests: Tests, hypothesis: Hypothesis, start: Array | None = None) -> 
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
     quick = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows, thinned=True)
     try:
-        value = minimise(quick, quick.mean if start is None else start, most=_STEPS, last=False).value
+        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
     except DivergedError:
         return np.inf
     return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in hypothesis)
@@ -165,7 +164,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
     `guessed` names the axes whose prior of the drag follows from the data: they have the drag of a body of their mass.
     """
     one, record = objective.logs[number], objective.records[number]
-    parameters = objective.table.of_log(objective.mean.tolist(), one)
+    parameters = objective.table.of_log(objective.mean, one)
     usual = dict(parameters.coefficients)
     for axis in (form.axis for form in one.layout.axes if form.axis.name in guessed):
         volume = usual[axis.inertia] / _DENSITY

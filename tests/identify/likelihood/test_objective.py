@@ -10,10 +10,11 @@ import pytest
 from rov_fmu.c.filter import Filter, Parameters, Record, Run
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
-from rov_fmu.identify.likelihood.solve import minimise, total
+from rov_fmu.identify.likelihood.solve import minimise, refits, total
 from rov_fmu.tank.arrays import Array
+from tests.c.sets import one_set
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
 from tests.recordings import run, write_log
@@ -74,8 +75,8 @@ def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
         _, information = total(objective, place, objective.data(place, runs))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
-    def one_by_one(self: Filter, record: Record, sets: Sequence[Parameters], first: Run, **how: bool) -> list[Run]:
-        return [self.run(record, one, repeated=first, **how) for one in sets]
+    def one_by_one(self: Filter, record: Record, sets: Parameters, first: Run, **how: bool) -> list[Run]:
+        return [self.run(record, one_set(sets, n), repeated=first, **how) for n in range(sets.count)]
 
     in_lanes = errors()
     monkeypatch.setattr(Filter, "run_many", one_by_one)
@@ -133,3 +134,35 @@ def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
             np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u))
         )
     assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
+
+
+def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objective, place: Array) -> None:
+    """Without each log and without each row, from the minimum for all data."""
+    best = minimise(objective, place)
+    logs, rows = objective.whole.logs, objective.whole.rows
+    parts = [Part([m for m in logs if m != n], rows) for n in logs] + [Part(logs, [m for m in rows if m != rows[0]])]
+    of_motion = np.array([p.of_motion for p in objective.table.parameters])
+    for part, found in zip(parts, refits(objective, best, parts), strict=True):
+        own = objective.of(part)
+        assert found.value <= own.value(best.z, [best.runs[n] for n in part.logs])
+        assert (found.z == best.z)[~of_motion].all(), "the noise stays"
+        (again,) = refits(own, minimise(own, found.z), [own.whole])
+        errors = np.sqrt(np.diag(np.linalg.inv(again.information / 2.0)))
+        assert (np.abs(found.z - again.z) < 1.0 * errors)[of_motion].all()
+
+
+def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, place: Array) -> None:
+    """One call for all sets gives the same as a call for each, and the same J."""
+    moved = (
+        place[:, None] + 1e-3 * np.random.default_rng(2).standard_normal((len(place), 5)) * objective.deviation[:, None]
+    )
+    moved = np.clip(moved.T, objective.low, objective.high).T
+    off, S = objective.row_values(moved)
+    runs = objective.runs(place)
+    trials = objective.trials(moved, [objective.whole] * 5, runs)
+    for n in range(5):
+        one_off, one_S = objective.row_values(moved[:, n])
+        assert off[:, n] == pytest.approx(one_off, rel=1e-12, abs=1e-15)
+        assert S[:, n] == pytest.approx(one_S, rel=1e-12)
+        alone = objective.value(moved[:, n], objective.runs(moved[:, n], runs))
+        assert trials[n][0] == pytest.approx(alone, rel=1e-9)

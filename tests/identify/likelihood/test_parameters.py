@@ -101,7 +101,7 @@ def test_priors_are_those_that_are_stated(known: Known) -> None:
 
 def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     table, (heave, surge) = known
-    z = np.random.default_rng(0).uniform(0.05, 0.3, len(table.parameters)).tolist()
+    z = np.random.default_rng(0).uniform(0.05, 0.3, len(table.parameters))
     of, c, base = partial(table.get, z), table.coefficients(z), table.base
     assert table.layout.voltage == pytest.approx(np.mean([15.19, 14.36]), abs=0.1)
     for curve in ("rear", "top"):

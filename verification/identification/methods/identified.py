@@ -56,9 +56,8 @@ class Identified:
                 known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high
 
         def drag(z: Array) -> Array:
-            model, shapes = own.table.model(z.tolist())
-            A, _ = shapes.motion(model, axis, assess.COMMANDS[0]).drag(1.0)
-            return np.array([A])
+            model, shapes = own.table.model(z)
+            return shapes.motions(model, axis, np.array(assess.COMMANDS[:1])).of["A"]
 
         (value,), ((variance,),), _ = own.numbers(drag)
         low, high = around(float(value), float(variance) ** 0.5, positive=True)
