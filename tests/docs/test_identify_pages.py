@@ -103,7 +103,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
         f"Bayes factor exceeds {causes.ENOUGH:g}, and that of the next cause by {causes.AHEAD:g} (`causes.py`)" in page
     )
     assert f"raises the evidence by more than {slips._CLEAR:g} (`slips.py`)" in page
-    assert f"They read {records.THINNED:g} samples per second" in page
+    assert f"reads {records.THINNED:g} samples per second" in page
     assert len(effects._WORDS) == len(
         page.partition("## Effects ")[2].partition(" are effects")[0].replace(" and ", ", ").split(", ")
     )
@@ -143,7 +143,7 @@ def test_the_rules_of_the_page_are_those_of_the_verdict() -> None:
         share = float(limit) / 100.0
         assert judged(prediction(), half_width=share - 0.01).word == inside
         assert judged(prediction(), half_width=share + 0.01).word == outside
-    ((difference),) = re.findall(r"two starts end .*? by more than (\d+)", text(METHOD))
+    ((difference),) = re.findall(r"a second start ends .*? by more than (\d+)", text(METHOD))
     assert judged(prediction(), difference=float(difference) - 1.0).word == "good"
     assert judged(prediction(), difference=float(difference) + 1.0).word == "do not use"
     worse, better = prediction(error=1.1), prediction()
