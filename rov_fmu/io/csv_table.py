@@ -48,6 +48,8 @@ _FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
 cells, and the largest share of columns that do not go on as before."""
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
+EMPTY = "the file is empty"
+"""What is wrong with a file without content."""
 _NO_ROWS = "no rows below the header"
 _BLANKS = ("", "-", "nan")
 _MOST_COMPARED = 1000
@@ -104,6 +106,8 @@ class Columns:
     """The headers of the columns that are read, as the file has them or as they are renamed."""
     units: Mapping[str, str]
     """The units of the file by column, with the numbers that follow a unit."""
+    conversions: Mapping[str, Conversion]
+    """The conversions of the numbers of the file to the first unit, by column."""
     values: Mapping[str, "array[float]"]
     """The numbers by column."""
     lines: "array[int]"
@@ -184,6 +188,7 @@ def read_columns(
         titles,
         headers,
         {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
+        {column.name: column.convert for column in file_columns.values()},
         values,
         lines,
         unread,
@@ -510,7 +515,7 @@ class _CsvFile:
         except csv.Error as error:
             raise DataFileError(f"{self.path}, line {before + reader.line_num}: not CSV: {error}") from error
         if is_header:
-            raise UnreadableFileError(f"{self.path}: the file is empty")
+            raise UnreadableFileError(f"{self.path}: {EMPTY}")
 
     def align(self) -> bool:
         """Find the columns of the header in rows that have more cells from some line on. Return True if some are found.
