@@ -138,16 +138,16 @@ def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, tuple[Seq
 
     Components of quaternions have no marks.
     """
-    found: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
+    meanings: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
     for message in reversed(MESSAGES):
         if message.gives != QUATERNION and topic.has(message):
             what = VECTORS.get(message.gives, (message.gives,)), partial(np.multiply, message.factor)
-            found |= dict.fromkeys(message.fields, what)
+            meanings |= dict.fromkeys(message.fields, what)
     for place in topic.fields:
         if (entry := entries.get(topic.full_name(place))) and (quantity := entry.quantity):
             convert = entry.convert
-            found[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
-    return found
+            meanings[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
+    return meanings
 
 
 def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Iterator[_Flag]:

@@ -107,9 +107,10 @@ def read_table(
     *,
     is_part: bool = False,
 ) -> tuple[Content, dict[str, Entry]]:
-    """Read a table, and return its columns in SI units, with the meaning of each. Raises DataFileError.
+    """Read a table, and return its columns, with the meaning of each. Raises DataFileError.
 
-    `open_stream` opens its lines. A part of a dive may have only commands or only motion.
+    The numbers are in SI units, but pulses whose neutral nobody states are as they stand in the file. `open_stream`
+    opens its lines. A part of a dive may have only commands or only motion.
     """
     known = columns_of_log(layout, axis, names.keys)
     flags = flag_columns(read_header(path, open_stream), known, names)
