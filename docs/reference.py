@@ -25,7 +25,7 @@ from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.templates import number
 from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.tank import catalogue
-from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting_frames
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -77,7 +77,7 @@ def _priors() -> Table:
 
 def _frames() -> Table:
     """Return the frames of ArduSub, with the vehicles that ship and fit them."""
-    shipped = {name: fitting(load_vehicle(path).layout) for name, path in SHIPPED.items()}
+    shipped = {name: fitting_frames(load_vehicle(path).layout) for name, path in SHIPPED.items()}
     rows: Table = [("`FRAME_CONFIG`", "frame", "motors", "vehicles that ship"), ("---",) * 4]
     for config, (frame, motors) in enumerate(FRAMES.items()):
         own = ", ".join(f"`{name}`" for name, frames in shipped.items() if frame in frames)

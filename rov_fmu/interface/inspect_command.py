@@ -20,8 +20,7 @@ from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
 from rov_fmu.tank.folder import unreadable
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, headers_of_tables, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
-from rov_fmu.tank.readers.listing import BAG, Listing, list_files, named
-from rov_fmu.tank.readers.other_files import NOT_OPENED
+from rov_fmu.tank.readers.listing import BAG, NOT_OPENED, Listing, list_files, named
 from rov_fmu.tank.readers.parsers import format_of, one_parser
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -34,7 +34,7 @@ _HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
 _SEPARATORS, _COMMENT = ",;\t", "#"
 _GIVEN_SEPARATOR = re.compile(rf'"?sep=([{_SEPARATORS}])"?', re.IGNORECASE)
 """The line by which Excel is told the separator."""
-UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
+_UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 """The first bytes of a text in UTF-16."""
 _CODE_PAGE = "cp1252"
 MOST_BEFORE = 100
@@ -48,6 +48,8 @@ _FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
 cells, and the largest share of columns that do not go on as before."""
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
+EMPTY = "the file is empty"
+"""What is wrong with a file without content."""
 _NO_ROWS = "no rows below the header"
 _BLANKS = ("", "-", "nan")
 _MOST_COMPARED = 1000
@@ -104,6 +106,8 @@ class Columns:
     """The headers of the columns that are read, as the file has them or as they are renamed."""
     units: Mapping[str, str]
     """The units of the file by column, with the numbers that follow a unit."""
+    conversions: Mapping[str, Conversion]
+    """The conversions of the numbers of the file to the first unit, by column."""
     values: Mapping[str, "array[float]"]
     """The numbers by column."""
     lines: "array[int]"
@@ -184,6 +188,7 @@ def read_columns(
         titles,
         headers,
         {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
+        {column.name: column.convert for column in file_columns.values()},
         values,
         lines,
         unread,
@@ -334,7 +339,7 @@ def open_text(path: Path) -> Callable[[], TextIO]:
     Windows writes µ and °. The stream takes less memory than the text.
     """
     content = read_bytes(path, UnreadableFileError, most=LARGEST)
-    for encoding in ("utf-16",) if content.startswith(UTF_16_MARKS) else ("utf-8-sig", _CODE_PAGE):
+    for encoding in ("utf-16",) if content.startswith(_UTF_16_MARKS) else ("utf-8-sig", _CODE_PAGE):
         with suppress(UnicodeDecodeError):
             content.decode(encoding)
             return partial(_stream, content, encoding)
@@ -349,7 +354,7 @@ def looks_like_table(path: Path) -> bool:
     """Return True if a text has a row of numbers below a header with as many columns. Only its beginning is read."""
     with path.open("rb") as file:
         start = file.read(_START)
-    encoding = "utf-16" if start.startswith(UTF_16_MARKS) else "utf-8-sig"
+    encoding = "utf-16" if start.startswith(_UTF_16_MARKS) else "utf-8-sig"
     return _dialect(StringIO(start.decode(encoding, "replace"))).has_rows
 
 
@@ -510,7 +515,7 @@ class _CsvFile:
         except csv.Error as error:
             raise DataFileError(f"{self.path}, line {before + reader.line_num}: not CSV: {error}") from error
         if is_header:
-            raise UnreadableFileError(f"{self.path}: the file is empty")
+            raise UnreadableFileError(f"{self.path}: {EMPTY}")
 
     def align(self) -> bool:
         """Find the columns of the header in rows that have more cells from some line on. Return True if some are found.
@@ -532,17 +537,17 @@ class _CsvFile:
         if any(part.count < _FEWEST for part in parts) or odd > _MOST_ODD * sum(part.count for part in parts[1:]):
             return False
         places: list[int | None] = [*range(width)]
-        found = {}
+        by_width = {}
         for before, after in pairwise(parts):
             low, high = _where_inserted(before, after)
             moved = [*range(low), *[None] * (high - low), *range(high + after.width - before.width, after.width)]
             places = [None if place is None else moved[place] for place in places]
-            found[after.width] = places
+            by_width[after.width] = places
         first = sum(place == n for n, place in enumerate(places))
         last = sum(place == n for n, place in enumerate(places, start=parts[-1].width - width))
         if not first + last:
             return False
-        self._places, self.left_out = found, odd
+        self._places, self.left_out = by_width, odd
         counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
         self.assumed["grown rows"] = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
         return True

@@ -11,7 +11,7 @@ from typing import IO, Any
 
 from rov_fmu.io.messages import NO_FILE, FileError
 
-MOST_BYTES = 1_000_000_000
+_MOST_BYTES = 1_000_000_000
 """The largest file that is read as a whole, in bytes, where nothing else is said."""
 _PIECE = 2**20
 """The number of bytes that are hashed at a time: a file may be larger than the memory."""
@@ -55,7 +55,7 @@ def _without_waiting(path: str, flags: int) -> int:
     return descriptor
 
 
-def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = MOST_BYTES) -> bytes:
+def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = _MOST_BYTES) -> bytes:
     """Return the content of a file. Raises `kind` if it cannot be read, or has more bytes than `most`."""
     with open_file(path, kind) as file:
         size = os.fstat(file.fileno()).st_size
@@ -67,15 +67,15 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = MOS
         return content
 
 
-def read_text(path: Path, kind: type[FileError] = FileError, *, most: int = MOST_BYTES) -> str:
-    """Return the text of a file in UTF-8 with \\n as line end and without a byte order mark. Raises `kind`."""
-    return text_of(path, read_bytes(path, kind, most=most), kind).replace("\r\n", "\n").replace("\r", "\n")
+def read_text(path: Path, kind: type[FileError] = FileError, *, most: int = _MOST_BYTES) -> str:
+    """Return the text of a file in UTF-8, as `text_of` does. Raises `kind`."""
+    return text_of(path, read_bytes(path, kind, most=most), kind)
 
 
 def text_of(path: Path, content: bytes, kind: type[FileError] = FileError) -> str:
-    """Return the content of a file as text, with its line ends, without a byte order mark. Raises `kind`."""
+    """Return the content of a file as text with \\n as line end and without a byte order mark. Raises `kind`."""
     try:
-        return content.decode("utf-8-sig")
+        return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
         raise kind(f"{path}: not UTF-8 text, at byte {error.start}") from error
 

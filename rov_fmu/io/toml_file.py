@@ -83,7 +83,7 @@ def toml_text(path: Path, content: bytes, failure: type[FileError]) -> str:
 
     A stranger may have written the file.
     """
-    text = text_of(path, content, failure).replace("\r\n", "\n").replace("\r", "\n")
+    text = text_of(path, content, failure)
     outside = '""'.join(_outside_strings(text))
     for key in re.finditer(r"[^=,\[\]{}\n]+", outside):
         if (parts := key[0].count(".") + 1) > _DEEPEST:

@@ -231,19 +231,8 @@ NOT_MEASURED = {
 """Words in names of topics of what is wanted and not measured, or not measured of the vehicle."""
 NOT_COMMANDED = {
     *("current", "currents", "temperature", "temp", "rpm", "speed", "duty", "voltage", "power", "status", "state"),
-    *(
-        "feedback",
-        "telemetry",
-        "fault",
-        "enabled",
-        "force",
-        "forces",
-        "newton",
-        "newtons",
-        "torque",
-        "wrench",
-        "thrust",
-    ),
+    *("feedback", "telemetry", "fault", "enabled"),
+    *("force", "forces", "newton", "newtons", "torque", "wrench", "thrust"),
     *("battery", "humidity", "rate", "load", "error", "mode", "id", "armed", "cpu", "gain", "light", "lights"),
     *("stick", "joystick"),
 }

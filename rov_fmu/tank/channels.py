@@ -79,6 +79,12 @@ class Topic:
         ordered, *columns = ascending(time, *known)
         return cls(source, ordered, dict(zip(fields, columns, strict=True)))
 
+    def has(self, message: Message) -> bool:
+        """Return True if the messages are what an entry of the catalogue describes."""
+        name, kind = self.source.topic, self.source.kind
+        is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
+        return bool(is_meant) and {*message.fields} <= self.fields.keys()
+
     def where(self, kept: Flags) -> "Topic":
         """Return the topic with only some of its messages."""
         return replace(self, time=self.time[kept], fields={name: own[kept] for name, own in self.fields.items()})
@@ -125,14 +131,11 @@ def _measurements(topics: Sequence[Topic], sender: Source | None, others: Collec
     """Yield what the catalogue knows, in the order of its preference."""
     for message in MESSAGES:
         found = []
-        for topic in topics:
-            name, kind = topic.source.topic, topic.source.kind
-            is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
-            if is_meant and {*message.fields} <= topic.fields.keys():
-                values = np.column_stack([topic.fields[field] for field in message.fields])
-                reason = _reason_against(topic, topics, sender, others)
-                known = np.where(values == message.unknown, np.nan, values * message.factor)
-                found.append(_Measurement(message, topic, known, reason))
+        for topic in (topic for topic in topics if topic.has(message)):
+            values = np.column_stack([topic.fields[field] for field in message.fields])
+            reason = _reason_against(topic, topics, sender, others)
+            known = np.where(values == message.unknown, np.nan, values * message.factor)
+            found.append(_Measurement(message, topic, known, reason))
         if message.gives in ("depth", "pressure"):  # of several barometers, the one in the water changes most
             found.sort(key=lambda measurement: -spread(measurement.values))
         yield from found

@@ -19,8 +19,6 @@ _FAR, _INTERVALS = 3600.0, 1000.0
 """A time is far from another one if both this time, s, and this many usual intervals are between them."""
 _OTHER_CLOCK = 1.0
 """If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
-
-
 LATE = 1.0
 """A command begins late if its first value comes later after that of another one, s."""
 

@@ -47,13 +47,12 @@ _ARDUPILOT_MOTORS = (*range(33, 41), *range(82, 86))
 """The functions of outputs of ArduPilot that drive the motors 1, 2, ... 12."""
 _PX4_MOTOR = 100
 """The function of output x of PX4 that drives motor n is n more than this."""
-
-
 _REST, _SHARE, _SELDOM = 100.0, 0.1, 0.01
 """An output rests at its most frequent pulse, if this is nearer to 1500 us than the first number and has the second
 share of the rows at least. It does not rest at another pulse that has less than the last share."""
 _AT_REST, _CLEAR = 2.0, 20.0
-"""Pulses closer to another one than the first number are the same, µs; they are on its one side beyond the second."""
+"""Two pulses that differ by less than the first number, µs, are the same. One is clearly on a side of the other if they
+differ by more than the second."""
 
 
 class LogKeys(Strict):
@@ -171,8 +170,8 @@ class Commanded:
     findings: Sequence[Finding] = ()
     without_pulse: Sequence[str] = ()
     """The thrusters that never get a pulse, although others do."""
-    without_thruster: Sequence[Function] = ()
-    """The outputs that drive motors for which the vehicle has no thruster."""
+    without_thruster: Mapping[str, int] = field(default_factory=dict)
+    """The motors for which the vehicle has no thruster, by words about them."""
 
 
 def commands_of(
@@ -201,7 +200,7 @@ def commands_of(
     used = {n for n, (_, values) in best.series.items() if np.isfinite(values).any()}
     used = {*best.used} if _are_pulses(path, best) else used
     without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
-    extra = [*_without_thruster(best, numbers, functions)]
+    extra = _without_thruster(best, numbers, functions)
     return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
 
 
@@ -213,7 +212,7 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     found: dict[Source, dict[str, Series]] = {}
     for message in WRENCHES:
         for topic in topics:
-            if re.fullmatch(message.kind, topic.source.kind) and {*message.fields} <= topic.fields.keys():
+            if topic.has(message):
                 _, body = frames_of(topic.source)
                 values = np.column_stack([topic.fields[field] for field in message.fields]) @ body.T
                 for force in forces:
@@ -239,9 +238,8 @@ def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
     places: dict[tuple[str, str], set[str]] = {}
     for source in (topic.source for topic in topics if vehicle):
         if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_place):
-            places.setdefault((source.kind, source.topic.removeprefix(f"/{source.vehicle}/")), set()).add(
-                source.vehicle
-            )
+            name = source.topic.removeprefix(f"/{source.vehicle}/")
+            places.setdefault((source.kind, name), set()).add(source.vehicle)
     return {other for vehicles in places.values() if vehicle in vehicles for other in vehicles} - {vehicle}
 
 
@@ -333,21 +331,17 @@ def _motors(outputs: _Outputs, thrusters: int, functions: Mapping[int, Function]
     return [assigned.get(motor, 0 if motor in others else motor) for motor in range(1, count + 1)]
 
 
-def _without_thruster(
-    outputs: _Outputs, numbers: Sequence[int], functions: Mapping[int, Function]
-) -> Iterator[Function]:
-    """Yield the outputs that drive motors, but that no thruster takes.
+def _without_thruster(outputs: _Outputs, numbers: Sequence[int], functions: Mapping[int, Function]) -> dict[str, int]:
+    """Return the motors that no thruster is, by words about their outputs.
 
-    They change, and a parameter says that they drive motors. If none tells what an output drives, it changes about as
-    often as those of the thrusters, as lights and cameras do not.
+    The outputs change, and a parameter says that they drive motors. If none tells what an output drives, it changes
+    about as often as those of the thrusters, as lights and cameras do not.
     """
     counts = {n: _changes_of(values) for n, (_, values) in outputs.series.items()}
     changing = [counts[n] for n in numbers if counts.get(n)]
     usual = float(np.median(changing)) if changing else np.inf
-    for n, count in counts.items():
-        own = functions.get(n) or Function(n, n if count >= _OFTEN * usual else 0)
-        if count and own.motor > len(numbers):
-            yield own
+    driven = [functions.get(n) or Function(n, n if count >= _OFTEN * usual else 0) for n, count in counts.items()]
+    return {of.words: of.motor for of in driven if counts[of.output] and of.motor > len(numbers)}
 
 
 def _changes_of(values: Array) -> int:

@@ -56,7 +56,7 @@ class Folder:
     path: Path
     rov_file: RovFile
     names: Names = field(default_factory=Names)
-    """The tables [columns] and [topics]."""
+    """The tables of rov.toml that explain logs."""
     files: dict[tuple[str, str], list[str]] = field(default_factory=dict)
     """The names of files by kind of test and by curve or axis, including files that cannot be read."""
     rows: dict[tuple[str, str], list[Row]] = field(default_factory=dict)
@@ -75,7 +75,7 @@ class Folder:
     originals: dict[tuple[str, ...], str] = field(default_factory=dict)
     """The first file (or the files of the first dive) with each content, by kind and hash."""
     known: set[str] = field(default_factory=set)
-    """The keys that the tables [columns] and [topics] may have."""
+    """The keys that the tables [columns], [topics] and [valid] may have."""
 
     @property
     def layout(self) -> Layout | None:

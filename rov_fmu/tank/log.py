@@ -169,7 +169,7 @@ class Log:
     unread: Mapping[str, str] = field(default_factory=dict)
     """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
-    """The keys that the tables [columns] and [topics] of rov.toml may have for this log."""
+    """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
 
     def used(self, name: str) -> Channel | None:
         """Return the channel that is used for a quantity, by the quantity's name, or None."""

@@ -56,6 +56,7 @@ def read_logs(
     else:
         content = read_content(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
     content.split_by_clock()
+    _move_to_neutral(content, entries)
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
     return [_log(path, content, piece, layout, entries, names, axis) for piece in content.pieces]
 
@@ -74,9 +75,7 @@ def _log(
     file = path.name if is_first else f"{path.name} (from {piece.since:.4g} s)"
     topics, not_measured = measured_only(file, piece.topics, entries, names.valid)
     piece = replace(piece, topics=topics)
-    fields = {field: values for topic in piece.topics for field, values in topic.full_fields() if field in entries}
-    rests, at_neutral = at_rest(file, {field: values for field, values in fields.items() if entries[field].is_pulse})
-    named, told, labels = _meant(path, piece, entries, rests)
+    named, told, labels = _meant(path, piece, entries)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
     if layout.has_wrench:
@@ -84,17 +83,16 @@ def _log(
         commanded = wrench_of(path.with_name(file), topics, forces, keys)
     else:
         commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
-    extra = {of.words: of.motor for of in commanded.without_thruster}
+    without_thruster = (content.without_thruster if is_first else {}) or commanded.without_thruster
     config = piece.parameters.last("FRAME_CONFIG")
     source = commanded.sender or Source.of_several([*labels.values()])
     series = told or commanded.series
     findings = [
         *content.findings * is_first,
         *not_measured,
-        *at_neutral,
         *commanded.findings,
         *_findings(file, layout, series, labels),
-        *misfits(file, layout, commanded.without_pulse, extra, config),
+        *misfits(file, layout, commanded.without_pulse, without_thruster, config),
     ]
     channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
     used = {channel.source.topic for channel in channels} | {*commanded.topics}
@@ -117,13 +115,26 @@ def _log(
     )
 
 
+def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
+    """Move the pulses of outputs that rest elsewhere than at the usual neutral pulse to this one, and tell it."""
+    pulses: dict[str, list[Array]] = {}
+    for topic in (topic for piece in content.pieces for topic in piece.topics):
+        for field, values in topic.full_fields():
+            if field in entries and entries[field].is_pulse:
+                pulses.setdefault(field, []).append(values)
+    rests, findings = at_rest(content.file, {field: np.concatenate(parts) for field, parts in pulses.items()})
+    content.findings += findings
+    for field, rest in rests.items():
+        for part in pulses[field]:
+            part[~np.isin(part, NO_OUTPUT)] += NEUTRAL - rest
+
+
 def _meant(
-    path: Path, piece: Piece, entries: Mapping[str, Entry], rests: Mapping[str, float]
+    path: Path, piece: Piece, entries: Mapping[str, Entry]
 ) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
 
-    `rests` has the pulses of no thrust by field, µs, where they are not the usual one. Raises DataFileError where
-    numbers that are no marks are beyond any vehicle.
+    Raises DataFileError where numbers that are no marks are beyond any vehicle.
     """
     channels: list[Channel] = []
     commands: dict[str, Series] = {}
@@ -131,9 +142,7 @@ def _meant(
     for topic in piece.topics:
         for field, values in topic.full_fields():
             if entry := entries.get(field):
-                moved = rests.get(field, NEUTRAL) - NEUTRAL
-                numbers = np.where(np.isin(values, NO_OUTPUT), values, values - moved) if moved else values
-                converted = np.array([*map(entry.convert, numbers.tolist())]) if entry.convert else values
+                converted = np.array([*map(entry.convert, values.tolist())]) if entry.convert else values
                 told = np.isfinite(converted) | bool(topic.source.kind)  # NaN in a message stops a motor
                 if quantity := entry.quantity:
                     if not topic.source.kind:

@@ -149,13 +149,13 @@ def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts:
         is_sure = not sure.isdisjoint(own) or (are_pulses and _work_all_the_time([numbers[title] for title in own]))
         if "#" in name and is_sure:
             sure.update(own)
-    found = [title for title in possible if title in sure]
-    best = min(map(_grade, found), default=0)
-    found = [title for title in found if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
-    ends = {name: _ends(numbers[title]) for name, title in zip(_names(found), found, strict=True)}
-    is_pulse = any(map(_are_pulses, (numbers[title] for title in found)))
+    chosen = [title for title in possible if title in sure]
+    best = min(map(_grade, chosen), default=0)
+    chosen = [title for title in chosen if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
+    ends = {name: _ends(numbers[title]) for name, title in zip(_names(chosen), chosen, strict=True)}
+    is_pulse = any(map(_are_pulses, (numbers[title] for title in chosen)))
     kept = likely_thrusters(ends, layouts, *((NEUTRAL, _IDLE_PULSE) if is_pulse else (0.0, 0.0)))
-    return [title for name, title in zip(ends, found, strict=True) if name in kept] or [
+    return [title for name, title in zip(ends, chosen, strict=True) if name in kept] or [
         title for title in meant if _force(title) and len(numbers[title])
     ]
 

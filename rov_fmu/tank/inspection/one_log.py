@@ -30,7 +30,7 @@ def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = Fa
     """Return a log up to the first restart of its clock, and warn of what is left out. Raises FileError.
 
     Of a dive of several files, all are read, whichever is named. `is_part` is true where a log of commands alone will
-    do. The tables [columns], [topics], [dives] and [logs] of the rov.toml beside the log are obeyed.
+    do. The tables [columns], [topics], [valid], [dives] and [logs] of the rov.toml beside the log are obeyed.
     """
     names, wrong = names_of(layout, rov_file.tables)
     if wrong or not rov_file.explains_files:

@@ -34,7 +34,9 @@ Servos = Mapping[str, tuple[int, float]]
 """For each input of the vehicle that a servo drives, the number of the servo from 1 on, and 1, or -1 if reversed."""
 
 _IMPOSSIBLE, _WRITTEN, _AGREES, _NAMED = -1e6, 1000.0, 10.0, 1.0
-"""What counts for a pair of a motor and a thruster: the least of it in all pairs together is less than the next one."""
+"""The values by which motors and thrusters are matched: of a pair that is impossible, of one that `--servo` names, of
+each torque that agrees, and of a name that is the number of the motor. One of a kind outweighs all of the next kind."""
+_ADVICE = ": write --servo NUMBER=THRUSTER for each servo"
 
 
 def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Servos:
@@ -56,7 +58,7 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
         servos[key] = servo, -1.0 if name.startswith("-") else 1.0
     if frame is None and table:
         return servos
-    own = frame or next(iter(fitting(layout)), None)
+    own = frame or next(iter(fitting_frames(layout)), None)
     matched = own and _matched(layout, FRAMES[own], table)
     if not matched:
         if frame:
@@ -74,10 +76,7 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
     return free | servos
 
 
-_ADVICE = ": write --servo NUMBER=THRUSTER for each servo"
-
-
-def fitting(layout: Layout) -> list[str]:
+def fitting_frames(layout: Layout) -> list[str]:
     """Return the names of ArduSub's frames whose motors are the thrusters of a vehicle, and all that it can command."""
     count = len(layout.thrusters)
     if len(layout.commands) != count:
@@ -92,13 +91,13 @@ def config_of(frame: str) -> str:
 
 def question_of(layout: Layout) -> str:
     """Return the question whether ArduSub has the frame that fits a vehicle."""
-    own = listed(map(config_of, fitting(layout)), "or")
+    own = listed(map(config_of, fitting_frames(layout)), "or")
     return f"does ArduSub have {own}?" if own else "does FRAME_CONFIG of ArduSub fit this vehicle?"
 
 
 def motors_of(layout: Layout) -> int:
     """Return the number of the last motor that ArduSub drives in a frame that fits a vehicle; 0 if none fits."""
-    return max((_ALSO_DRIVEN.get(name, len(FRAMES[name])) for name in fitting(layout)), default=0)
+    return max((_ALSO_DRIVEN.get(name, len(FRAMES[name])) for name in fitting_frames(layout)), default=0)
 
 
 def misfits(
@@ -111,7 +110,7 @@ def misfits(
     """
     frame = [*FRAMES][int(config)] if config is not None and 0.0 <= config < len(FRAMES) else ""
     motors = FRAMES.get(frame, ())
-    fits = fitting(layout)
+    fits = fitting_frames(layout)
     if frame in fits:
         extra = {words: motor for words, motor in extra.items() if motor > motors_of(layout)}
     frames = [f"the log has {config_of(frame)}"] if frame else []

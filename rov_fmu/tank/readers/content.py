@@ -45,6 +45,8 @@ class Content:
     """A description of everything that is not recognised, by name."""
     names: frozenset[str] = frozenset()
     """All headers of a table."""
+    without_thruster: Mapping[str, int] = field(default_factory=dict)
+    """The motors of a table for which the vehicle has no thruster, by their headers."""
 
     def count(self, kind: str, count: int, **words: str | float) -> None:
         """Add a finding about something that was counted, if there is any."""

@@ -1,22 +1,26 @@
 """The files of a folder: which are logs and tables, by their content, and why the others are not read."""
 
+import os
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import groupby
 from pathlib import Path
 
-from rov_fmu.io.csv_table import DataFileError, looks_like_table
+from rov_fmu.io.csv_table import EMPTY, DataFileError, looks_like_table
 from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.readers.other_files import EMPTY, IN_FOLDER, NO_TABLE, NOT_OPENED, PICTURE
+from rov_fmu.tank.readers.other_files import PICTURE
 from rov_fmu.tank.readers.parsers import FORMAT_NAMES, TABLE, format_of
 
 BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
 _OF_SYSTEM = (BAG, "Thumbs.db", "desktop.ini")
 """The files that systems put into folders."""
+NOT_OPENED = "a device, a pipe or a link that leads nowhere is not opened"
+_NO_TABLE = "a table needs a header, and rows of numbers with commas, semicolons or tabs between the columns"
+_IN_FOLDER = "logs and tables in another folder do not count. If they belong to the tests, move them beside rov.toml"
 _MOST_NAMES = 3
 """The largest number of files with the same suffix that a sentence names one by one."""
 
@@ -34,7 +38,7 @@ class Listing:
     @property
     def findings(self) -> list[Finding]:
         """A finding for each reason why files are not read: a warning, unless nobody expects them to be read."""
-        usual = (PICTURE, EMPTY, NO_TABLE, IN_FOLDER)
+        usual = (PICTURE, EMPTY, _NO_TABLE, _IN_FOLDER)
         return [
             about(named(paths), "other files" if reason in usual else "unreadable file", reason=reason)
             for reason, paths in self.others.items()
@@ -57,13 +61,15 @@ def list_files(folder: Path, known: Collection[str] = ()) -> Listing:
     """
     listing = Listing(folder)
     for path in sorted(folder.iterdir()):
-        if (path / BAG).is_file():
+        if os.path.isfile(path / BAG):  # noqa: PTH113 (in a folder that nobody may search, there is no bag)
             listing.tests += sorted(part for part in path.iterdir() if part.name != BAG and part.is_file())
+        elif path.is_dir() and not has_usual_suffix(path):
+            if _has_tests(path):
+                listing.others.setdefault(_IN_FOLDER, []).append(path)
         elif not (_needs_no_word(path) or path.name in known):
-            reason = _why_not_read(path)
-            if reason:
+            if reason := _why_not_read(path):
                 listing.others.setdefault(reason, []).append(path)
-            elif reason is not None:
+            else:
                 listing.tests.append(path)
     return listing
 
@@ -83,27 +89,28 @@ def _needs_no_word(path: Path) -> bool:
     return False
 
 
-def _why_not_read(path: Path) -> str | None:
-    """Return why a file or folder is not read, and what to do; an empty text if it is, and None for a folder without
-    tests.
+def _has_tests(folder: Path) -> bool:
+    """Return True for a folder with a log or a table that is not hidden. One that may not be listed has none."""
+    with suppress(OSError):
+        parts = (part for part in folder.iterdir() if part.is_file() and not _needs_no_word(part))
+        return not (_needs_no_word(folder) or all(map(_why_not_read, parts)))
+    return False
+
+
+def _why_not_read(path: Path) -> str:
+    """Return why a file is not read, and what to do; an empty text if it is.
 
     What has a usual suffix is always read, so that its mistakes are told.
     """
+    if not (path.is_file() or path.is_dir()):
+        return NOT_OPENED
+    if has_usual_suffix(path):
+        return ""
     try:
-        if not (path.is_file() or path.is_dir()):
-            return NOT_OPENED
-        if has_usual_suffix(path):
-            return ""
-        if path.is_dir():
-            parts = (part for part in path.iterdir() if part.is_file() and not _needs_no_word(part))
-            has_tests = not all(map(_why_not_read, parts))
-            return IN_FOLDER if has_tests else None
         is_text = format_of(path) is TABLE
     except DataFileError as error:
         return str(error).removeprefix(f"{path}: ")
-    except OSError:  # a folder that may not be listed
-        return None
-    return NO_TABLE if is_text and not looks_like_table(path) else ""
+    return _NO_TABLE if is_text and not looks_like_table(path) else ""
 
 
 def named(paths: Iterable[Path]) -> str:

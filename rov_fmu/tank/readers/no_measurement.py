@@ -12,7 +12,7 @@ Both rules apply to the numbers as they stand in the log, before a vector is rot
 """
 
 import re
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from math import pi
@@ -32,15 +32,18 @@ from rov_fmu.tank.findings import Finding, about
 _OUTERMOST, _LEAST_OTHERS = 2, 10
 """The largest number of marks on each side of the measurements that are found at once, and the least number of other
 values whose range is known well."""
-_FAR, _FAR_VELOCITY, _FAR_ONCE, _FAR_VELOCITY_ONCE = 1.0, 3.0, 10.0, 100.0
-"""A mark is farther from all others than this many times their range. A velocity may change quickly. A number that
-occurs only once may be a short motion, or an outlier, which the fit can bear."""
+_FAR, _FAR_ONCE = {True: 3.0, False: 1.0}, {True: 100.0, False: 10.0}
+"""A mark is farther from all others than this many times their range, that of a velocity (True), which may change
+quickly, or of another quantity (False). A number that occurs only once may be a short motion, or an outlier, which the
+fit can bear."""
 _FAR_FROM_FEW = 100.0
 """A mark among few other values is farther from them than this many times their range and their size."""
 _TURN = 2.1 * pi
 """The largest range of an angle that wraps, rad."""
 _GAP_INTERVALS = 10.0
 """Between samples that are farther apart than this many usual intervals, a vehicle may move."""
+_VALID = {"valid", "validity", "invalid"}
+"""The words that make a name that of a flag."""
 _TRUE, _FALSE = ("true", "t", "yes", "valid", "ok", "a"), ("false", "f", "no", "invalid", "v")
 
 
@@ -62,9 +65,9 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
     if name in valid:
         return {quantity.removeprefix("-"): not quantity.startswith("-") for quantity in valid[name]}
     words = words_of(re.split(r"[\[(]", place or name)[0])
-    if not words & {"valid", "validity", "invalid"}:
+    if not words & _VALID:
         return {}
-    others = words - {"valid", "validity", "invalid", "is", "flag", "data", "measurement"}
+    others = words - _VALID - {"is", "flag", "data", "measurement"}
     named = {quantity for quantity in QUANTITIES if " " in quantity and {*quantity.split()} <= others}
     meant = named or {quantity for pattern, of in FLAGS for quantity in of if re.search(pattern, " ".join(others))}
     return dict.fromkeys(meant if others else QUANTITIES, "invalid" not in words)
@@ -73,10 +76,8 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
 def flag_columns(titles: Iterable[str], known: Mapping[str, LogColumn], names: Names) -> dict[str, str]:
     """Return the headers of a table that are flags of validity, by the names under which they are read."""
     is_column = KnownColumns(known_columns(known)).has
-    found = [
-        title for title in titles if flag_of(title, names.valid) and not is_column(names.columns.get(title, title))
-    ]
-    return {f"flag {n}": title for n, title in enumerate(dict.fromkeys(found))}
+    unknown = (title for title in dict.fromkeys(titles) if not is_column(names.columns.get(title, title)))
+    return {f"flag {n}": title for n, title in enumerate(unknown) if flag_of(title, names.valid)}
 
 
 @dataclass(frozen=True)
@@ -89,6 +90,12 @@ class _Flag:
     quantities: Mapping[str, bool]
     time: Array
     is_true: Flags
+
+    def denies(self, topic: Topic, quantities: Collection[str]) -> Flags:
+        """Return True at the times of a topic at which the flag says that one of these quantities is invalid."""
+        is_about = self.topic in (None, topic)
+        invalid = [not valid for name, valid in self.quantities.items() if is_about and name in quantities]
+        return np.isin(held(self.time, self.is_true, topic.time), invalid)
 
 
 def measured_only(
@@ -113,10 +120,7 @@ def measured_only(
         for place, (quantities, convert) in _measured(topic, entries).items():
             column = topic.full_name(place)
             for flag in flags:
-                for is_valid in {state for name, state in flag.quantities.items() if name in quantities}:
-                    if flag.topic in (None, topic):
-                        gone = held(flag.time, flag.is_true, topic.time) != is_valid
-                        fields[place] = without(fields[place], gone, "invalid", flag.name, column)
+                fields[place] = without(fields[place], flag.denies(topic, quantities), "invalid", flag.name, column)
             in_si = convert(fields[place])
             for mark in marks(topic.time, in_si, QUANTITIES[quantities[0]]):
                 factor, unit = in_degrees(QUANTITIES[quantities[0]].unit)
@@ -134,18 +138,16 @@ def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, tuple[Seq
 
     Components of quaternions have no marks.
     """
-    found: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
-    name, kind = topic.source.topic, topic.source.kind
+    meanings: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
     for message in reversed(MESSAGES):
-        is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
-        if is_meant and {*message.fields} <= topic.fields.keys() and message.gives != QUATERNION:
+        if message.gives != QUATERNION and topic.has(message):
             what = VECTORS.get(message.gives, (message.gives,)), partial(np.multiply, message.factor)
-            found |= dict.fromkeys(message.fields, what)
+            meanings |= dict.fromkeys(message.fields, what)
     for place in topic.fields:
         if (entry := entries.get(topic.full_name(place))) and (quantity := entry.quantity):
             convert = entry.convert
-            found[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
-    return found
+            meanings[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
+    return meanings
 
 
 def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Iterator[_Flag]:
@@ -188,10 +190,7 @@ def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterato
             distance = float(max(others[0] - outer[-1], outer[0] - others[-1]))
             body = levels[_OUTERMOST:-_OUTERMOST] if len(levels) >= 2 * _OUTERMOST + _LEAST_OTHERS else others
             size = float(np.ptp(body))
-            is_once = counts[own].min() < 2
-            factor = (
-                (_FAR_VELOCITY_ONCE if is_once else _FAR_VELOCITY) if is_velocity else _FAR_ONCE if is_once else _FAR
-            )
+            factor = (_FAR_ONCE if counts[own].min() < 2 else _FAR)[is_velocity]
             if quantity.wraps and size < _TURN:
                 if np.ptp(levels) < _TURN:
                     continue  # on a circle, it is near

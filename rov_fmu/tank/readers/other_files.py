@@ -3,10 +3,6 @@
 from pathlib import Path
 
 PICTURE = "pictures, films and documents are neither logs nor tables"
-EMPTY = "the file is empty"
-NO_TABLE = "a table needs a header, and rows of numbers with commas, semicolons or tabs between the columns"
-IN_FOLDER = "logs and tables in another folder do not count. If they belong to the tests, move them beside rov.toml"
-NOT_OPENED = "a device, a pipe or a link that leads nowhere is not opened"
 _WORKBOOK = "a workbook must first be saved as CSV, sheet by sheet"
 _PACKED = "a packed file must first be unpacked into the same folder"
 _BEGINNINGS = {

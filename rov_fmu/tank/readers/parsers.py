@@ -23,14 +23,14 @@ from typing import Any, Concatenate, ParamSpec, TextIO, TypeVar
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
-from rov_fmu.io.csv_table import DataFileError, UnreadableFileError, open_text, read_header
+from rov_fmu.io.csv_table import EMPTY, DataFileError, UnreadableFileError, open_text, read_header
 from rov_fmu.io.messages import FileError, brief, listed
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import ZSTD, read_bag, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
-from rov_fmu.tank.readers.other_files import EMPTY, reason_against
+from rov_fmu.tank.readers.other_files import reason_against
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.tank.readers.ulog import read_ulog
 

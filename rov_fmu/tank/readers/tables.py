@@ -54,10 +54,8 @@ from rov_fmu.tank.columns import (
     known_columns,
     refuse_slips,
 )
-from rov_fmu.tank.commands import at_rest
 from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
-from rov_fmu.tank.readers.ardusub_frames import misfits
 from rov_fmu.tank.readers.content import Content, Piece
 from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
 
@@ -109,9 +107,10 @@ def read_table(
     *,
     is_part: bool = False,
 ) -> tuple[Content, dict[str, Entry]]:
-    """Read a table, and return its columns in SI units, with the meaning of each. Raises DataFileError.
+    """Read a table, and return its columns, with the meaning of each. Raises DataFileError.
 
-    `open_stream` opens its lines. A part of a dive may have only commands or only motion.
+    The numbers are in SI units, but pulses whose neutral nobody states are as they stand in the file. `open_stream`
+    opens its lines. A part of a dive may have only commands or only motion.
     """
     known = columns_of_log(layout, axis, names.keys)
     flags = flag_columns(read_header(path, open_stream), known, names)
@@ -132,29 +131,21 @@ def read_table(
     refuse_slips(table, commanding)
     pulses = _pulses(table, commanding)
     unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
-    rests, told = at_rest(path.name, {name: pulses[name] for name in unstated})
-    if rests:
-        stated = {table.headers[name]: f"[us {rest:g} {names.keys.span or SPAN:g}]" for name, rest in rests.items()}
-        titles = {title: names.columns.get(title, title) for title in table.header}
-        renamed = {title: meant.partition("[")[0] + stated[meant] for title, meant in titles.items() if meant in stated}
-        names = replace(names, columns={**names.columns, **renamed})
-        content, entries = read_table(path, layout, axis, names, open_stream, is_part=is_part)
-        content.findings += told
-        return content, entries
     values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
+    values |= {name: pulses[name] for name in unstated}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
-    told += [about(path.name, kind, **words) for kind, words in table.assumed.items()]
-    content = Content(path.name, [], names=frozenset(table.header))
+    content = Content(path.name, [], names=frozenset(table.header), without_thruster=_without_thruster(table))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, pulses, names.keys.neutral)
-    content.findings += told
+    content.findings += [about(path.name, kind, **words) for kind, words in table.assumed.items()]
     _tell_headers(content, table, known)
-    content.findings += _without_thruster(table, layout)
     if unlikely:
         content.findings.append(unlikely)
-    return content, {header: entry for name, header in table.headers.items() if (entry := known[name].entry)}
+    entries = {name: entry for name in table.headers if (entry := known[name].entry)}
+    entries |= {name: replace(entries[name], convert=table.conversions[name], is_pulse=True) for name in unstated}
+    return content, {table.headers[name]: entry for name, entry in entries.items()}
 
 
 # ---- Columns ---------------------------------------------------------------------------------------------------------
@@ -318,14 +309,14 @@ def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColum
             content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
 
 
-def _without_thruster(table: Columns, layout: Layout) -> Iterator[Finding]:
-    """Yield findings about columns such as `u_7 [%]` of a log whose other commands are those of numbered thrusters."""
-    # by their numbers: headers that are read may have been renamed
-    used = {int(match[1]) for title in table.headers.values() if (match := _NUMBERED.fullmatch(title))}
-    numbers = {title: int(match[1]) for title in table.header if (match := _NUMBERED.fullmatch(title))}
-    if used:
-        extra = {shown(title): number for title, number in numbers.items() if number not in used}
-        yield from misfits(table.path.name, layout, [], extra, None)
+def _without_thruster(table: Columns) -> dict[str, int]:
+    """Return the numbers in headers such as `u_7 [%]` that are not read, although others like it are."""
+    used, all_numbers = (
+        {shown(title): int(match[1]) for title in titles if (match := _NUMBERED.fullmatch(title))}
+        for titles in (table.headers.values(), table.header)
+    )
+    unused = {title: number for title, number in all_numbers.items() if number not in used.values()}
+    return unused if used else {}
 
 
 def _unlikely_rate(table: Columns, time: Array) -> Finding | None:

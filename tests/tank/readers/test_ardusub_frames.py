@@ -17,7 +17,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import MISFITS as KINDS
 from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting, servos_of
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting_frames, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.tank.logs import commanded, read_log
@@ -102,7 +102,7 @@ def test_force_and_torque_decide_whatever_the_order_of_the_thrusters(frame: str,
     first = servos_of(with_thrusters(parts), None, {})
     assert servos_of(with_thrusters(chance.sample(parts, len(parts))), None, {}) == first
     assert servos_of(with_thrusters(parts), frame, {}) == first
-    assert frame in fitting(with_thrusters(parts))
+    assert frame in fitting_frames(with_thrusters(parts))
     for name, (number, sign) in first.items():
         own = expected[name]
         assert (motors[number - 1], sign) == (motors[own[0] - 1], own[1])

@@ -223,7 +223,7 @@ def test_outputs_beside_those_of_the_thrusters() -> None:
     """A thruster whose fraction is never a number has no output; one that is always 0 has. Rare changes are a light."""
     fractions = f"/cmd {ARRAY} . . data[0]=0,1,0,1,0 data[1]=nan,nan,nan,nan,nan data[2]=0,0,0,0,0 data[3]=1,0,1,0,1"
     found = commands_of(Path("log"), [*topics(f"{fractions} data[4]=0,0,0,0,1")], [*"abc"], Parameters(), LogKeys())
-    assert (found.without_pulse, [of.words for of in found.without_thruster]) == (["b"], ["output 4"])
+    assert (found.without_pulse, [*found.without_thruster]) == (["b"], ["output 4"])
     none = commands_of(Path("log"), [*topics(f"{SERVOS} 1 . servo1_raw=0,0")], ["a"], Parameters(), LogKeys())
     assert none.without_pulse == [], "no pulse at all is no thrust at all"
 
