@@ -122,12 +122,16 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
     return states
 
 
-def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -> tuple[Array, dict[str, Array]]:
+def checked_inputs(
+    layout: Layout, time: Array, inputs: Inputs, *, many: bool, told: set[str] | None = None
+) -> tuple[Array, dict[str, Array]]:
     """Return the times of the steps and the inputs by name, each held from one time up to the next.
 
     The times are those of the results, and those between them at which an input changes. An input is a number, or an
-    array whose last axis is time. Raises InputError. Warns about commands that saturate.
+    array whose last axis is time. Raises InputError. Warns about commands that saturate, except
+    those in `told`, and adds their names to it.
     """
+    told = set() if told is None else told
     names = _names("inputs", inputs)
     own = checked_times("inputs['time']", inputs[TIME], 1, may_repeat=True) if TIME in names else None
     times = time if own is None else np.union1d(time, np.clip(own, time[0], time[-1]))
@@ -151,18 +155,19 @@ def checked_inputs(layout: Layout, time: Array, inputs: Inputs, *, many: bool) -
                 array = np.where(place >= 0, array[..., np.maximum(place, 0)], before)
         given[name] = array
     values = with_axes(layout, given)
-    for name in filter(layout.commands.__contains__, values):
+    for name in (name for name in values if name in layout.commands and name not in told):
         for beyond in _beyond(values[name], layout.commands[name]):
+            told.add(name)
             warnings.warn(f"{name} reaches {beyond}", UserWarning, stacklevel=4)
     return times, values
 
 
-def held_inputs(layout: Layout, inputs: Mapping[str, float]) -> dict[str, float]:
+def held_inputs(layout: Layout, inputs: Mapping[str, float], told: set[str] | None = None) -> dict[str, float]:
     """Return the values of all inputs of a step, in the order of the layout: those that are given, and the usual ones.
 
-    Raises InputError. Warns about commands that saturate.
+    Raises InputError. Warns about commands that saturate, except those in `told`, and adds their names to it.
     """
-    _, values = checked_inputs(layout, np.zeros(1), inputs, many=False)
+    _, values = checked_inputs(layout, np.zeros(1), inputs, many=False, told=told)
     return {**layout.usual_inputs, **{name: value.item() for name, value in values.items()}}
 
 

@@ -220,7 +220,7 @@ class VehicleModel(Vehicle):
         return super().step(self._all_inputs(inputs), self._all_states(state), checked_length(h))
 
     def stepper(self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None) -> VehicleStepper:
-        """Return the vehicle at time 0 s, to be stepped in a loop: with the results of `simulate` to the last bit.
+        """Return the vehicle at time 0 s, to be stepped in a loop: with the states of `simulate` to the last bit.
 
         It goes on from where it was, with everything that its states do not tell, such as commands that wait for the
         dead time. `start` and `record` are those of `simulate`.

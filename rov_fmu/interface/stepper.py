@@ -18,6 +18,7 @@ class VehicleStepper:
 
     def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
         self._stepper, self._record = Stepper(vehicle, start, record), tuple(record)
+        self._saturated: set[str] = set()
 
     @property
     def time(self) -> float:
@@ -33,12 +34,13 @@ class VehicleStepper:
         """Hold inputs for h > 0 seconds, and return the recorded variables at the end, by name.
 
         `inputs` are those of `simulate` as numbers, also along axes: `stepper.step({"surge": 0.3}, 0.1)`. The other
-        inputs have their usual values.
+        inputs have their usual values. A command that saturates is told once. Thrust without lag is that of the inputs
+        that were held, as in the FMU; `simulate` has that of the inputs that begin at the same time.
 
         Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
         """
         h = checked_length(h)
-        values = [*held_inputs(self._stepper.vehicle.layout, inputs).values()]
+        values = [*held_inputs(self._stepper.vehicle.layout, inputs, self._saturated).values()]
         try:
             return dict(zip(self._record, self._stepper.step(values, h), strict=True))
         except OverflowError as error:

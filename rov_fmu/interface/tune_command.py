@@ -10,7 +10,7 @@ from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tun
 from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
 from rov_fmu.io.messages import InputError
-from rov_fmu.io.output import check_replaced, check_targets, is_same
+from rov_fmu.io.output import check_replaced, check_targets
 from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
@@ -41,7 +41,7 @@ def tune_vehicle(
     if output:
         check_targets([output], [*([points] if points else []), *vehicle.files])
         check_written(output, VEHICLE_FILE)
-        check_replaced([output], force=force or is_same(path, output))
+        check_replaced([output], force=force)
     if points is not None:
         wanted = read_points(points, vehicle, axis)
     elif command is None or V_ss is None:

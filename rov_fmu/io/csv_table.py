@@ -534,7 +534,11 @@ class _CsvFile:
                 parts[-1].add(row)
             elif len(parts) > 1:
                 odd += 1
-        if any(part.count < _FEWEST for part in parts) or odd > _MOST_ODD * sum(part.count for part in parts[1:]):
+        if (
+            len(parts) == 1
+            or any(part.count < _FEWEST for part in parts)
+            or odd > _MOST_ODD * sum(part.count for part in parts[1:])
+        ):
             return False
         places: list[int | None] = [*range(width)]
         by_width = {}

@@ -5,6 +5,7 @@ import hashlib
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
@@ -190,8 +191,9 @@ def _written() -> str:
 
 
 def _note(outputs: Iterable[Output]) -> None:
-    """Add the digests of files to the list. Without a folder for it, the next command asks for --force."""
-    with suppress(OSError, RuntimeError):
+    """Add the digests of files to the list. Warns if that fails, because the next command will ask for --force."""
+    path = Path("the user's state folder")
+    try:
         path = _list()
         path.parent.mkdir(parents=True, exist_ok=True)
         lines = "".join(f"{hashlib.sha256(output.content).hexdigest()}\n" for output in outputs)
@@ -202,6 +204,10 @@ def _note(outputs: Iterable[Output]) -> None:
             shorter.replace(path)
         with path.open("a", encoding="utf-8") as file:
             file.write(lines)
+    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no folder
+        reason = getattr(error, "strerror", None) or error
+        words = "the list of the files that rov-fmu wrote cannot be written, so that replacing them will need --force"
+        warnings.warn(f"{path}: {words}: {reason}", UserWarning, stacklevel=3)
 
 
 def _digest(text: str) -> str:

@@ -47,9 +47,10 @@ _ARDUPILOT_MOTORS = (*range(33, 41), *range(82, 86))
 """The functions of outputs of ArduPilot that drive the motors 1, 2, ... 12."""
 _PX4_MOTOR = 100
 """The function of output x of PX4 that drives motor n is n more than this."""
-_REST, _SHARE, _SELDOM = 100.0, 0.1, 0.01
+_REST, _SHARE, _SELDOM, _BRIEF = 100.0, 0.1, 0.01, 0.1
 """An output rests at its most frequent pulse, if this is nearer to 1500 us than the first number and has the second
-share of the rows at least. It does not rest at another pulse that has less than the last share."""
+share of the rows at least. It does not rest at another pulse that has less than the third share. It hardly rests there
+if that pulse has less than the last share of the rows that the most frequent one has."""
 _AT_REST, _CLEAR = 2.0, 20.0
 """Two pulses that differ by less than the first number, µs, are the same. One is clearly on a side of the other if they
 differ by more than the second."""
@@ -465,9 +466,13 @@ def at_rest(
     told = {name: level for name, level in levels.items() if abs(level - (trims.get(name) or 0.0)) < _AT_REST}
     if told and any(abs(level - NEUTRAL) >= _AT_REST for level in told.values()):
         return told, [about(file, "at rest", **_in_words(told))]
-    stays = (np.mean(np.abs(values - NEUTRAL) < _AT_REST) for values in known.values() if len(values))
-    if 2 * len(levels) <= len(pulses) or max(stays, default=1.0) >= _SELDOM:
+    stays = {name: np.mean(np.abs(values - NEUTRAL) < _AT_REST) for name, values in known.items() if len(values)}
+    if 2 * len(levels) <= len(pulses):
         return {}, []
+    if max(stays.values()) >= _SELDOM:
+        usual = {name: np.mean(known[name] == level) for name, level in levels.items()}
+        hardly = all(share < max(_SELDOM, _BRIEF * usual.get(name, 0.0)) for name, share in stays.items())
+        return {}, [about(file, "perhaps at rest", **_in_words(levels))] if hardly else []
     sides = ((known[name].min() - level, known[name].max() - level) for name, level in levels.items())
     is_two_sided = any(low < -_CLEAR and high > _CLEAR for low, high in sides)
     own = [np.abs(pulses[name] - level) < _AT_REST for name, level in levels.items()]

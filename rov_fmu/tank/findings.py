@@ -154,7 +154,7 @@ SENTENCES: dict[str, SentenceForm] = {
     ),
     "gaps": "{files}: {count:#gap} in the {quantity}: {gaps}",
     # Logs of autopilots and bags
-    "unreadable file": "{files}: left out, because it cannot be read: {reason}",
+    "unreadable file": "{files}: left out as unreadable: {reason}",
     "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",
     "source of commands": "{files}: the commands of the thrusters are those of {source}{others}",
     "source of wrench": "{files}: the forces and moments on the body are those of {source}{others}",
@@ -173,8 +173,8 @@ SENTENCES: dict[str, SentenceForm] = {
         "neutral = 1500 into [logs] of rov.toml"
     ),
     "perhaps at rest": (
-        "{files}: no output ever rests at 1500 us, which is taken as no thrust, and most stay at {rest} us. If that is "
-        "no thrust, write neutral = {key} into [logs] of rov.toml"
+        "{files}: the outputs hardly rest at 1500 us, which is taken as no thrust, and most stay at {rest} us. If that "
+        "is no thrust, write neutral = {key} into [logs] of rov.toml"
     ),
     "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",

@@ -19,9 +19,10 @@ from rov_fmu.tank.findings import Finding
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
 
-_LONG, _LONG_INTERVALS, _CHANGING = 1.0, 10.0, 0.9
+_LONG, _LONG_INTERVALS, _CHANGING, _REGULAR = 1.0, 10.0, 0.9, 2.0
 """Commands are told only where they change if more than this time passes without one, s, and more than this many
-usual intervals of the measurements, and if at least this share of the rows change a command."""
+usual intervals of the measurements, and if at least this share of the rows change a command, or if the rows are not
+regular: the upper quartile of their intervals is more than so many times the lower one."""
 
 
 @dataclass(frozen=True, order=True)
@@ -130,13 +131,15 @@ class Commands:
     def held_while(self, measured: Array) -> "Commands":
         """Return the commands with a row at each time of a measurement if they are told only where they change.
 
-        Then nearly every row is another command, and long times have none. The last command holds until the
-        measurements (s, ascending) end.
+        Then nearly every row is another command, or rows come at any time, and long times have none. The last command
+        holds until the measurements (s, ascending) end.
         """
         times = measured[measured >= self.rows[0]]
         usual = float(np.median(np.diff(times))) if len(times) > 1 else np.inf
-        longest = np.diff(self.rows, append=max(self.rows[-1], times[-1] if len(times) else -np.inf)).max()
-        if longest <= max(_LONG, _LONG_INTERVALS * usual) or len({*self.time}) < _CHANGING * len(self.rows):
+        intervals = np.diff(self.rows, append=max(self.rows[-1], times[-1] if len(times) else -np.inf))
+        lower, upper = np.quantile(intervals, (0.25, 0.75))
+        is_regular = len({*self.time}) < _CHANGING * len(self.rows) and upper <= _REGULAR * lower
+        if is_regular or intervals.max() <= max(_LONG, _LONG_INTERVALS * usual):
             return self
         rows = np.union1d(self.rows, times)
         return Commands.of_rows(self.thrusters, rows, self.at(rows), self.source)

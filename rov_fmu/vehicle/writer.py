@@ -138,21 +138,20 @@ def check_report(path: Path, report: Path) -> None:
         raise VehicleFileError(f"{report}: must be inside the folder of {path}, which names it") from error
 
 
-def write_vehicle(vehicle: Vehicle, path: Path, *, force: bool = False) -> None:
+def write_vehicle(vehicle: Vehicle, path: str | Path, *, force: bool = False) -> None:
     """Write the vehicle file. Raises VehicleFileError if it could not be read again, or OSError.
 
     `force` allows replacing a file that this program did not write, or that has changed since.
     """
-    write_whole(vehicle_output(vehicle, path), force=force)
+    write_whole(vehicle_output(vehicle, Path(path)), force=force)
 
 
 def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str, *, force: bool = False) -> None:
     """Write a copy of the vehicle file `source` with other values of some coefficients.
 
     `reason` becomes the source of the coefficients that change. A new file is a vehicle of its own: its name, its
-    identifier and so its FMU have other names than those of `source`. Everything else stays as it is. `source` itself
-    may be replaced, and `force` allows replacing others that this program did not write. Raises VehicleFileError or
-    OSError, as write_vehicle does.
+    identifier and so its FMU have other names than those of `source`. Everything else stays as it is. Raises
+    VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
     for name, value in values.items():
@@ -167,12 +166,11 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
             unit = vehicle.layout.coefficients[name].unit
             table[key] = _inline_table({"value": value, "unit": unit, "source": reason})
         _remove_estimate(document, name)
-    in_place = is_same(source, path)
-    if not in_place:
+    if not is_same(source, path):
         document["vehicle"]["identifier"] = _own_identifier(path.stem, vehicle)
         stem = "".join(c if c.isprintable() else "_" for c in path.stem)
         document["vehicle"]["name"] = f"{vehicle.name.partition(_TUNED_AS)[0][:50]}{_TUNED_AS}{stem[:30]}"
-    write_whole(_moved(document, source, path), force=force or in_place)
+    write_whole(_moved(document, source, path), force=force)
 
 
 _TUNED_AS = ", tuned: "

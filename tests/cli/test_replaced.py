@@ -249,8 +249,10 @@ def test_where_nothing_can_be_listed_files_are_written_all_the_same(
     (tmp_path / "state").touch()
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     path = tmp_path / "some.csv"
-    write_whole(Output(path, b"1"))
+    with pytest.warns(UserWarning, match="the list of the files that rov-fmu wrote cannot be written, so that"):
+        write_whole(Output(path, b"1"))
     with pytest.raises(WriteError):
         write_whole(Output(path, b"2"))
-    write_whole(Output(path, b"2"), force=True)
+    with pytest.warns(UserWarning, match="will need --force: Not a directory"):
+        write_whole(Output(path, b"2"), force=True)
     assert path.read_bytes() == b"2"

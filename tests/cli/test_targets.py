@@ -201,11 +201,15 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(
 
 
 def test_a_vehicle_may_be_tuned_in_its_place(tmp_path: Path) -> None:
+    """A file that somebody wrote by hand is replaced with --force only, as by every command."""
     rov = tmp_path / "rov.toml"
     rov.write_text(ALONE, encoding="utf-8")
     points = tmp_path / "points.csv"
     points.write_text("command [%],velocity [m/s]\n20,0.1\n30,0.2\n40,0.3\n", encoding="utf-8")
-    assert main(["tune", str(rov), "--axis", "heave", "--points", str(points), "-o", str(rov)]) == 0
+    words = ["tune", str(rov), "--axis", "heave", "--points", str(points), "-o", str(rov)]
+    assert main(words) == 2
+    assert rov.read_text(encoding="utf-8") == ALONE
+    assert [main([*words, "--force"]), main(words)] == [0, 0]
     assert load_vehicle(rov).sources["alpha_w"] == "Tuned to V_ss = 0.1 at 20%, V_ss = 0.2 at 30%, ..."
 
 

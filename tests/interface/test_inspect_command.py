@@ -426,11 +426,11 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     (tmp_path / name).write_bytes(UNREADABLE[name])
     assert main(["identify", str(tmp_path), "--draft"]) == 0
     (warning,) = capsys.readouterr().err.splitlines()
-    assert warning.startswith(f"rov-fmu: warning: {name}: left out, because it cannot be read: ")
+    assert warning.startswith(f"rov-fmu: warning: {name}: left out as unreadable: ")
     weigh(tmp_path)
     tests = load_tests(tmp_path)
     assert tests.tested.logs == ["heave"]
-    assert f"{name}: left out, because it cannot be read" in by_heading(tests.findings)["Warnings"][0]
+    assert f"{name}: left out as unreadable" in by_heading(tests.findings)["Warnings"][0]
     log.unlink()
     for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):
         assert main(["identify", *arguments]) == 2

@@ -135,7 +135,7 @@ def test_a_table_of_tank_tests_is_used_whatever_its_suffix(suffix: str, folder: 
 def test_a_text_with_numbers_that_is_no_test_does_not_stop_the_others(folder: Path) -> None:
     (folder / "frames.txt").write_text("frame,x,y\n1,2,3\n2,3,4\n")
     (line,) = [line for line in _told(folder)["Warnings"] if "frames.txt" in line]
-    assert line.startswith("frames.txt: left out, because it cannot be read: neither a log, which has a column 'time")
+    assert line.startswith("frames.txt: left out as unreadable: neither a log, which has a column 'time")
 
 
 def test_a_folder_with_many_photos_stays_readable(folder: Path) -> None:
@@ -174,7 +174,7 @@ def test_logs_in_another_folder_are_told(folder: Path) -> None:
 def test_only_files_are_opened(name: str, make: Callable[[Path], None], folder: Path) -> None:
     make(folder / name)
     assert list_files(folder).others == {"a device, a pipe or a link that leads nowhere is not opened": [folder / name]}
-    assert f"{name}: left out, because it cannot be read: a device, a pipe " in _told(folder)["Warnings"][0]
+    assert f"{name}: left out as unreadable: a device, a pipe " in _told(folder)["Warnings"][0]
     assert main(["identify", "--inspect", str(folder / name)]) == 2
 
 

@@ -166,8 +166,8 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         f"{SERVOS} 1 . servo1_raw=1540,1540,1640,1740",
         "a",
         "",
-        "a 0.1 0.1 0.35 0.6: | no output ever rests at 1500 us, which is taken as no thrust, and most stay at 1540 us. "
-        "If that is no thrust, write neutral = 1540 into [logs] of rov.toml",
+        "a 0.1 0.1 0.35 0.6: | the outputs hardly rest at 1500 us, which is taken as no thrust, and most stay at 1540 "
+        "us. If that is no thrust, write neutral = 1540 into [logs] of rov.toml",
     ),
     "neutral alone": (ONE, "a", f"neutral=1520 {SERVO1}", "0.5 -0.7"),
     "span alone": (ONE, "a", f"span=200 {SERVO1}", "1.1 -1.3"),
