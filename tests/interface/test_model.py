@@ -217,6 +217,14 @@ def test_a_command_beyond_full_saturates_with_a_warning(videoray: VehicleModel) 
     assert found["u"].tolist() == videoray.simulate(TIMES, {"u_l": [-1.0, 0.0, 1.0]})["u"].tolist()
 
 
+def test_a_stepper_tells_once_that_a_command_saturates(videoray: VehicleModel) -> None:
+    stepper = videoray.stepper()
+    with pytest.warns(UserWarning, match=r"^u_l reaches -2, which acts as -1: commands saturate at ±1$") as caught:
+        speeds = [stepper.step({"u_l": command}, 0.1)["u"] for command in (-2.0, 0.5, -3.0)]
+    assert len(caught) == 1
+    assert speeds[0] < speeds[1]
+
+
 def test_a_pulse_of_zero_is_no_signal_and_acts_as_neutral_with_a_warning(videoray: VehicleModel) -> None:
     pulses = pulsed(videoray, (1000.0, 1500.0, 2000.0))
     expected = "^u_l reaches 0: commands are pulse widths, and a pulse of 0 means that there is no signal: it acts as"

@@ -330,3 +330,9 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"length": LENGTH})
     assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"
+
+
+def test_a_line_of_numbers_before_the_header_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = _file(tmp_path, "Date:;03.05.2026;\n1;2;3\n\ncommand [%];force [N];remark\n-50;-3;ok\n50;5;ok\n")
+    with pytest.raises(DataFileError, match=r"line 2, column 3 = '3': there is no such column.*Complete the header$"):
+        read_columns(path, {"a": Column({"1": 1.0})}, others=True, loose=True, renamed={"Date:": "a [1]"})

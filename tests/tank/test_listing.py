@@ -77,7 +77,7 @@ def test_each_file_that_is_not_read_is_named_with_the_reason(folder: Path, capsy
     for name, (_, reason) in OTHERS.items():
         is_usual = reason in USUAL
         (line,) = [line for line in told["Facts" if is_usual else "Warnings"] if name in line]
-        assert f"{'not read' if is_usual else 'left out'}, because " in line
+        assert ("not read, because " if is_usual else "left out as unreadable: ") in line
         assert reason in line
         assert line in (out if is_usual else err)
     (folder / "dive.txt").write_text(LOG)

@@ -51,6 +51,27 @@ def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:
     assert several.at(np.array([2.9, 3.0, 5.9]))[:, 0].tolist() == [0.0, 0.1, -0.4]
 
 
+@pytest.mark.parametrize("repeats", [0, 3, 12])
+def test_commands_at_any_times_are_held_while_measurements_go_on_even_if_some_repeat(repeats: int) -> None:
+    random = np.random.default_rng(1)
+    rows = np.cumsum(random.uniform(0.2, 4.0, 40))
+    values = random.uniform(-0.5, 0.5, 40)
+    for n in random.choice(np.arange(1, 40), repeats, replace=False):
+        values[n] = values[n - 1]
+    measured = np.arange(0.0, rows[-1] + 5.0, 0.1)
+    one = commands(rows, {"a": values})
+    held = one.held_while(measured)
+    assert {*measured[measured >= rows[0]]} <= {*held.rows}
+    assert held.at(measured).tolist() == one.at(measured).tolist()
+
+
+def test_regular_commands_with_a_gap_stay_as_they_are() -> None:
+    """They may have changed between their rows, and during the gap."""
+    rows = np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(15.0, 25.0, 0.5)])
+    one = commands(rows, {"a": np.repeat(np.linspace(-0.5, 0.5, 10), 4)})
+    assert one.held_while(np.arange(0.0, 25.0, 0.1)) is one
+
+
 def test_rows_begin_when_each_series_has_a_value() -> None:
     rows, values = in_rows({"a": (STEPS[:3], STEPS[:3]), "b": (STEPS[1:4] + 0.05, STEPS[:3])})
     assert rows == pytest.approx([0.15, 0.2, 0.25, 0.35])

@@ -169,6 +169,12 @@ COMMANDS: dict[str, tuple[str, str, str, str]] = {
         "a 0.1 0.1 0.35 0.6: | the outputs hardly rest at 1500 us, which is taken as no thrust, and most stay at 1540 "
         "us. If that is no thrust, write neutral = 1540 into [logs] of rov.toml",
     ),
+    "one thruster that passes 1500 us and may rest elsewhere": (
+        f"{SERVOS} 1 . servo1_raw={'1540,' * 48}1500,1740",
+        "a",
+        "",
+        f"{'0.1 ' * 48}0 0.6: | the outputs hardly rest at 1500 us, which is taken as no thrust",
+    ),
     "neutral alone": (ONE, "a", f"neutral=1520 {SERVO1}", "0.5 -0.7"),
     "span alone": (ONE, "a", f"span=200 {SERVO1}", "1.1 -1.3"),
     "pulses": (f"/cmd {ARRAY} . . data[0]=800,2200,65535,0", "a", "", "-1.75 1.75 0 0"),
