@@ -68,7 +68,8 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
     if not words & _VALID:
         return {}
     others = words - _VALID - {"is", "flag", "data", "measurement"}
-    named = {quantity for quantity in QUANTITIES if " " in quantity and {*quantity.split()} <= others}
+    exact = {"velocity" if word in ("rate", "speed") else word for word in others}
+    named = {quantity for quantity in QUANTITIES if " " in quantity and {*quantity.split()} <= exact}
     meant = named or {quantity for pattern, of in FLAGS for quantity in of if re.search(pattern, " ".join(others))}
     return dict.fromkeys(meant if others else QUANTITIES, "invalid" not in words)
 

@@ -102,6 +102,8 @@ FLAGS = {
     "DepthValid [-]": "depth, pressure",
     "heading_invalid (0/1)": "-heading",
     "imu.valid": "roll angle, pitch angle, heading, roll velocity, pitch velocity, yaw velocity",
+    "yaw_rate_valid": "yaw velocity",
+    "surge speed valid": "surge velocity",
     "is_valid": ", ".join(QUANTITIES),
     "altitude_valid": "",
     "dvl": "",
