@@ -4,6 +4,7 @@ import shutil
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote, split
 
 import click
 import pytest
@@ -132,24 +133,25 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
 
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
-_TUNE = f"tune {BARE} --axis heave --command 0.3 --v-ss 0.2"
+_BARE, _FEW = quote(str(BARE)), quote(str(FEW_TESTS))
+_TUNE = f"tune {_BARE} --axis heave --command 0.3 --v-ss 0.2"
 # What each option writes, in the folder {f}. A study, an exported folder and the files beside an FMU name their files.
 WRITING = {
-    ("build", "output"): ("rov.fmu", f"build {BARE} --platform host -o {{f}}/rov.fmu"),
-    ("build", "osp"): ("bare_OspModelDescription.xml", f"build {BARE} --platform host --osp -o {{f}}/rov.fmu"),
-    ("simulate", "output"): ("run.csv", f"simulate {BARE} -o {{f}}/run.csv"),
-    ("simulate", "plot"): ("run.svg", f"simulate {BARE} --plot {{f}}/run.svg"),
-    ("fly", "output"): ("fly.html", f"fly {BARE} -o {{f}}/fly.html"),
+    ("build", "output"): ("rov.fmu", f"build {_BARE} --platform host -o {{f}}/rov.fmu"),
+    ("build", "osp"): ("bare_OspModelDescription.xml", f"build {_BARE} --platform host --osp -o {{f}}/rov.fmu"),
+    ("simulate", "output"): ("run.csv", f"simulate {_BARE} -o {{f}}/run.csv"),
+    ("simulate", "plot"): ("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
+    ("fly", "output"): ("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
     ("sitl", "log"): ("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
-    ("sdf", "output"): ("rov.sdf", f"sdf {BARE} -o {{f}}/rov.sdf"),
-    ("export", "output"): ("rov.sdf", f"export {BARE} --to sdf -o {{f}}/rov.sdf"),
+    ("sdf", "output"): ("rov.sdf", f"sdf {_BARE} -o {{f}}/rov.sdf"),
+    ("export", "output"): ("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
     ("export", "folder"): ("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
     ("prove", "report"): ("proof.html", "prove {fmu} --report {f}/proof.html"),
     ("study", "output"): ("study.html", "study {f}/plan.toml -o {f}"),
     ("study", "run"): ("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
-    ("identify", "output"): ("rov.toml", f"identify {FEW_TESTS} -o {{f}}/rov.toml"),
-    ("identify", "report"): ("report.html", f"identify {FEW_TESTS} --report {{f}}/report.html"),
-    ("identify", "mcap"): ("logs.mcap", f"identify {FEW_TESTS} --mcap {{f}}/logs.mcap"),
+    ("identify", "output"): ("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
+    ("identify", "report"): ("report.html", f"identify {_FEW} --report {{f}}/report.html"),
+    ("identify", "mcap"): ("logs.mcap", f"identify {_FEW} --mcap {{f}}/logs.mcap"),
     ("tune", "output"): ("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
 }
 READING = {
@@ -183,7 +185,7 @@ def test_no_command_replaces_the_work_of_others(
     shutil.copy(BARE, tmp_path)
     (tmp_path / name).write_bytes(b"my work")
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert main([word.format(f=tmp_path, fmu=videoray_fmu) for word in command.split()]) == 2
+    assert main([word.format(f=tmp_path, fmu=videoray_fmu) for word in split(command)]) == 2
     out, err = capsys.readouterr()
     assert (out, without_progress(err).count("\n")) == ("", 1)
     assert str(tmp_path / name) in err
@@ -196,7 +198,7 @@ def test_a_command_replaces_its_own_file_until_somebody_changes_it(
     key: tuple[str, str], tmp_path: Path, capsys: Capsys
 ) -> None:
     name, command = WRITING[key]
-    words = command.format(f=tmp_path).split()
+    words = [word.format(f=tmp_path) for word in split(command)]
     assert [main(words), main(words)] == [0, 0]
     with (tmp_path / name).open("ab") as file:
         file.write(b"\n")

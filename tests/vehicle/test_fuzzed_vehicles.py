@@ -102,16 +102,10 @@ def test_any_file_that_can_be_read_is_written_as_it_is_read(examples: int, path:
             vehicle = load_vehicle(path)
         except VehicleFileError:
             return
-        try:
-            write_vehicle(vehicle, written)
-        except VehicleFileError as error:  # a number that six digits put beyond its bounds
-            check_refusal(str(error), written)
-            return
+        write_vehicle(vehicle, written, force=True)
         again = load_vehicle(written)
-        assert again.layout == vehicle.layout
-        assert again.sources == vehicle.sources
-        for name, value in vehicle.coefficients.items():
-            assert again[name] == float(f"{value:.6g}")
+        assert again == vehicle
+        assert again.coefficients == vehicle.coefficients, "every digit"
 
     fuzz(check, examples)
 
@@ -127,16 +121,16 @@ def _name(text: str) -> Callable[[str], str]:
 # Mistakes that fuzzing rarely finds: how the text is changed, and what the line must contain.
 RARE: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
     "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("arm.R.value", "0xfff")),
-    "a key of 3000 parts": (lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'), ("vehicle.name",)),
+    "a key of 3000 parts": (
+        lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'),
+        ("name.a", "most 20"),
+    ),
     "tables in tables": (lambda text: text + "deep = " + "{a=" * 50_000, ("not TOML",)),
     "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
 }
 
 
-_SLOW = "a key of 3000 parts"
-
-
-@pytest.mark.parametrize("case", [pytest.param(c, marks=[pytest.mark.long] * (c == _SLOW)) for c in RARE])
+@pytest.mark.parametrize("case", RARE)
 def test_a_rare_mistake_is_one_clear_line(case: str, path: Path) -> None:
     change, named = RARE[case]
     path.write_text(change(TEXT), encoding="utf-8")
