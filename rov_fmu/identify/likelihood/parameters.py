@@ -78,9 +78,9 @@ USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
 """The usual time constant of the lag of thrusters, s."""
-_MOTION_STEP = 1e-6
-"""The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add one
-or two per cent at most."""
+_MOTION_STEP = 3e-6
+"""The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
+less than a per cent."""
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
 
