@@ -69,7 +69,8 @@ COMMANDS = {
 
 def without_progress(err: str) -> str:
     """Return what a command printed on stderr, without the lines about parts and runs that are done."""
-    return re.sub(r"^rov-fmu: .*(?:: done in [\d.]+ s|so far\)|[\d,]+/[\d,]+ runs, .*)\n", "", err, flags=re.M)
+    is_done = r": done in [\d.]+ s|so far(?:, about .* left)?\)|[\d,]+/[\d,]+ runs, .*"
+    return re.sub(rf"^rov-fmu: .*(?:{is_done})\n", "", err, flags=re.M)
 
 
 _DRIVER = """
