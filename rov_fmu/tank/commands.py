@@ -459,7 +459,8 @@ def at_rest(
     `pulses` has those of each output of the vehicle, and `trims` those of no thrust that the log tells, µs. A thruster
     that works all the time does not rest. But if most outputs stay at a pulse from which they depart to both sides, or
     which several have at the same time, and if none stays at 1500 us, then these are their pulses of no thrust.
-    Otherwise a reverse thrust and a load would be invented.
+    Otherwise a reverse thrust and a load would be invented. If one of them passes 1500 us now and then, this is not
+    clear enough, and there is only a finding.
     """
     known = {name: values[np.isfinite(values) & ~np.isin(values, NO_OUTPUT)] for name, values in pulses.items()}
     levels = {name: level for name, values in known.items() if (level := _usual_level(values)) is not None}
@@ -471,8 +472,8 @@ def at_rest(
         return {}, []
     if max(stays.values()) >= _SELDOM:
         usual = {name: np.mean(known[name] == level) for name, level in levels.items()}
-        hardly = all(share < max(_SELDOM, _BRIEF * usual.get(name, 0.0)) for name, share in stays.items())
-        return {}, [about(file, "perhaps at rest", **_in_words(levels))] if hardly else []
+        is_brief = all(share < max(_SELDOM, _BRIEF * usual.get(name, 0.0)) for name, share in stays.items())
+        return {}, [about(file, "perhaps at rest", **_in_words(levels))] if is_brief else []
     sides = ((known[name].min() - level, known[name].max() - level) for name, level in levels.items())
     is_two_sided = any(low < -_CLEAR and high > _CLEAR for low, high in sides)
     own = [np.abs(pulses[name] - level) < _AT_REST for name, level in levels.items()]

@@ -20,9 +20,10 @@ LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
 
 _LONG, _LONG_INTERVALS, _CHANGING, _REGULAR = 1.0, 10.0, 0.9, 2.0
-"""Commands are told only where they change if more than this time passes without one, s, and more than this many
-usual intervals of the measurements, and if at least this share of the rows change a command, or if the rows are not
-regular: the upper quartile of their intervals is more than so many times the lower one."""
+"""Commands are told only where they change if two conditions hold. Somewhere no command comes for longer than the first
+number, s, and for longer than the second number of usual intervals of the measurements. And either at least the third
+share of the rows change a command, or the rows come at irregular times: the upper quartile of their intervals is more
+than the fourth number times the lower one."""
 
 
 @dataclass(frozen=True, order=True)
