@@ -34,8 +34,8 @@ class VehicleStepper:
         """Hold inputs for h > 0 seconds, and return the recorded variables at the end, by name.
 
         `inputs` are those of `simulate` as numbers, also along axes: `stepper.step({"surge": 0.3}, 0.1)`. The other
-        inputs have their usual values. A command that saturates is told once. Thrust without lag is that of the inputs
-        that were held, as in the FMU; `simulate` has that of the inputs that begin at the same time.
+        inputs have their usual values. Each command that saturates gives one warning. Thrust without lag is that of the
+        inputs that were held, as in the FMU; `simulate` gives that of the inputs that begin at the same time.
 
         Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
         """
