@@ -113,7 +113,7 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
 def test_coefficients_stay_with_their_curve_where_names_collide() -> None:
     """Thrust astern of the curve `main` has the name of the curve `main_reverse`, which then gets a number."""
     names, keys = {"rear": "main", "top": "main_reverse"}, ("a_t", "b_t")
-    thrusters = tuple(t.model_copy(update={"curve": names[t.curve]}) for t in VIDEORAY.layout.thrusters)
+    thrusters = tuple(replace(t, curve=names[t.curve]) for t in VIDEORAY.layout.thrusters)
     curves = Curve("main", (*keys, "a_t_reverse", "b_t_reverse")), Curve("main_reverse", keys)
     both = replace(VIDEORAY.layout, thrusters=thrusters, curves=curves)
     plain = replace(both, curves=(Curve("main", keys), curves[1]))

@@ -120,10 +120,9 @@ def renamed(rov: Vehicle, names: Names) -> Vehicle:
         rov.layout,
         curves=tuple(map(named, rov.layout.curves)),
         thrusters=tuple(
-            one.model_copy(update={"name": of("driven", one.name), "curve": of("curves", one.curve)})
-            for one in rov.layout.thrusters
+            replace(one, name=of("driven", one.name), curve=of("curves", one.curve)) for one in rov.layout.thrusters
         ),
-        fins=tuple(one.model_copy(update={"name": of("driven", one.name)}) for one in rov.layout.fins),
+        fins=tuple(replace(one, name=of("driven", one.name)) for one in rov.layout.fins),
         mix={
             of("inputs", name): {of("driven", one): gain for one, gain in gains.items()}
             for name, gains in rov.layout.mix.items()
