@@ -11,7 +11,7 @@ from pathlib import Path
 from sphinx.application import Sphinx
 
 from rov_fmu import __version__
-from rov_fmu.fmu.archive import web_module
+from rov_fmu.fmu.content import web_module
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -3,7 +3,7 @@
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from os import SEEK_END
+from functools import partial
 from pathlib import Path
 from time import perf_counter
 
@@ -16,10 +16,9 @@ from rov_fmu.c.compile import (
     compile_all,
     host_platform,
 )
-from rov_fmu.fmu.archive import Content, archive, native_content, python_content, web_module
-from rov_fmu.fmu.evidence.check import check_evidence
-from rov_fmu.fmu.evidence.meta_data import META_DATA, meta_data
-from rov_fmu.fmu.evidence.signature import private_key, signature_path, signed
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.content import Content, native_content, python_content, web_module
+from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
@@ -28,12 +27,12 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
 from rov_fmu.io.reading import open_file
+from rov_fmu.prove.check import check_evidence
+from rov_fmu.prove.signature import private_key, signature_path, signed
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 BACKENDS = ("native", "pythonfmu")
-_BEGINNING, _END, _END_SIZE = b"PK\x03\x04", b"PK\x05\x06", 22
-"""How a ZIP archive begins, and how the last bytes of one without a comment begin."""
 
 
 @dataclass(frozen=True)
@@ -117,8 +116,8 @@ def build(
     files = dict(content.files)
     for name, library in binaries.items():
         files[f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}"] = library
-    files[META_DATA] = meta_data(vehicle, files)
-    packed, lost = archive(files), sorted(_platforms_in(output) - _folders(files))
+    packed = archive(files, partial(meta_data, vehicle, files))
+    lost = sorted(_platforms_in(output) - _folders(files))
     if key:
         beside.append(Output(signature_path(output), signed(packed, key)))
     checked: list[tuple[str, bool]] = []
@@ -177,11 +176,7 @@ def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[st
 def _is_as_built(path: Path) -> bool:
     """Return True if a file is an FMU of this program that nobody has changed since."""
     try:
-        with open_file(path) as file:
-            beginning = file.read(len(_BEGINNING))
-            file.seek(-_END_SIZE, SEEK_END)
-            is_whole = beginning == _BEGINNING and file.read().startswith(_END)  # nothing stands before or behind
-        return is_whole and bool(check_evidence(path).files)
+        return bool(check_evidence(path).files)
     except (FileError, InputError, ProofError):
         return False
 

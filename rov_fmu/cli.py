@@ -397,7 +397,7 @@ def _fly(
     force: bool,
 ) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.archive import web_module
+    from rov_fmu.fmu.content import web_module
     from rov_fmu.io.output import Output, sealed
     from rov_fmu.report.console import print_end
     from rov_fmu.report.page.live import Flown, fly_page
@@ -628,16 +628,15 @@ def _prove(
     from rov_fmu.report.progress import parts
 
     if report:
-        from rov_fmu.fmu.claims.claims import prove_claims
-        from rov_fmu.report.proof_page import proof_output
+        from rov_fmu.interface.prove_command import prove_with_report
 
-        check_targets([report], [fmu])
-        check_written(report, PAGE)
-        check_replaced([report], force=force)
         with parts() as shown:
-            proof = prove_claims(fmu, interface, tolerance, time_limit, key, shown.begin("checking the claims"))
-        write_whole(proof_output(proof, report), force=force)
+            begin = shown.begin("checking the claims")
+            proof = prove_with_report(
+                fmu, interface, tolerance, time_limit, key, report, force=force, on_progress=begin
+            )
         print_claims(proof)
+        print_evidence(proof.origin)
         print_end([report], "open it in a browser")
         if failed := proof.with_result("fails"):
             raise ProofError(
@@ -645,8 +644,8 @@ def _prove(
             )
         return
 
-    from rov_fmu.fmu.evidence.check import check_evidence
-    from rov_fmu.fmu.proof import prove
+    from rov_fmu.prove.check import check_evidence
+    from rov_fmu.prove.proof import prove
 
     evidence = check_evidence(fmu, key)
     with parts() as shown:

@@ -118,7 +118,7 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
 
 def _videoray(made_once: Made, folder: Path, fmi: int) -> None:
     """Build the VideoRay's FMU into a folder, and unzip it there. Its page has the same module in both versions."""
-    from rov_fmu.fmu.archive import web_module
+    from rov_fmu.fmu.content import web_module
 
     path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
     layout = load_vehicle(VIDEORAY).layout
@@ -161,7 +161,7 @@ def without_page() -> Iterator[None]:
 
 def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder."""
-    from rov_fmu.fmu.archive import native_content
+    from rov_fmu.fmu.content import native_content
 
     platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi)
     assert platform

@@ -24,6 +24,7 @@ PARTS = (
     "bridges",
     "build",
     "report",
+    "prove",
     "fmu",
     "identify",
     "tank",
@@ -56,7 +57,7 @@ MAY_IMPORT = {
 
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
-    "tests/fmu": 14,
+    "tests/fmu": 13,
     "tests/fmu/calls": 16,
     "tests/equation": 14,
 }

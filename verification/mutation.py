@@ -39,7 +39,7 @@ from xml.etree import ElementTree
 import click
 
 from rov_fmu.c.compile import C_FLAGS, UNITY_FILE, WARNINGS, compiler, fmi_headers
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.checkouts import ROOT, copy_checkout, environment
@@ -84,20 +84,20 @@ TESTS = {
     "rov_fmu/identify/findings.py": "identify/test_findings.py report/test_report.py report/test_console.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
     "rov_fmu/fmu/card.py": "fmu/results/test_card.py report/test_card.py fmu",
-    "rov_fmu/fmu/experiments.py": "cli/test_prove.py fmu",
-    "rov_fmu/fmu/proof.py": "cli/test_prove.py fmu",
-    "rov_fmu/fmu/claims/*": "fmu/claims",
+    "rov_fmu/prove/experiments.py": "cli/test_prove.py fmu",
+    "rov_fmu/prove/proof.py": "cli/test_prove.py fmu",
+    "rov_fmu/prove/*": "prove",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
     "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py identify/test_identify.py",
-    "rov_fmu/report/plots/proof.py": "fmu/claims",
+    "rov_fmu/report/plots/proof.py": "prove",
     "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
     "rov_fmu/report/page/recording.py": "tank/test_several_files.py report/fly",
     "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
-    "rov_fmu/report/proof_page.py": "fmu/claims",
+    "rov_fmu/report/proof_page.py": "prove",
     "rov_fmu/report/console_log.py": "interface/test_inspect_command.py",
     "rov_fmu/report/console_results.py": "report/test_report.py identify/test_tuning.py",
     "rov_fmu/report/console.py": "report/test_console.py cli/test_prove.py fmu/results/test_evidence.py",

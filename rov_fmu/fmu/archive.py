@@ -1,132 +1,67 @@
-"""Collect everything that goes into an FMU and zip it. The same inputs give the same bytes."""
+"""The archive of an FMU, in the one form that the builder writes.
 
-import hashlib
-import zipfile
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import partial
-from io import BytesIO
-from types import MappingProxyType
-from uuid import UUID
-
-from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
-from rov_fmu.c.source import generated_sources, unused_sources
-from rov_fmu.c.source import sources as motion_sources
-from rov_fmu.equation.layout import Layout
-from rov_fmu.fmu.model_description import build_description, model_description
-from rov_fmu.fmu.python_flavour import python_files, python_sources
-from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
-from rov_fmu.fmu.variables import interface_header, variables
-from rov_fmu.io.paths import LICENSE
-from rov_fmu.io.picture import read_png
-from rov_fmu.io.reading import read_bytes
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
-
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-REPORT = "identification.html"
-"""The name of the report in documentation/, if the vehicle file names one."""
-_EXTERNAL_DEPENDENCIES = """What the binaries need of the system, and nothing else:
-
-Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
-Windows  the Universal C Runtime, which is part of Windows since 10
-macOS    11 or newer
+The same files give the same bytes, and each of its bits follows from the files and their compressed bytes. So `prove`
+finds a bit that was changed, wherever it is.
 """
 
+import struct
+import zipfile
+from collections.abc import Callable, Iterable, Mapping
+from io import BytesIO
 
-@dataclass(frozen=True)
-class Content:
-    """Everything in an FMU except its compiled binaries."""
-
-    identifier: str
-    guid: str
-    files: Mapping[str, bytes]
-    """The content of each file by its path in the archive."""
-    sources: Mapping[str, str]
-    """The C files to compile by name; none in pure Python."""
-
-
-def native_content(
-    vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
-) -> Content:
-    """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
-    declared = variables(vehicle)
-    other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
-    left_out = (other_version, *unused_sources(vehicle.layout))
-    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
-    sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
-    sources |= generated_sources(vehicle.layout)
-    source_files = (UNITY_FILE,) if fmi == 2 else ()
-    interfaces = INTERFACES[interface]
-    describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
-    guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, interfaces)
-    files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
-    files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
-    if fmi == 3:
-        files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
-        files["documentation/externalDependencies.txt"] = _EXTERNAL_DEPENDENCIES.encode()
-    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
+FOLDER = "extra/org.fmi-standard.fmi-ls-ref"
+"""The folder of the layered standard FMI-LS-REF, with the experiments and their results."""
+MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
+META_DATA = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
+"""The path that SSP-LS-Traceability prescribes for the meta-data, which are the last file of the archive."""
+CARD = "documentation/model_card.txt"
+"""The path of the model card."""
+_EPOCH = (1980, 1, 1, 0, 0, 0)
+_UNIX, _VERSION, _UTF_8, _MODE = 3, 20, 0x800, 0o644 << 16
+"""What the headers say: the system, the version of the format, the encoding of a name, and the mode of each file."""
 
 
-def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
-    """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
-    declared = variables(vehicle)
-    sources = python_sources(vehicle, declared)
-    describe = partial(model_description, vehicle, declared, interfaces=INTERFACES["cs"], native=False)
-    guid = _guid(describe(guid=""), sources)
-    files = python_files(vehicle, sources)
-    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
+def archive(files: Mapping[str, bytes], meta_data: Callable[[bytes], bytes] | None = None) -> bytes:
+    """Return the FMU that contains these files, given by their path.
 
-
-def _guid(description: bytes, sources: Mapping[str, str]) -> str:
-    """Return a GUID that is computed from the interface and the code.
-
-    A binary can then refuse the description of another FMU.
+    `meta_data` returns the meta-data from the bytes of the archive that precede them.
     """
-    digest = hashlib.sha256(description)
-    for name, text in sorted(sources.items()):
-        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
-    return f"{{{UUID(digest.hexdigest()[:32])}}}"
-
-
-def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
-    """Return the files that FMUs in C and in Python both have, by their path."""
-    report = vehicle.provenance.report if vehicle.provenance else None
-    files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
-    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
-    if picture := vehicle.picture("model.png"):
-        read["model.png"] = read_png(picture)
-    elif ICON in pages:
-        read["model.png"] = pages[ICON]
-    terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
-    return {"modelDescription.xml": description, **terminals, **read, **pages}
-
-
-def _fmi_license(fmi: int) -> bytes:
-    """Return the licence of the FMI headers, which is a comment in them."""
-    text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
-    start = text.index("Copyright (C)")
-    lines = text[start : text.index("*/", start)].splitlines()
-    return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
-
-
-def web_module(layout: Layout) -> bytes:
-    """Return the C of the FMU's motion, unchanged, as a WebAssembly module for the page that flies the vehicle.
-
-    The page passes the coefficients to it. Raises BuildError.
-    """
-    page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
-    return compile_module(page | motion_sources(layout))
-
-
-def archive(files: Mapping[str, bytes]) -> bytes:
-    """Return the FMU that contains these files, given by their path. The same files give the same bytes."""
     packed = BytesIO()
     with zipfile.ZipFile(packed, "w") as zipped:
-        # the description comes first, so that an importer that reads a stream finds it at once
-        for member in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
-            entry = zipfile.ZipInfo(member, _EPOCH)
-            entry.create_system = 3  # Unix, also when built on Windows
-            entry.external_attr = 0o644 << 16
-            zipped.writestr(entry, files[member], zipfile.ZIP_DEFLATED, compresslevel=9)
+        # The description comes first, so that an importer that reads a stream finds it at once.
+        for name in sorted(files, key=lambda f: (f != "modelDescription.xml", f)):
+            zipped.writestr(_entry(name), files[name], zipfile.ZIP_DEFLATED, compresslevel=9)
+        if meta_data:  # Deflated, they would have bits that mean nothing.
+            zipped.writestr(_entry(META_DATA), meta_data(packed.getvalue()), zipfile.ZIP_STORED)
     return packed.getvalue()
+
+
+def _entry(name: str) -> zipfile.ZipInfo:
+    entry = zipfile.ZipInfo(name, _EPOCH)
+    entry.create_system, entry.external_attr = _UNIX, _MODE  # the same when built on Windows
+    return entry
+
+
+def _header(entry: zipfile.ZipInfo) -> bytes:
+    """Return what both headers of a file have in common, from the version needed to the lengths."""
+    name, (year, month, day, *_) = entry.orig_filename, _EPOCH
+    date = (year - 1980) << 9 | month << 5 | day
+    flags, sizes = 0 if name.isascii() else _UTF_8, (entry.CRC, entry.compress_size, entry.file_size)
+    return struct.pack("<5H3L2H", _VERSION, flags, entry.compress_type, 0, date, *sizes, len(name.encode()), 0)
+
+
+def local_header(entry: zipfile.ZipInfo) -> bytes:
+    """Return the bytes before the content of a file (APPNOTE 4.3.7)."""
+    return b"PK\3\4" + _header(entry) + entry.orig_filename.encode()
+
+
+def directory(entries: Iterable[zipfile.ZipInfo]) -> bytes:
+    """Return the bytes after the last file: the entry of each file, and the end of the directory (4.3.12, 4.3.16)."""
+    records, place = [], 0
+    for entry in entries:
+        end = struct.pack("<3H2L", 0, 0, 0, _MODE, place)
+        first = struct.pack("<4s2B", b"PK\1\2", _VERSION, _UNIX)
+        records.append(first + _header(entry) + end + entry.orig_filename.encode())
+        place += len(local_header(entry)) + entry.compress_size
+    count, size = len(records), sum(map(len, records))
+    return b"".join(records) + struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, count, count, size, place, 0)

@@ -4,7 +4,7 @@ It is made from the vehicle file alone, and is the same in the FMU's page, in th
 file documentation/model_card.txt, and in the annotations of modelDescription.xml.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from math import degrees
 from textwrap import fill
 
@@ -109,6 +109,11 @@ def read_card(text: str) -> dict[str, list[str]]:
         elif line:
             paragraphs = headings.setdefault(line, [])
     return headings
+
+
+def not_to_use(headings: Mapping[str, Sequence[str]]) -> list[str]:
+    """Return the paragraphs of a card about the axes that must not be used."""
+    return [paragraph for paragraph in headings.get("How far to trust it", ()) if ": do not use." in paragraph]
 
 
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:

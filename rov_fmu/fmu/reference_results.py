@@ -15,8 +15,8 @@ from math import hypot, isfinite, sqrt
 from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.equation.expression import compiled
-from rov_fmu.fmu.evidence.related import Related, ends_of_intervals, manifest, origin
-from rov_fmu.fmu.experiments import FOLDER, MANIFEST
+from rov_fmu.fmu.archive import FOLDER, MANIFEST
+from rov_fmu.fmu.related import Related, ends_of_intervals, manifest, origin
 from rov_fmu.io.messages import listed
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned

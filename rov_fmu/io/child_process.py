@@ -84,8 +84,8 @@ class LimitError(ChildError):
 class ChildProcess:
     """An object that lives in a process of its own, where its methods are called.
 
-    Messages are pickled. What the child process prints is dropped. Its temporary files are removed when it ends. Ctrl-C
-    in a terminal does not reach it; it ends with this process.
+    Messages are pickled. What the child process prints is dropped. It works in a folder of its own, which is removed
+    when it ends, with its temporary files. Ctrl-C in a terminal does not reach it; it ends with this process.
     """
 
     def __init__(
@@ -93,8 +93,8 @@ class ChildProcess:
     ) -> None:
         """Start the process and make the object there. Raises ChildError, and what `make` raises.
 
-        The limits hold for `make` and for each call. The time does not include the start of Python. The temporary files
-        lie in the folder `temporary`, if it is given. A process that may be killed gives one that another one removes.
+        The limits hold for `make` and for each call. The time does not include the start of Python. Its folder
+        lies in the folder `temporary`, if it is given. A process that may be killed gives one that another one removes.
         """
         self._limits = limits
         self._answers: SimpleQueue[Any] = SimpleQueue()
@@ -105,10 +105,11 @@ class ChildProcess:
         threads = {"OPENBLAS_NUM_THREADS": "1"} if limits.memory else {}
         with UNINTERRUPTED:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _PROGRAM.format(sys.path)],
+                [sys.executable, "-c", _PROGRAM.format([*map(os.path.abspath, sys.path)])],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 env={**os.environ, **places, **threads},
+                cwd=folder,
                 start_new_session=True,
             )
             self._open.enter_context(cleaned_up(self._kill))

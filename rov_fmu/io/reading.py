@@ -4,6 +4,7 @@ import errno
 import hashlib
 import os
 import stat
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,11 +18,12 @@ _PIECE = 2**20
 """The number of bytes that are hashed at a time: a file may be larger than the memory."""
 
 
-def hash_of(file: IO[bytes], kind: str) -> bytes:
-    """Return the hash of the content of an open file, of a kind that hashlib has."""
+def hash_of(file: IO[bytes], kind: str, size: int = sys.maxsize) -> bytes:
+    """Return the hash of what follows in an open file, or of its first `size` bytes, of a kind that hashlib has."""
     digest = hashlib.new(kind)
-    while piece := file.read(_PIECE):
+    while piece := file.read(min(size, _PIECE)):
         digest.update(piece)
+        size -= len(piece)
     return digest.digest()
 
 

@@ -22,9 +22,9 @@ from rov_fmu.vehicle.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from rov_fmu.fmu.claims.claims import Proof
-    from rov_fmu.fmu.evidence.check import MetaData
-    from rov_fmu.fmu.proof import Finding
+    from rov_fmu.prove.check import MetaData
+    from rov_fmu.prove.claims import Proof
+    from rov_fmu.prove.proof import Finding
 
 DEVIATION = "+.1%"
 """The format of a relative deviation."""
@@ -167,22 +167,21 @@ def print_proof(findings: "Sequence[Finding]") -> None:
 
 def print_evidence(evidence: "MetaData") -> None:
     """Print what the hashes in an FMU and its signature say, if it has any."""
-    lines = []
-    if evidence.signer:
-        lines.append(f"All {len(evidence.files)} files are as they were built. Signed with the key {evidence.signer}.")
-    elif evidence.files:
-        lines.append(f"All {len(evidence.files)} files match the hashes in the FMU, which is not signed.")
-    if lines:
-        paragraph(console(), " ".join(lines))
+    if evidence.words:
+        paragraph(console(), evidence.words)
 
 
 def print_claims(proof: "Proof") -> None:
     """Print the result and the figure of every claim about an FMU, and why a claim was not checked."""
+    from rov_fmu.fmu.card import not_to_use, read_card  # with the vehicle's modules, which few commands need
+
     found = table("", "claim", (), ("result", "figure"))
     for claim, evidence in proof.evidence:
-        reason = evidence.sentence if evidence.result in ("not checked", "does not apply") else ""
+        reason = evidence.sentence if evidence.result == "does not apply" else ""
         found.add_row(claim.name.lower(), evidence.result, evidence.figure or reason)
     print_table(found)
+    for words in not_to_use(read_card(proof.card)):
+        paragraph(console(), words)
 
 
 def _deviation(f: "Finding") -> tuple[str, str]:

@@ -12,9 +12,11 @@ import fmpy
 from markupsafe import Markup
 
 from rov_fmu import __version__
-from rov_fmu.fmu.claims.claims import Claim, Proof
-from rov_fmu.fmu.claims.measures import Evidence
+from rov_fmu.fmu.archive import META_DATA
+from rov_fmu.fmu.card import not_to_use, read_card
 from rov_fmu.io.output import Output, sealed
+from rov_fmu.prove.claims import Claim, Proof
+from rov_fmu.prove.measures import Evidence
 from rov_fmu.report.console import shell_words
 from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
@@ -49,6 +51,9 @@ def proof_page(proof: Proof, *, made: date | None = None) -> str:
     return page(
         "proof.html.j2",
         proof=proof,
+        card=(card := read_card(proof.card)),
+        not_to_use=not_to_use(card),
+        meta_data=META_DATA,
         made=made or today(),
         machine=f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors, "
         f"Python {platform.python_version()}, FMPy {fmpy.__version__}, rov-fmu {__version__}",

@@ -33,5 +33,5 @@ def _compiled_once() -> Iterator[None]:
     """Let builds of the tests in this folder compile the same sources only once."""
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("rov_fmu.build.compile_all", _compile_all)
-        patched.setattr("rov_fmu.fmu.archive.compile_module", lambda sources: _module(tuple(sources.items())))
+        patched.setattr("rov_fmu.fmu.content.compile_module", lambda sources: _module(tuple(sources.items())))
         yield

@@ -13,10 +13,9 @@ import pytest
 from pythonfmu import FmuBuilder
 
 from rov_fmu.cli import main
-from rov_fmu.fmu.evidence.meta_data import META_DATA
-from rov_fmu.fmu.experiments import FOLDER, MANIFEST
-from rov_fmu.fmu.proof import prove
+from rov_fmu.fmu.archive import FOLDER, MANIFEST, META_DATA
 from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.prove.proof import prove
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE
 
@@ -260,7 +259,7 @@ BAD: dict[str, tuple[Files, str]] = {
     "no experiments": ({_EXP: None}, f"{_EXP}: there is no such file in the FMU"),
     "a source outside": (
         {MANIFEST: '<fmiReferences><Related role="experiment" source="../../../../etc/passwd"/></fmiReferences>'},
-        "../../etc/passwd: there is no such file in the FMU",
+        f"{MANIFEST}: source = '../../../../etc/passwd' does not lead to a file in the FMU",
     ),
     "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
     "a file of 30 MB": ({_Y: "time,y\n" + "0,0\n" * 7_500_000}, f"{_Y}: has 30 MB; at most 20 MB are read"),

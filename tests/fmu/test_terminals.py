@@ -9,7 +9,7 @@ import pytest
 from lxml import etree
 
 from rov_fmu.equation.layout import Range
-from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.pictures import pictures

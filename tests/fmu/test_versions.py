@@ -15,7 +15,7 @@ from lxml import etree
 import rov_fmu
 from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.model_description import DEAD_TIME_NOTE, PYTHON_NOTE, build_description, model_description
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

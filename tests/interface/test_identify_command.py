@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import rov_fmu
-from rov_fmu.fmu.evidence.related import origin
+from rov_fmu.fmu.related import origin
 from rov_fmu.interface.identify_command import identify_folder
 from rov_fmu.io.messages import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -17,7 +17,7 @@ from rov_fmu.build import build
 from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.interface.arguments import duration_times
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import FileError, InputError

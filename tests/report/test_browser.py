@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from rov_fmu.fmu.claims.claims import prove_claims
+from rov_fmu.prove.claims import prove_claims
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from tests.report.conftest import Visit

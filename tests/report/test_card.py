@@ -7,8 +7,8 @@ from dataclasses import replace
 import pytest
 from lxml import etree, html
 
-from rov_fmu.fmu.archive import Content, native_content, python_content
 from rov_fmu.fmu.card import card, card_text
+from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.report.templates import sentence
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from lxml import html
 
-from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.templates import number

@@ -11,7 +11,7 @@ import pytest
 from lxml import html
 from PIL import Image
 
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.vehicle.shipped import VIDEORAY

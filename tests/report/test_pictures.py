@@ -13,7 +13,7 @@ from lxml import etree
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from rov_fmu.fmu.archive import Content, native_content, python_content
+from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.svg import inline_svg, with_formulas

@@ -16,7 +16,7 @@ from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE
-from rov_fmu.fmu.archive import native_content, python_content
+from rov_fmu.fmu.content import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, driven_aside, next_tests, told
 from rov_fmu.identify.result import AxisResult, Identification, Slip

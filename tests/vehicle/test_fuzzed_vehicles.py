@@ -8,7 +8,8 @@ import pytest
 from fmpy.model_description import ModelDescription, read_model_description
 from hypothesis import strategies as st
 
-from rov_fmu.fmu.archive import archive, native_content
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import read_toml
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

@@ -12,7 +12,7 @@ from fmpy.sundials.libraries import sundials_core, sundials_cvode
 from numpy.typing import NDArray
 
 from rov_fmu.c.compile import PLATFORMS, compile_all, host_platform
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.c_programs import compile_c
 

@@ -15,7 +15,7 @@ from pathlib import Path
 import click
 
 from rov_fmu.c.compile import BuildError
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, table

@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from rov_fmu.c.compile import INTERFACES
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.fmu.archive import REPORT
+from rov_fmu.fmu.archive import CARD
 from rov_fmu.fmu.card import card, card_text, reversing
+from rov_fmu.fmu.content import REPORT
 from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
@@ -58,7 +59,7 @@ def documentation(
     text = documentation_page(vehicle, native=native, fmi=fmi, interface=interface, module=module)
     return {
         "documentation/index.html": text.encode(),
-        "documentation/model_card.txt": card_text(vehicle).encode(),
+        CARD: card_text(vehicle).encode(),
         **pictures(vehicle),
     }
 

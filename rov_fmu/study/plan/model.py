@@ -7,10 +7,11 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.fmu.unpacking import unpack_fmu
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, did_you_mean, shown
 from rov_fmu.io.reading import read_bytes
+from rov_fmu.prove.description import read_description
+from rov_fmu.prove.unpacking import unpack_fmu
 
 TYPES = {
     2: {"Real": "f8", "Integer": "i4", "Enumeration": "i4", "Boolean": "i4"},
@@ -89,16 +90,17 @@ class Model:
     variables: Mapping[str, Variable]
     """The numeric variables, by name."""
 
-    def unpack(self, folder: Path) -> Any:
-        """Unpack the FMU into a folder and return FMPy's model description. Raises FileError."""
-        return unpack_fmu(BytesIO(self.content), Path(self.name), folder)
+    def unpack(self, folder: Path) -> None:
+        """Unpack the FMU into a folder. Raises FileError."""
+        unpack_fmu(BytesIO(self.content), Path(self.name), folder)
 
 
 def read_model(path: Path) -> Model:
     """Read an FMU. Raises FileError if it cannot be unpacked, or is not for Co-Simulation of FMI 2.0 or 3.0."""
     content = read_bytes(path)
     with temporary_folder("fmu-") as folder:
-        description = unpack_fmu(BytesIO(content), path, Path(folder))
+        unpack_fmu(BytesIO(content), path, Path(folder))
+        description = read_description(path, Path(folder))
     version = {"2": 2, "3": 3}.get(description.fmiVersion[:1])
     if version is None:
         raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")

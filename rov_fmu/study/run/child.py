@@ -9,8 +9,8 @@ import fmpy
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.fmu.claims.subject import DISK, MEMORY
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
+from rov_fmu.prove.description import DISK, MEMORY
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.run.simulator import Job, LoadError, RunError, Simulator
 

@@ -45,7 +45,7 @@ class _Pool:
 
     def __init__(self, job: Job, folder: Path) -> None:
         self.job = replace(job, model=replace(job.model, content=b""))
-        self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder))
+        self._folder = Path(tempfile.mkdtemp(prefix="fmu-", dir=folder)).absolute()
         job.model.unpack(self._folder)
         self._idle: list[Child] = []
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.fmu.archive import native_content
+from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.c_programs import Ended, clang, compile_c, run_program
 

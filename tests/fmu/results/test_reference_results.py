@@ -17,8 +17,7 @@ import pytest
 from lxml import etree
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.fmu.archive import archive
-from rov_fmu.fmu.experiments import FOLDER, MANIFEST
+from rov_fmu.fmu.archive import FOLDER, MANIFEST, archive
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
 from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED

@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.fmu.claims import measures
-from rov_fmu.fmu.claims.runs import Answer, Plan, RunError
-from rov_fmu.fmu.claims.subject import Subject
-from rov_fmu.fmu.experiments import Experiment
-from rov_fmu.fmu.proof import Finding
+from rov_fmu.interface.prove_command import conservation
 from rov_fmu.io.csv_table import Series
+from rov_fmu.prove import measures
+from rov_fmu.prove.experiments import Experiment
+from rov_fmu.prove.proof import Finding
+from rov_fmu.prove.runs import Answer, Plan, RunError
+from rov_fmu.prove.subject import Subject
 
 _VARIABLES = {"X_ext": "input", "u": "output", "der(u)": "local", **dict.fromkeys(("a_d_u", "F_0_u"), "parameter")}
 _HELD = Series(time=array("d", (0.0, 1.0, 1.0)), X_ext=array("d", (1.0, 1.0, -1.0)))
@@ -28,14 +29,14 @@ def subject(call: Callable[..., Any], *experiments: Experiment, **given: Any) ->
     """Return an FMU whose process answers by `call`, with a body of one axis; `given` is of its description."""
 
     class MadeUp(Subject):
-        bounds = given.pop("bounds", {"a_d_u": (0.5, inf), "F_0_u": (-inf, 4.0)})
-
         @contextmanager
         def runs(self, *_: Any, **__: Any) -> Iterator[Any]:
             yield SimpleNamespace(call=call)
 
+    bounds = given.pop("bounds", {"a_d_u": {"min": "0.5"}, "F_0_u": {"max": "4"}})
+    other = {"type": "Real", "start": "0", "nominal": "-2", "dimensions": [], "min": None, "max": None}
     variables = [
-        SimpleNamespace(name=name, causality=causality, type="Real", start="0", nominal="-2", dimensions=[])
+        SimpleNamespace(name=name, causality=causality, **{**other, "declaredType": None, **bounds.get(name, {})})
         for name, causality in _VARIABLES.items()
     ]
     times = {"startTime": "0", "stopTime": "4", "stepSize": "0.5", "tolerance": "1e-4"}
@@ -46,7 +47,7 @@ def subject(call: Callable[..., Any], *experiments: Experiment, **given: Any) ->
         "defaultExperiment": SimpleNamespace(**times),
         "generationTool": "rov-fmu 1",
     }
-    return MadeUp(Path("a.fmu"), "", SimpleNamespace(**description | given), [*experiments], None, None, 60.0, None)
+    return MadeUp(Path("a.fmu"), "", SimpleNamespace(**description | given), [*experiments], None, None, 60.0)
 
 
 def _unasked(*_: Any) -> Any:
@@ -98,7 +99,7 @@ def test_otherwise_the_default_experiment_is_run(
     ],
 )
 def test_why_an_fmu_cannot_be_run_is_told(given: Mapping[str, Any], reason: str) -> None:
-    for measure in (measures.step_size, measures.repeatability, measures.cost, measures.conservation, measures.limits):
+    for measure in (measures.step_size, measures.repeatability, measures.cost, conservation, measures.limits):
         found = measure(subject(_unasked, **given))
         assert (found.result, found.sentence) == ("does not apply", reason)
 
@@ -244,7 +245,7 @@ def _body(free: float, *braked: float) -> Callable[..., Any]:
 def test_energy_is_neither_lost_without_drag_nor_gained_with_it(
     energies: Sequence[float], result: str, words: str
 ) -> None:
-    found = measures.conservation(subject(_body(*energies)))
+    found = conservation(subject(_body(*energies)))
     assert found.result == result
     assert words in found.sentence
     if result == "holds":
@@ -266,7 +267,7 @@ def test_energy_is_not_measured_where_drag_cannot_be_switched_off() -> None:
         ),
         ({"modelVariables": fixed[:2]}, "It is known only of vehicles of rov-fmu"),
     ):
-        found = measures.conservation(subject(_unasked, **given))
+        found = conservation(subject(_unasked, **given))
         assert found.result == "does not apply"
         assert found.sentence.startswith(reason)
 
@@ -328,34 +329,6 @@ def test_a_number_without_bounds_has_none_beyond_them() -> None:
             raise RunError("cannot be run")
         return Answer(len(argument), len(argument), len(argument), "no")
 
-    found = measures.limits(subject(call, bounds={"a_d_u": (-inf, inf), "F_0_u": (-3.0, inf)}))
+    found = measures.limits(subject(call, bounds={"F_0_u": {"declaredType": SimpleNamespace(min="-3")}}))
     assert (found.rows[3][1], found.rows[4]) == ("1 of 1", ("A step of 0 s", "0 of 1", "it cannot be run"))
     assert found.figure == "4 of 8"
-
-
-# ---- What the FMU says about itself ----
-
-
-@pytest.mark.parametrize(
-    ("verdict", "result", "figure"),
-    [
-        ("good", "holds", "1 of 1 axes"),
-        ("usable", "holds", "1 of 1 axes"),
-        ("do not use", "measured", "do not use surge"),
-    ],
-)
-def test_the_errors_on_unseen_data_are_those_of_the_model_card(
-    verdict: str, result: str, figure: str, tmp_path: Path
-) -> None:
-    card = f"Model card\n\nHow far to trust it\n- surge: {verdict}. The 95% bands contain\n  90%.\n"
-    card += "- Unseen data: surge velocity: off by 0.15 m/s (RMS) in log_3.csv, and a\n  prediction of no "
-    card += "change by 1 m/s.\n"
-    (tmp_path / "documentation").mkdir()
-    (tmp_path / "documentation" / "model_card.txt").write_text(card, "utf-8")
-    found = measures.unseen(replace(subject(_unasked), folder=str(tmp_path)))
-    assert (found.result, found.figure) == (result, figure)
-    assert found.rows == [
-        ("surge velocity", "off by 0.15 m/s (RMS) in log_3.csv, and a prediction of no change by 1 m/s")
-    ]
-    assert f"Its verdicts: surge: {verdict}." in found.sentence
-    assert ("Do not use surge: The 95% bands contain 90%." in found.sentence) == (verdict == "do not use")

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.fmu.claims.runs import MESSAGE, Runs, keep_message
-from rov_fmu.fmu.claims.subject import TIME_LIMIT, Subject, opened
-from rov_fmu.fmu.experiments import Experiment
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
+from rov_fmu.prove.description import TIME_LIMIT
+from rov_fmu.prove.experiments import Experiment
+from rov_fmu.prove.runs import MESSAGE, Runs, keep_message
+from rov_fmu.prove.subject import Subject, opened
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
 """FMPy's name of each interface, by the name on the command line."""

@@ -5,16 +5,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.fmu.claims import measures
-from rov_fmu.fmu.claims.measures import Evidence
-from rov_fmu.fmu.claims.runs import RunError
-from rov_fmu.fmu.claims.subject import TIME_LIMIT, Subject, opened
-from rov_fmu.fmu.evidence.meta_data import META_DATA
-from rov_fmu.fmu.experiments import FOLDER
-from rov_fmu.fmu.proof import remedy
+from rov_fmu.fmu.archive import CARD, FOLDER
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
 from rov_fmu.io.reading import hash_of, open_file
+from rov_fmu.prove import measures
+from rov_fmu.prove.check import MetaData, check_evidence
+from rov_fmu.prove.description import TIME_LIMIT
+from rov_fmu.prove.measures import Evidence
+from rov_fmu.prove.proof import remedy
+from rov_fmu.prove.runs import RunError
+from rov_fmu.prove.subject import Subject, opened
 
 
 @dataclass(frozen=True)
@@ -47,12 +48,6 @@ CLAIMS = (
         "the same simulation, repeated in any importer",
     ),
     Claim(
-        "Conservation",
-        "Without thrust, the energy never rises; without drag, none is lost.",
-        measures.conservation,
-        "the parameters a_d, b_d, F_0, W and B in modelDescription.xml, set to 0",
-    ),
-    Claim(
         "Cost of a step",
         "A step is fast, and takes about as long each time.",
         measures.cost,
@@ -64,21 +59,8 @@ CLAIMS = (
         measures.limits,
         "min and max in modelDescription.xml; the log of the FMU",
     ),
-    Claim(
-        "Hashes and signature",
-        "The files are those that were built, and a signature says by whom.",
-        measures.integrity,
-        f"{META_DATA} in the FMU, and the file .sig beside it; rov-fmu prove FMU --key KEY.pub or "
-        "ssh-keygen -Y check-novalidate -n rov-fmu -s FMU.sig < FMU checks the signature",
-    ),
-    Claim(
-        "Unseen data",
-        "The errors on data that the fit did not see are known, and axes that must not be used are named.",
-        measures.unseen,
-        "documentation/model_card.txt in the FMU",
-    ),
 )
-"""All claims, in the order of the report. A new claim is a function in measures.py and an entry here."""
+"""The claims about any FMU, in the order of the report. A new claim is a function in measures.py and an entry here."""
 
 
 @dataclass(frozen=True)
@@ -90,8 +72,10 @@ class Proof:
     """The SHA-256 of the file."""
     description: Any
     """FMPy's description of the FMU."""
-    card: dict[str, list[str]]
-    """The model card, by its headings; empty if the FMU has none."""
+    origin: MetaData
+    """What its hashes and the signature beside it say."""
+    card: str
+    """The text of the model card of an FMU of ours; empty if the FMU has none."""
     evidence: Sequence[tuple[Claim, Evidence]]
 
     def with_result(self, result: measures.Result) -> list[tuple[Claim, Evidence]]:
@@ -105,22 +89,26 @@ def prove_claims(
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
     key: Path | None = None,
+    claims: Sequence[Claim] = CLAIMS,
     on_progress: Progress = silent,
 ) -> Proof:
-    """Check all claims about an FMU of any exporter, and return the evidence.
+    """Check claims about an FMU of any exporter, and return the evidence.
 
     The arguments are those of `prove` and of `check_evidence`; only the expected results can use Model Exchange. An FMU
     that ends its process or exceeds a limit fails the claim that was checked, and the others are checked all the same.
-    Raises FileError.
+    Raises what `check_evidence` raises, before the FMU is run, and FileError.
     """
-    with opened(fmu, interface, tolerance, time_limit, key) as subject:
+    origin = check_evidence(fmu, key)
+    with opened(fmu, interface, tolerance, time_limit) as subject:
         evidence = []
-        for n, claim in enumerate(CLAIMS):
-            on_progress(claim.name.lower(), n / len(CLAIMS))
+        for n, claim in enumerate(claims):
+            on_progress(claim.name.lower(), n / len(claims))
             evidence.append((claim, _checked(claim, subject)))
         with open_file(fmu) as file:
             sha256 = hash_of(file, "sha256").hex()
-        return Proof(fmu, sha256, subject.description, measures.card_of(subject), evidence)
+        card = Path(subject.folder, CARD)
+        text = card.read_text(encoding="utf-8", errors="replace") if card.is_file() else ""
+        return Proof(fmu, sha256, subject.description, origin, text, evidence)
 
 
 def _checked(claim: Claim, subject: Subject) -> Evidence:

@@ -9,26 +9,22 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.fmu.claims.runs import NUMBERS, Plan, Runs
-from rov_fmu.fmu.experiments import (
+from rov_fmu.io.child_process import ChildProcess, Limits
+from rov_fmu.io.file_kinds import FMU, check_suffix
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError
+from rov_fmu.prove.description import DISK, MEMORY, TIME_LIMIT, read_description
+from rov_fmu.prove.experiments import (
     DEFAULT_STEPS,
     DEFAULT_TOLERANCE,
     MOST_STEPS,
     Experiment,
     NoResultsError,
-    ReferenceResults,
+    read_experiments,
 )
-from rov_fmu.fmu.unpacking import unpack_fmu
-from rov_fmu.io.child_process import ChildProcess, Limits
-from rov_fmu.io.file_kinds import FMU, check_suffix
-from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError
-from rov_fmu.io.reading import read_bytes, root_of_xml
+from rov_fmu.prove.runs import NUMBERS, Plan, Runs
+from rov_fmu.prove.unpacking import unpack_fmu
 
-TIME_LIMIT = 60.0
-"""The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
-MEMORY, DISK = 4_000_000_000, 1_000_000_000
-"""The address space of the process of an FMU and the size of each file that it writes, in bytes (Linux)."""
 _TOOL = "rov-fmu "
 """The beginning of the generation tool of our FMUs."""
 
@@ -48,8 +44,6 @@ class Subject:
     tolerance: float | None
     """The relative tolerance of results in place of those of the experiments, or None."""
     time_limit: float
-    key: Path | None
-    """The file of the public key that must have signed the FMU; None if any key may have."""
 
     @cached_property
     def variables(self) -> dict[str, Any]:
@@ -61,16 +55,11 @@ class Subject:
         own = [v for v in self.variables.values() if v.causality == causality and v.type in types]
         return [v.name for v in own if not getattr(v, "dimensions", None)]
 
-    @cached_property
-    def bounds(self) -> dict[str, tuple[float, float]]:
-        """The least and the largest value of each variable, by name. FMPy does not read those of FMI 3.0."""
-        root = root_of_xml(read_bytes(Path(self.folder, "modelDescription.xml")))
-        types = {one.get("name"): _attributes(one) for one in root.iterfind("TypeDefinitions/*")}
-        bounds = {}
-        for own in map(_attributes, root.iterfind("ModelVariables/*")):
-            given = types.get(own.get("declaredType"), {}) | own
-            bounds[own["name"]] = float(given.get("min", -inf)), float(given.get("max", inf))
-        return bounds
+    def bounds(self, name: str) -> tuple[float, float]:
+        """Return the least and the largest value of a variable, which may be those of its type."""
+        of = self.variables[name]
+        low, high = (getattr(of, key) or getattr(of.declaredType, key, None) for key in ("min", "max"))
+        return float(low or -inf), float(high or inf)
 
     @property
     def is_ours(self) -> bool:
@@ -138,7 +127,6 @@ def opened(
     interface: str | None = None,
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
-    key: Path | None = None,
     *,
     needs_results: bool = False,
 ) -> Iterator[Subject]:
@@ -149,25 +137,17 @@ def opened(
     import fmpy
 
     check_suffix(fmu, FMU)
-    accepted = suppress(*([] if needs_results else [NoResultsError]))
     experiments: list[Experiment] = []
     with temporary_folder("fmu-") as folder:
-        results = None
-        with accepted:
-            results = ReferenceResults(fmu)
-        description = unpack_fmu(fmu, fmu, Path(folder))
-        with accepted:
-            experiments = results.experiments(description) if results else []
+        unpack_fmu(fmu, fmu, Path(folder))
+        description = read_description(fmu, Path(folder))
+        with suppress(*([] if needs_results else [NoResultsError])):
+            experiments = read_experiments(fmu, Path(folder), description)
         platforms = fmpy.supported_platforms(folder)
         if fmpy.platform not in platforms:
             has = ", ".join(platforms) or "none"
             raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {has}")
-        yield Subject(fmu, folder, description, experiments, interface, tolerance, time_limit, key)
-
-
-def _attributes(element: Any) -> dict[str, str]:
-    """Return the attributes of a variable or of a type, which in FMI 2.0 belong to an element inside it."""
-    return {name: text for one in (element, *element.iterchildren("*")) for name, text in reversed(one.attrib.items())}
+        yield Subject(fmu, folder, description, experiments, interface, tolerance, time_limit)
 
 
 def _pieces(experiment: Experiment) -> tuple[tuple[float, Mapping[str, float]], ...]:

@@ -9,32 +9,40 @@ from collections.abc import Iterator, Mapping
 from functools import cache
 from hashlib import sha3_256
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rov_fmu import __version__
+from rov_fmu.fmu.archive import META_DATA
 from rov_fmu.io.paths import FMU_SRC
 from rov_fmu.io.templates import render
-from rov_fmu.vehicle.vehicle import Vehicle
 
-META_DATA = "extra/org.ssp-standard.ssp-traceability.srmd/resourceMetaData.srmd"
-"""The path in the FMU that the standard prescribes."""
-FILES, INPUTS, GENERATOR = "rov-fmu.files", "rov-fmu.inputs", "rov-fmu.generator"
-"""The classifications: the files of the FMU, the files that identification read, and the program. Each entry has a
-name and a hash."""
+if TYPE_CHECKING:
+    from rov_fmu.vehicle.vehicle import Vehicle
+
+FILES, INPUTS, GENERATOR, ARCHIVE = "rov-fmu.files", "rov-fmu.inputs", "rov-fmu.generator", "rov-fmu.archive"
+"""The classifications: the files of the FMU, the files that identification read, the program, and the bytes of the
+archive before the meta-data. Each entry has a name and a hash."""
+BEFORE = "bytes before this file"
+"""The name of the entry in ARCHIVE. Its hash shows a change of bits that change no file, such as a date."""
 _ZEROS = "0" * 64
 _OWN_HASH = re.compile(rb'(keyword="' + re.escape(META_DATA).encode() + rb'">)[^<]*')
-_PACKAGE = Path(__file__).parents[2]
+_PACKAGE = Path(__file__).parents[1]
 _SOURCES = (".py", ".c", ".h", ".js", ".j2")
 """The kinds of files that the program consists of."""
 
 
-def meta_data(vehicle: Vehicle, files: Mapping[str, bytes]) -> bytes:
-    """Return the document for an FMU that has these other files. The same files give the same bytes."""
+def meta_data(vehicle: "Vehicle", files: Mapping[str, bytes], before: bytes) -> bytes:
+    """Return the document for an FMU that has these other files.
+
+    `before` are the bytes of the archive that precede the document. The same files give the same bytes.
+    """
     made, generator = vehicle.provenance, f"rov-fmu {__version__}"
     hashes = [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())]
     classifications = {
         FILES: [*hashes, (META_DATA, _ZEROS)],
         INPUTS: [(name, f"{made.hash}: {digest}") for name, digest in made.inputs.items()] if made else [],
         GENERATOR: [(generator, generator_hash())],
+        ARCHIVE: [(BEFORE, sha3_256(before).hexdigest())],
     }
     given = {"vehicle": vehicle, "generator": generator, "classifications": classifications}
     document = render("resourceMetaData.srmd.j2", **given).encode()

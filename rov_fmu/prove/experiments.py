@@ -1,24 +1,21 @@
-"""Read the experiments that any FMU may contain. Their format is the layered standard FMI-LS-REF."""
+"""Read the experiments in an unpacked FMU of any exporter. Their format is the layered standard FMI-LS-REF."""
 
 import posixpath
-import zipfile
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
-from io import BytesIO, StringIO
+from io import StringIO
 from pathlib import Path
 from typing import Any
 from urllib.parse import unquote, urlsplit
 
 from lxml import etree
 
+from rov_fmu.fmu.archive import MANIFEST
 from rov_fmu.io.csv_table import Series, finite, read_series
 from rov_fmu.io.messages import FileError, shown
-from rov_fmu.io.reading import read_bytes, root_of_xml
+from rov_fmu.io.reading import root_of_xml
 
-NAME = "org.fmi-standard.fmi-ls-ref"
-FOLDER = f"extra/{NAME}"
-MANIFEST = f"{FOLDER}/fmi-ls-manifest.xml"
 DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
 DEFAULT_STEPS = 500
@@ -55,6 +52,7 @@ class _Member:
     """A file in the FMU."""
 
     fmu: Path
+    folder: Path
     path: str
 
     def __str__(self) -> str:
@@ -76,46 +74,68 @@ class _Member:
             parts = urlsplit(source or "")
         except ValueError:
             parts = urlsplit("")
-        if not parts.path or parts.scheme or parts.netloc or parts.path.startswith("/"):
+        path = posixpath.normpath(posixpath.join(posixpath.dirname(self.path), unquote(parts.path)))
+        is_outside = path.startswith(("..", "/")) or any(c in path for c in "\\:\0")
+        if not parts.path or parts.scheme or parts.netloc or is_outside:
             raise self.error(f"source = {shown(source)} does not lead to a file in the FMU")
-        return _Member(self.fmu, posixpath.normpath(posixpath.join(posixpath.dirname(self.path), unquote(parts.path))))
+        return _Member(self.fmu, self.folder, path)
+
+    def text(self) -> str:
+        """Return the text in this file. Raises FileError."""
+        path = self.folder / self.path
+        if not path.is_file():
+            raise self.error("there is no such file in the FMU")
+        if (size := path.stat().st_size) > _MOST_BYTES:
+            raise self.error(f"has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
+        try:
+            return path.read_bytes().decode("utf-8-sig")
+        except UnicodeDecodeError as error:
+            raise self.error(f"not UTF-8 text, at byte {error.start}") from error
+
+    def xml(self, root: str) -> Any:
+        """Return the root element of this file, which must have the name `root`."""
+        try:
+            element = root_of_xml(self.text().encode())
+        except etree.XMLSyntaxError as error:
+            raise self.error(f"not XML: {error}") from error
+        if (name := etree.QName(element).localname) != root:
+            raise self.error(f"must begin with <{root}>, and not with <{name}>")
+        return element
 
 
-class ReferenceResults:
-    """The reference results in an FMU that can be unpacked. All methods raise FileError."""
+def read_experiments(fmu: Path, folder: Path, description: Any) -> list[Experiment]:
+    """Return all experiments in an unpacked FMU except those of uncertainty analyses.
 
-    def __init__(self, fmu: Path) -> None:
-        self._manifest = _Member(fmu, MANIFEST)
+    `description` is FMPy's description of the FMU. Raises FileError, which names the FMU by the path `fmu`.
+    """
+    manifest = _Member(fmu, folder, MANIFEST)
+    if not Path(folder, MANIFEST).is_file():
+        raise NoResultsError(f"{manifest}: there is no such file: the FMU carries no reference results")
+    reader = _Reader({v.name: v for v in description.modelVariables}, description.defaultExperiment)
+    experiments: list[Experiment] = []
+    for related in manifest.xml("fmiReferences").iterfind("{*}Related"):
+        role, _, purpose = related.get("role", "").partition("/")
+        if role == "experiment" and purpose != "uncertainty-analysis":
+            experiments += reader.read(manifest.resolve(related.get("source")))
+    if len(experiments) > _MOST_EXPERIMENTS:
+        raise manifest.error(f"names {len(experiments)} experiments; at most {_MOST_EXPERIMENTS} are run")
+    if not any(experiment.references for experiment in experiments):
+        raise NoResultsError(f"{manifest}: names no experiment with expected results")
+    return experiments
+
+
+class _Reader:
+    """The files of the experiments of an FMU. All methods raise FileError."""
+
+    def __init__(self, variables: Mapping[str, Any], default: Any) -> None:
+        """`variables` are FMPy's variables by name, and `default` is the default experiment of the FMU."""
+        self._variables, self._default = variables, default
         self._read_series: dict[str, Series] = {}
         """The CSV files by their path, because many experiments may have the same one."""
-        try:
-            self._archive = zipfile.ZipFile(BytesIO(read_bytes(fmu)))
-        except zipfile.BadZipFile as error:
-            raise FileError(f"{fmu}: is not an FMU, or is damaged: {error}") from error
-        if MANIFEST not in self._archive.namelist():
-            raise NoResultsError(f"{self._manifest}: there is no such file: the FMU carries no reference results")
 
-    def experiments(self, description: Any) -> list[Experiment]:
-        """Return all experiments except those of uncertainty analyses.
-
-        `description` is FMPy's description of the FMU.
-        """
-        variables = {v.name: v for v in description.modelVariables}
-        experiments: list[Experiment] = []
-        for related in self._xml(self._manifest, "fmiReferences").iterfind("{*}Related"):
-            role, _, purpose = related.get("role", "").partition("/")
-            if role == "experiment" and purpose != "uncertainty-analysis":
-                member = self._manifest.resolve(related.get("source"))
-                experiments += self._read(member, description.defaultExperiment, variables)
-        if len(experiments) > _MOST_EXPERIMENTS:
-            raise self._manifest.error(f"names {len(experiments)} experiments; at most {_MOST_EXPERIMENTS} are run")
-        if not any(experiment.references for experiment in experiments):
-            raise NoResultsError(f"{self._manifest}: names no experiment with expected results")
-        return experiments
-
-    def _read(self, member: _Member, default: Any, variables: Mapping[str, Any]) -> Iterator[Experiment]:
+    def read(self, member: _Member) -> Iterator[Experiment]:
         """Read a file of experiments."""
-        for element in self._xml(member, "Experiments").iterfind("{*}Experiment"):
+        for element in member.xml("Experiments").iterfind("{*}Experiment"):
             name = element.get("name", "")
             where = f"experiment {shown(name)}"
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
@@ -128,7 +148,7 @@ class ReferenceResults:
             numbers = {
                 key: member.number(str(text), f"{where}: {key}")
                 for key in ("startTime", "stopTime", "stepSize", "tolerance")
-                if (text := given.get(key, getattr(default, key, None))) is not None
+                if (text := given.get(key, getattr(self._default, key, None))) is not None
             }
             start = numbers.get("startTime", 0.0)
             stop = numbers.get("stopTime", start + 1.0)
@@ -137,18 +157,18 @@ class ReferenceResults:
             if reason := _why_not_run(start, stop, step, tolerance):
                 raise member.error(f"{where}: {reason}")
             files = {part: member.resolve(one.get("source")) for part, one in parts.items()}
-            parameters = self._parameters(files["Parameters"], variables) if "Parameters" in files else {}
+            parameters = self._parameters(files["Parameters"]) if "Parameters" in files else {}
             stimuli, references = (
-                self._series(files[part], variables) if part in files else None for part in ("Stimuli", "References")
+                self._series(files[part]) if part in files else None for part in ("Stimuli", "References")
             )
             yield Experiment(name, start, stop, step, tolerance, parameters, stimuli, references)
 
-    def _parameters(self, member: _Member, variables: Mapping[str, Any]) -> dict[str, str]:
+    def _parameters(self, member: _Member) -> dict[str, str]:
         """Read a parameter set in the format of SSP, and return its values as text by name."""
         values = {}
-        for element in self._xml(member, "ParameterSet").iter("{*}Parameter"):
+        for element in member.xml("ParameterSet").iter("{*}Parameter"):
             name, value = element.get("name", ""), next(iter(element), None)
-            if not (variable := variables.get(name)):
+            if not (variable := self._variables.get(name)):
                 raise member.error(f"the FMU has no variable {shown(name)}")
             if value is None or value.get("value") is None:
                 raise member.error(f"parameter {shown(name)}: has no value")
@@ -159,11 +179,11 @@ class ReferenceResults:
                 member.number(values[name], f"parameter {shown(name)}")
         return values
 
-    def _series(self, member: _Member, variables: Mapping[str, Any]) -> Series:
+    def _series(self, member: _Member) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
         def why_wrong(name: str) -> str | None:
-            if not (variable := variables.get(name)):
+            if not (variable := self._variables.get(name)):
                 return "the FMU has no such variable"
             if variable.type in _NON_NUMERIC or getattr(variable, "dimensions", None):
                 return "the variable is not a single number"
@@ -171,29 +191,9 @@ class ReferenceResults:
 
         if member.path not in self._read_series:
             self._read_series[member.path] = read_series(
-                str(member), why_wrong, partial(StringIO, self._text(member), newline="")
+                str(member), why_wrong, partial(StringIO, member.text(), newline="")
             )
         return self._read_series[member.path]
-
-    def _text(self, member: _Member) -> str:
-        try:
-            if (size := self._archive.getinfo(member.path).file_size) > _MOST_BYTES:
-                raise member.error(f"has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
-            return self._archive.read(member.path).decode("utf-8-sig")
-        except KeyError:
-            raise member.error("there is no such file in the FMU") from None
-        except UnicodeDecodeError as error:
-            raise member.error(f"not UTF-8 text, at byte {error.start}") from error
-
-    def _xml(self, member: _Member, root: str) -> Any:
-        """Return the root element of an XML file, which must have the name `root`."""
-        try:
-            element = root_of_xml(self._text(member).encode())
-        except etree.XMLSyntaxError as error:
-            raise member.error(f"not XML: {error}") from error
-        if (name := etree.QName(element).localname) != root:
-            raise member.error(f"must begin with <{root}>, and not with <{name}>")
-        return element
 
 
 def _why_not_run(start: float, stop: float, step: float, tolerance: float) -> str:

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from math import exp
 from pathlib import Path
 
-from rov_fmu.fmu.evidence.meta_data import META_DATA
-from rov_fmu.fmu.experiments import FOLDER
+from rov_fmu.fmu.archive import FOLDER, META_DATA
 from rov_fmu.io.paths import name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.templates import render

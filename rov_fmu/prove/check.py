@@ -1,19 +1,19 @@
 """Whether an FMU is as it was built: the hashes in its meta-data, and the signature beside it."""
 
 import zipfile
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from lxml import etree
 
-from rov_fmu.fmu.evidence.meta_data import FILES, GENERATOR, INPUTS, META_DATA, own_hash
-from rov_fmu.fmu.evidence.signature import check_signature
-from rov_fmu.fmu.unpacking import refusal
+from rov_fmu.fmu.archive import META_DATA, directory, local_header
+from rov_fmu.fmu.meta_data import ARCHIVE, BEFORE, FILES, GENERATOR, INPUTS, own_hash
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.messages import FileError, ProofError, brief, shown
 from rov_fmu.io.reading import hash_of, open_file, root_of_xml
+from rov_fmu.prove.signature import check_signature
+from rov_fmu.prove.unpacking import check_order, opened_archive
 
 _MOST_BYTES = 20_000_000
 """The largest size of the meta-data."""
@@ -29,8 +29,17 @@ class MetaData:
     """The hash of each file that identification read, by its name: `SHA3-256: 5f1c...`."""
     generator: Mapping[str, str] = field(default_factory=dict)
     """The SHA3-256 of the program that built the FMU, by its name and version."""
+    before: str = ""
+    """The SHA3-256 of the bytes of the archive before the meta-data."""
     signer: str = ""
     """The fingerprint of the key that signed the FMU; empty if there is no signature."""
+
+    @property
+    def words(self) -> str:
+        """What the hashes and the signature say; empty if the FMU has neither."""
+        if self.signer:
+            return f"All {len(self.files)} files are as they were built. Signed with the key {self.signer}."
+        return f"All {len(self.files)} files match the hashes in the FMU, which is not signed." if self.files else ""
 
 
 def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
@@ -43,18 +52,12 @@ def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
     """
     check_suffix(fmu, FMU)
     evidence = MetaData()
-    try:
-        with open_file(fmu) as file, zipfile.ZipFile(file) as archive:
-            if reason := refusal(archive):
-                raise FileError(f"{fmu}: {reason}")
-            if META_DATA in archive.namelist():
-                evidence = _read(fmu, archive)
-                if evidence != MetaData() and (change := next(_changes(archive, evidence.files), "")):
-                    raise ProofError(f"{fmu}: {change}")
-    except (FileError, ProofError):
-        raise
-    except Exception as error:  # zipfile raises many kinds on damaged archives
-        raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error
+    with open_file(fmu) as file, opened_archive(file, fmu) as archive:
+        if META_DATA in archive.namelist():
+            evidence = _read(fmu, archive)
+            if evidence != MetaData() and (change := next(_changes(archive, evidence), "")):
+                raise ProofError(f"{fmu}: {change}")
+        check_order(archive, fmu)
     return replace(evidence, signer=check_signature(fmu, key))
 
 
@@ -74,15 +77,16 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
         }
         for classification in root.iterfind("{*}Classification")
     }
-    return MetaData(entries.get(FILES, {}), entries.get(INPUTS, {}), entries.get(GENERATOR, {}))
+    before = entries.get(ARCHIVE, {}).get(BEFORE, "")
+    return MetaData(entries.get(FILES, {}), entries.get(INPUTS, {}), entries.get(GENERATOR, {}), before)
 
 
-def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str]:
-    """Yield a line about each file that is not what the meta-data say; the meta-data themselves come first."""
-    members = [name for name in archive.namelist() if not name.endswith("/")]
-    for name, times in Counter(archive.namelist()).items():
-        if times > 1:
-            yield f"{shown(name)} is {times} times in the archive"
+def _changes(archive: zipfile.ZipFile, evidence: MetaData) -> Iterator[str]:
+    """Yield a line about each file that is not what the meta-data say; the meta-data themselves come first.
+
+    Then follows a line if other bytes are not those that the builder writes, such as a date or an attribute.
+    """
+    members, files = [name for name in archive.namelist() if not name.endswith("/")], evidence.files
     for name in sorted({*members, *files}, key=lambda name: (name != META_DATA, name)):
         if name not in members:
             yield f"{shown(name)} is missing; it was there when the FMU was built"
@@ -91,6 +95,13 @@ def _changes(archive: zipfile.ZipFile, files: Mapping[str, str]) -> Iterator[str
         elif (digest := _hash(archive, name)) != (given := files.get(name, "unknown")):
             differs = f"its SHA3-256 is {digest[:16]}…, and was {given[:16]}…" if digest else "it is damaged"
             yield f"{shown(name)} was altered after the FMU was built: {differs}"
+    entry, file = archive.getinfo(META_DATA), archive.fp
+    assert file
+    expected = local_header(entry) + archive.read(entry) + directory(archive.infolist())
+    file.seek(0)
+    before = hash_of(file, "sha3_256", entry.header_offset).hex()
+    if before != evidence.before or file.read(len(expected) + 1) != expected:
+        yield "the archive was altered after the FMU was built, although its files are the same"
 
 
 def _hash(archive: zipfile.ZipFile, name: str) -> str:

@@ -1,0 +1,116 @@
+"""Collect everything that goes into an FMU. The same inputs give the same bytes."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from uuid import UUID
+
+from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
+from rov_fmu.c.source import generated_sources, unused_sources
+from rov_fmu.c.source import sources as motion_sources
+from rov_fmu.equation.layout import Layout
+from rov_fmu.fmu.model_description import build_description, model_description
+from rov_fmu.fmu.python_flavour import python_files, python_sources
+from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
+from rov_fmu.fmu.variables import interface_header, variables
+from rov_fmu.io.paths import LICENSE
+from rov_fmu.io.picture import read_png
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
+
+REPORT = "identification.html"
+"""The name of the report in documentation/, if the vehicle file names one."""
+_EXTERNAL_DEPENDENCIES = """What the binaries need of the system, and nothing else:
+
+Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
+Windows  the Universal C Runtime, which is part of Windows since 10
+macOS    11 or newer
+"""
+
+
+@dataclass(frozen=True)
+class Content:
+    """Everything in an FMU except its compiled binaries."""
+
+    identifier: str
+    guid: str
+    files: Mapping[str, bytes]
+    """The content of each file by its path in the archive."""
+    sources: Mapping[str, str]
+    """The C files to compile by name; none in pure Python."""
+
+
+def native_content(
+    vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
+) -> Content:
+    """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
+    declared = variables(vehicle)
+    other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
+    left_out = (other_version, *unused_sources(vehicle.layout))
+    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
+    sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
+    sources |= generated_sources(vehicle.layout)
+    source_files = (UNITY_FILE,) if fmi == 2 else ()
+    interfaces = INTERFACES[interface]
+    describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
+    guid = _guid(describe(guid=""), sources)
+    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, interfaces)
+    files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
+    files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
+    if fmi == 3:
+        files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
+        files["documentation/externalDependencies.txt"] = _EXTERNAL_DEPENDENCIES.encode()
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
+
+
+def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
+    """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
+    declared = variables(vehicle)
+    sources = python_sources(vehicle, declared)
+    describe = partial(model_description, vehicle, declared, interfaces=INTERFACES["cs"], native=False)
+    guid = _guid(describe(guid=""), sources)
+    files = python_files(vehicle, sources)
+    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
+
+
+def _guid(description: bytes, sources: Mapping[str, str]) -> str:
+    """Return a GUID that is computed from the interface and the code.
+
+    A binary can then refuse the description of another FMU.
+    """
+    digest = hashlib.sha256(description)
+    for name, text in sorted(sources.items()):
+        digest.update(name.encode() + b"\0" + text.encode() + b"\0")
+    return f"{{{UUID(digest.hexdigest()[:32])}}}"
+
+
+def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the files that FMUs in C and in Python both have, by their path."""
+    report = vehicle.provenance.report if vehicle.provenance else None
+    files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
+    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
+    if picture := vehicle.picture("model.png"):
+        read["model.png"] = read_png(picture)
+    elif ICON in pages:
+        read["model.png"] = pages[ICON]
+    terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
+    return {"modelDescription.xml": description, **terminals, **read, **pages}
+
+
+def _fmi_license(fmi: int) -> bytes:
+    """Return the licence of the FMI headers, which is a comment in them."""
+    text = (fmi_headers() / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
+    start = text.index("Copyright (C)")
+    lines = text[start : text.index("*/", start)].splitlines()
+    return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
+
+
+def web_module(layout: Layout) -> bytes:
+    """Return the C of the FMU's motion, unchanged, as a WebAssembly module for the page that flies the vehicle.
+
+    The page passes the coefficients to it. Raises BuildError.
+    """
+    page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
+    return compile_module(page | motion_sources(layout))

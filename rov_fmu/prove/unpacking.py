@@ -1,0 +1,173 @@
+"""Unpack an FMU that may come from anyone.
+
+The files stay in their folder, their size is limited, and every reader of the archive finds the same files.
+"""
+
+import os
+import stat
+import struct
+import zipfile
+import zlib
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+from rov_fmu.io.messages import FileError, ProofError, brief, shown
+from rov_fmu.io.reading import open_file
+
+_MOST_UNPACKED = 2_000_000_000
+"""The size of all files."""
+_MOST_RATIO = 100
+"""The size of all files, relative to that of the archive, if it is above _SMALL."""
+_SMALL = 100_000_000
+"""Bytes that an archive may unpack to, however well it is compressed."""
+_METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""The compression that FMI allows. Python takes memory without limit for other methods."""
+_UTF_8, _SIZES_BEHIND = 0x800, 8
+"""The flags of a file whose name is in UTF-8, and of one whose sizes follow its content."""
+_LARGE = b"\1\0\x10\0"
+"""How the extra field with the sizes of a large file begins."""
+_PIECE = 2**14
+"""The number of bytes that are unpacked at a time."""
+
+
+def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> None:
+    """Unpack an FMU into a folder.
+
+    Raises FileError, which names the FMU by the path `fmu`, if it is damaged, if a file would lie outside the folder or
+    is a link, or if the files take too much space.
+    """
+    if isinstance(archive, Path):
+        with open_file(archive) as file:
+            return unpack_fmu(file, fmu, folder)
+    with opened_archive(archive, fmu) as zipped:
+        check_order(zipped, fmu)
+        try:
+            zipped.extractall(folder)
+        except OSError as error:
+            where = f": {os.path.relpath(error.filename, folder)}" if error.filename else ""
+            raise FileError(f"{fmu}: cannot be unpacked: {error.strerror or error}{where}") from error
+    return None
+
+
+# ---- The archive -----------------------------------------------------------------------------------------------------
+
+
+@contextmanager
+def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
+    """Open the archive of an FMU. Raises FileError, also in place of what zipfile raises in the block."""
+    try:
+        with zipfile.ZipFile(file) as zipped:
+            if reason := refusal(zipped):
+                raise FileError(f"{fmu}: {reason}")
+            yield zipped
+    except (FileError, ProofError):
+        raise
+    except Exception as error:  # zipfile raises many kinds on damaged or encrypted archives
+        raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error
+
+
+def refusal(zipped: zipfile.ZipFile) -> str:
+    """Return why an archive may not be unpacked, or an empty text."""
+    members = zipped.infolist()
+    times = Counter(member.orig_filename for member in members)
+    for member in members:
+        name = member.orig_filename
+        is_outside = name.startswith("/") or ".." in name.split("/") or any(c in name for c in "\\:\0")
+        is_special = stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR)
+        for is_wrong, reason in (
+            (is_outside, "a path in an FMU must be relative, with forward slashes and without .."),
+            (is_special, "is a link or a special file; an FMU must have files and folders only"),
+            (member.compress_type not in _METHODS, "must be stored or deflated, the compression that FMI allows"),
+            (times[name] > 1, f"is {times[name]} times in the archive"),
+        ):
+            if is_wrong:
+                return f"member {shown(name)}: {reason}"
+    total = sum(member.file_size for member in members)
+    packed = zipped.start_dir
+    if total > _MOST_UNPACKED:
+        return f"would take {total / 1e9:.3g} GB unpacked; at most {_MOST_UNPACKED / 1e9:g} GB are allowed"
+    if total > max(_SMALL, _MOST_RATIO * packed):
+        return (
+            f"would take {total / 1e6:.3g} MB unpacked, {total / packed:.0f} times the size of the archive; "
+            f"above {_SMALL / 1e6:g} MB at most {_MOST_RATIO} times are allowed"
+        )
+    return ""
+
+
+def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
+    """Raise FileError if two readers could find different files in an archive.
+
+    Some go by the directory at the end of an archive, others by the header before each file. So both must say the same,
+    and there may be nothing that belongs to no file.
+    """
+    place, size, file = 0, 0, zipped.fp
+    assert file
+    for entry in sorted(zipped.infolist(), key=lambda entry: entry.header_offset):
+        where = f"{fmu}: member {shown(entry.orig_filename)}"
+        if entry.header_offset != place:
+            raise FileError(f"{where}: must begin at byte {place} of the archive, and not at {entry.header_offset}")
+        if entry.is_dir() and entry.file_size:
+            raise FileError(f"{where}: is a folder, and must have no content")
+        place = _end_of(file, entry)
+        if not place:
+            raise FileError(f"{where}: its header and its content must be as the directory of the archive says")
+        size += 46 + len(_encoded(entry)) + len(entry.extra) + len(entry.comment)
+    file.seek(place + size)
+    end = file.read(100 + len(zipped.comment))
+    if end.startswith(b"PK\6\6"):  # the records of large archives, of 56 and 20 bytes
+        end = end[76:]
+    if zipped.start_dir != place or not end.startswith(b"PK\5\6") or len(end) != 22 + len(zipped.comment):
+        raise FileError(f"{fmu}: has bytes beside its files and its directory that belong to nothing")
+
+
+def _encoded(entry: zipfile.ZipInfo) -> bytes:
+    """Return the name of a file as it stands in the archive."""
+    return entry.orig_filename.encode("utf-8" if entry.flag_bits & _UTF_8 else "cp437")
+
+
+def _end_of(file: IO[bytes], entry: zipfile.ZipInfo) -> int:
+    """Return where a file ends in an archive; 0 if its header or its content is not as the directory says.
+
+    A writer that did not know the sizes before the content gives them behind it, with 4 or 8 bytes each, and with or
+    without a signature (APPNOTE 4.3.9).
+    """
+    file.seek(entry.header_offset)
+    _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4x5H3L2H", file.read(30))
+    year, month, day, hour, minute, second = entry.date_time
+    written = hour << 11 | minute << 5 | second // 2, (year - 1980) << 9 | month << 5 | day
+    if (flags, method, time, date) != (entry.flag_bits, entry.compress_type, *written):
+        return 0
+    if file.read(name) != _encoded(entry):
+        return 0
+    more = file.read(extra)
+    if numbers[1:] == [2**32 - 1] * 2 and more.startswith(_LARGE):
+        numbers[1:] = reversed(struct.unpack("<2Q", more[len(_LARGE) :][:16]))
+    if not _is_whole(file, entry):
+        return 0
+    end, expected = file.tell(), (entry.CRC, entry.compress_size, entry.file_size)
+    if flags & _SIZES_BEHIND and all(number in (0, right) for number, right in zip(numbers, expected, strict=True)):
+        following = file.read(24)
+        for form in ("<4sL2Q", "<4s3L", "<0sL2Q", "<0s3L"):
+            descriptor = struct.pack(form, b"PK\7\10", *expected)
+            if following.startswith(descriptor):
+                return end + len(descriptor)
+    return end if tuple(numbers) == expected else 0
+
+
+def _is_whole(file: IO[bytes], entry: zipfile.ZipInfo) -> bool:
+    """Return True if the content that begins here ends where the directory says, and has the size that it says."""
+    left, size = entry.compress_size, 0
+    inflate = zlib.decompressobj(-zlib.MAX_WBITS)
+    if entry.compress_type == zipfile.ZIP_STORED:
+        file.seek(left, os.SEEK_CUR)
+        return left == entry.file_size
+    try:
+        while size <= entry.file_size and (piece := file.read(min(left, _PIECE))):
+            left -= len(piece)
+            size += len(inflate.decompress(piece))
+    except zlib.error:
+        return False
+    return inflate.eof and not (left or inflate.unused_data) and size == entry.file_size

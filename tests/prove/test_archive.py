@@ -1,0 +1,275 @@
+"""Every reader of an archive that `prove` accepts finds the same files, and no bit of an FMU of ours can be changed."""
+
+import random
+import struct
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from functools import partial
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.meta_data import meta_data
+from rov_fmu.io.messages import FileError, ProofError
+from rov_fmu.prove.check import check_evidence
+from rov_fmu.prove.unpacking import unpack_fmu
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.often import often
+
+_FILES = {"modelDescription.xml": b"<a/>" * 9, "binaries/linux64/ü.so": bytes(range(64)), "resources/empty": b""}
+
+
+@pytest.fixture(scope="module")
+def small() -> bytes:
+    """An archive as the builder writes it, with few files."""
+    return archive(_FILES, partial(meta_data, load_vehicle(SHIPPED["videoray"]), _FILES))
+
+
+def is_refused(content: bytes, path: Path) -> bool:
+    """Return True if `prove` refuses an archive before it runs the FMU, in one line."""
+    path.write_bytes(content)
+    try:
+        check_evidence(path)
+    except (FileError, ProofError) as error:
+        return "\n" not in str(error)
+    return False
+
+
+def flipped(content: bytes, place: int, bit: int) -> bytes:
+    return content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
+
+
+# ---- FMUs of ours ----------------------------------------------------------------------------------------------------
+
+
+@often("bits", 1, 8)
+def test_no_bit_of_an_archive_can_be_changed(bits: int, small: bytes, tmp_path: Path) -> None:
+    """Of each byte one bit, or all of them: headers, compressed bytes, the directory, and its end.
+
+    Of the meta-data a few bytes are enough, because test_evidence.py changes each of them.
+    """
+    path = tmp_path / "small.fmu"
+    assert not is_refused(small, path)
+    begin, end = small.index(b"<?xml"), small.index(b"ResourceMetaData>\n") + 16
+    assert small[begin:end].count(b"rov-fmu.archive") == 1
+    for place in range(len(small)):
+        if not begin <= place < end or place % 50 == 0:
+            for bit in [place % 8] if bits == 1 else range(8):
+                assert is_refused(flipped(small, place, bit), path), (place, bit)
+
+
+@often("count", 60, 2000)
+def test_no_bit_of_the_shipped_fmu_can_be_changed(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
+    content, draws = videoray_fmu.read_bytes(), random.Random(count)
+    assert not is_refused(content, tmp_path / "videoray.fmu")
+    for _ in range(count):
+        place, bit = draws.randrange(len(content)), draws.randrange(8)
+        assert is_refused(flipped(content, place, bit), tmp_path / "videoray.fmu"), (place, bit)
+
+
+def _pieces(content: bytes, draws: random.Random) -> Iterator[bytes]:
+    """Yield pieces of bytes of every kind: random ones, zeros, parts of the archive, and a whole archive."""
+    while True:
+        begin = draws.randrange(len(content))
+        yield draws.randbytes(draws.randint(1, 100))
+        yield bytes(draws.randint(1, 100))
+        yield content[begin : begin + draws.randint(1, 1000)]
+        yield archive({"binaries/linux64/other.so": b"evil"})
+
+
+@often("count", 12, 200)
+def test_nothing_can_be_inserted_before_within_or_after(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
+    content, draws = videoray_fmu.read_bytes(), random.Random(count)
+    for n, piece in zip(range(count), _pieces(content, draws), strict=False):
+        place = (0, len(content), draws.randrange(len(content)))[n % 3]
+        assert is_refused(content[:place] + piece + content[place:], tmp_path / "videoray.fmu"), (n, place)
+
+
+def test_an_empty_block_in_the_compressed_bytes_is_found(small: bytes, tmp_path: Path) -> None:
+    """It changes no file. With the right sizes in both headers, it still changes the bytes that have a hash."""
+    with zipfile.ZipFile(BytesIO(small)) as zipped:
+        first, *others = zipped.infolist()
+        data = zipped.read(first)
+    compress = zlib.compressobj(9, zlib.DEFLATED, -15)
+    longer = compress.compress(data) + compress.flush(zlib.Z_FULL_FLUSH) + compress.flush()
+    begin, end = 30 + len(first.filename), 30 + len(first.filename) + first.compress_size
+    more = len(longer) - first.compress_size
+    changed = bytearray(small[:begin] + longer + small[end:])
+    directory = changed.index(b"PK\1\2")
+    struct.pack_into("<L", changed, 18, len(longer))
+    struct.pack_into("<L", changed, directory + 20, len(longer))
+    for entry in others:
+        place = changed.index(entry.filename.encode(), directory) - 4
+        struct.pack_into("<L", changed, place, entry.header_offset + more)
+    struct.pack_into("<L", changed, len(changed) - 6, directory)
+    unpack_fmu(BytesIO(bytes(changed)), Path("a.fmu"), tmp_path / "as in any FMU")
+    (tmp_path / "small.fmu").write_bytes(changed)
+    with pytest.raises(ProofError, match="the archive was altered after the FMU was built, although its files are the"):
+        check_evidence(tmp_path / "small.fmu")
+
+
+def test_a_date_or_an_attribute_of_a_file_is_found_and_named(small: bytes, tmp_path: Path) -> None:
+    path, directory = tmp_path / "small.fmu", small.index(b"PK\1\2")
+    for place in (directory + 4, directory + 5, directory + 36, directory + 38, len(small) - 18):
+        path.write_bytes(flipped(small, place, 0))
+        with pytest.raises(ProofError, match=r"small\.fmu: the archive was altered after the FMU was built, although"):
+            check_evidence(path)
+
+
+# ---- FMUs of others --------------------------------------------------------------------------------------------------
+
+
+class _Stream(BytesIO):
+    """A file that cannot go back, such as a pipe: sizes stand behind the content."""
+
+    def seekable(self) -> bool:
+        return False
+
+    def tell(self) -> int:
+        raise OSError
+
+    def seek(self, *_: Any) -> int:
+        raise OSError
+
+
+def _written(write: Callable[[zipfile.ZipFile], None], file: BytesIO | None = None) -> bytes:
+    file = file or BytesIO()
+    with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as zipped:
+        write(zipped)
+    return file.getvalue()
+
+
+def _plain(zipped: zipfile.ZipFile) -> None:
+    for name, content in _FILES.items():
+        zipped.writestr(name, content)
+
+
+def _with_folders(zipped: zipfile.ZipFile) -> None:
+    zipped.mkdir("resources") if hasattr(zipped, "mkdir") else zipped.writestr("resources/", b"")
+    zipped.writestr(zipfile.ZipInfo("binaries/", (2026, 11, 28, 23, 59, 58)), b"", zipfile.ZIP_DEFLATED)
+    _plain(zipped)
+    zipped.comment = b"made by another tool"
+
+
+def _large(zipped: zipfile.ZipFile) -> None:
+    """With sizes of 8 bytes, as of a file whose size was not known when it was begun."""
+    for name, content in _FILES.items():
+        with zipped.open(name, "w", force_zip64=True) as file:
+            file.write(content)
+
+
+def _with_extra_fields(zipped: zipfile.ZipFile) -> None:
+    for name, content in _FILES.items():
+        entry = zipfile.ZipInfo(name, (2024, 2, 29, 1, 2, 4))
+        entry.extra, entry.comment, entry.external_attr = b"UT\5\0\3abcd", b"a word", 0o100755 << 16
+        zipped.writestr(entry, content, zipfile.ZIP_STORED)
+
+
+def _without_signatures(content: bytes) -> bytes:
+    """Leave the optional signatures of the sizes behind the content out of a streamed archive with one file."""
+    place, directory = content.index(b"PK\7\10"), content.index(b"PK\1\2") - 4
+    changed = bytearray(content[:place] + content[place + 4 :])
+    struct.pack_into("<L", changed, len(changed) - 6, directory)
+    return bytes(changed)
+
+
+HONEST: dict[str, Callable[[], bytes]] = {
+    "plain": lambda: _written(_plain),
+    "stored, with extra fields and comments": lambda: _written(_with_extra_fields),
+    "with folders and a comment": lambda: _written(_with_folders),
+    "as a stream": lambda: _written(_plain, _Stream()),
+    "as a stream of large files": lambda: _written(_large, _Stream()),
+    "large files": lambda: _written(_large),
+    "without the optional signature": lambda: _without_signatures(
+        _written(lambda zipped: zipped.writestr("modelDescription.xml", b"<a/>" * 9), _Stream())
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", HONEST)
+def test_an_honest_archive_is_unpacked_and_refused_if_a_piece_is_inserted(kind: str, tmp_path: Path) -> None:
+    content, draws = HONEST[kind](), random.Random(1)
+    unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
+    assert (tmp_path / "modelDescription.xml").read_bytes() == b"<a/>" * 9
+    for n, piece in zip(range(40), _pieces(content, draws), strict=False):
+        place = (0, len(content), draws.randrange(len(content)))[n % 3]
+        with pytest.raises(FileError, match=r"^a\.fmu: "):
+            unpack_fmu(BytesIO(content[:place] + piece + content[place:]), Path("a.fmu"), tmp_path)
+
+
+def _entry(name: str, content: bytes) -> bytes:
+    """Return a file with the header before it, as a streaming reader finds it."""
+    return archive({name: content}).partition(b"PK\1\2")[0]
+
+
+def _moved(content: bytes, more: int) -> bytes:
+    """Return an archive whose directory says that all files lie further behind."""
+    changed, place = bytearray(content), 0
+    while (place := changed.find(b"PK\1\2", place)) >= 0:
+        struct.pack_into("<L", changed, place + 42, struct.unpack_from("<L", changed, place + 42)[0] + more)
+        place += 4
+    struct.pack_into("<L", changed, len(changed) - 6, struct.unpack_from("<L", changed, len(changed) - 6)[0] + more)
+    return bytes(changed)
+
+
+def _hidden_behind_a_stream(content: bytes) -> bytes:
+    """Let the compressed bytes of the only file contain another entry, which only a streaming reader finds."""
+    hidden, end = _entry("binaries/linux64/other.so", b"evil"), content.index(b"PK\1\2")
+    size = struct.unpack_from("<L", content, 18)[0] + len(hidden)
+    changed = bytearray(_moved(content[:end] + hidden + content[end:], 0))
+    struct.pack_into("<L", changed, len(changed) - 6, end + len(hidden))
+    for place in (18, end + len(hidden) + 20):
+        struct.pack_into("<L", changed, place, size)
+    return bytes(changed)
+
+
+ONE = archive({"modelDescription.xml": b"<a/>"})
+DIRECTORY = ONE.index(b"PK\1\2")
+HIDDEN: dict[str, tuple[Callable[[], bytes], str]] = {
+    "an entry in front": (
+        lambda: _entry("modelDescription.xml", b"<b/>") + _moved(ONE, DIRECTORY),
+        "member 'modelDescription.xml': must begin at byte 0 of the archive, and not at 5",
+    ),
+    "another name before the content": (lambda: flipped(ONE, 30, 0), "member 'modelDescription.xml': its header and"),
+    "another size before the content": (lambda: flipped(ONE, 22, 0), "member 'modelDescription.xml': its header and"),
+    "another checksum before the content": (lambda: flipped(ONE, 14, 0), "member 'modelDescription.xml': its header"),
+    "other flags": (lambda: flipped(ONE, 6, 3), "member 'modelDescription.xml': its header and its content must be as"),
+    "another date": (lambda: flipped(ONE, 12, 0), "member 'modelDescription.xml': its header and its content must be"),
+    "an entry in the content": (lambda: _hidden_behind_a_stream(ONE), "member 'modelDescription.xml': its header and"),
+    "a word behind": (lambda: ONE + b"more", "has bytes beside its files and its directory that belong to nothing"),
+    "a folder with content": (lambda: archive({"a/": b"x"}), "member 'a/': is a folder, and must have no content"),
+    "a number that is too large": (
+        lambda: ONE[: DIRECTORY + 42] + b"\xff\xff\xff\x7f" + ONE[DIRECTORY + 46 :],
+        "member 'modelDescription.xml': must begin at byte 0 of the archive, and not at 2147483647",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", HIDDEN)
+def test_what_readers_would_read_differently_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
+    make, reason = HIDDEN[case]
+    with pytest.raises(FileError) as error:
+        unpack_fmu(BytesIO(make()), Path("a.fmu"), tmp_path / "unpacked")
+    assert str(error.value).startswith(f"a.fmu: {reason}")
+    assert "\n" not in str(error.value)
+    assert not (tmp_path / "unpacked").exists()
+
+
+@often("count", 100, 20_000)
+def test_two_damaged_bytes_are_one_line(count: int, small: bytes, tmp_path: Path) -> None:
+    """Such as an offset that lies outside the file, where reading would raise an OSError."""
+    draws = random.Random(count)
+    for content in (small, ONE):
+        for _ in range(count // 2):
+            changed = bytearray(content)
+            for _ in range(2):
+                changed[draws.randrange(len(changed))] = draws.randrange(256)
+            with suppress(FileError):
+                unpack_fmu(BytesIO(changed), Path("a.fmu"), tmp_path)
+            assert changed == content or is_refused(bytes(changed), tmp_path / "small.fmu") or content is ONE

@@ -1,0 +1,132 @@
+"""An FMU from an unknown source is unpacked into its folder, within limits, or refused in one line."""
+
+import stat
+import struct
+import time
+import zipfile
+from collections.abc import Callable
+from io import BytesIO
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.io.messages import FileError
+from rov_fmu.prove.unpacking import refusal, unpack_fmu
+
+_LINK = (stat.S_IFLNK | 0o777) << 16
+_STUDY = 'fmu = "bad.fmu"\nstop_time = 1.0\nstep = 0.1\nsampler = "grid"\n[figures]\nend = "u[-1]"\n'
+
+
+def _member(name: str, content: bytes = b"", mode: int = 0, method: int = zipfile.ZIP_DEFLATED) -> Callable[..., None]:
+    def add(archive: zipfile.ZipFile) -> None:
+        entry = zipfile.ZipInfo(name)
+        entry.create_system, entry.external_attr = 3, mode
+        archive.writestr(entry, content, method)
+
+    return add
+
+
+def _zeros(megabytes: int) -> Callable[..., None]:
+    def add(archive: zipfile.ZipFile) -> None:
+        entry = zipfile.ZipInfo("resources/zeros.bin")
+        entry.compress_type = zipfile.ZIP_DEFLATED
+        with archive.open(entry, "w") as file:
+            for _ in range(megabytes):
+                file.write(bytes(1_000_000))
+
+    return add
+
+
+BAD: dict[str, tuple[Callable[..., None], str]] = {
+    "a path upwards": (_member("resources/../../evil"), "member 'resources/../../evil': a path in an FMU must"),
+    "an absolute path": (_member("/tmp/evil"), "member '/tmp/evil': a path in an FMU must be relative"),
+    "a path of Windows": (_member("..\\evil"), r"member '..\\evil': a path in an FMU must be relative"),
+    "a drive": (_member("C:/evil"), "member 'C:/evil': a path in an FMU must be relative"),
+    "a link": (_member("resources/link", b"/etc/passwd", _LINK), "member 'resources/link': is a link or a special"),
+    "another compression": (
+        _member("resources/a", bytes(1_000_000), method=zipfile.ZIP_BZIP2),
+        "member 'resources/a': must be stored or deflated, the compression that FMI allows",
+    ),
+    "a name that is too long": (_member("x" * 300), "cannot be unpacked: File name too long: xxx"),
+    "a file below a file": (_member("modelDescription.xml/x"), "cannot be unpacked: "),
+    "a bomb": (_zeros(150), "would take 15"),
+}
+
+
+def _archive(*members: Callable[..., None]) -> BytesIO:
+    content = BytesIO()
+    with zipfile.ZipFile(content, "w") as archive:
+        for add in members:
+            add(archive)
+    return content
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_a_bad_archive_is_refused_in_one_line(case: str, tmp_path: Path) -> None:
+    add, message = BAD[case]
+    with pytest.raises(FileError) as error:
+        unpack_fmu(_archive(_member("modelDescription.xml", b"<a/>"), add), Path("a.fmu"), tmp_path / "unpacked")
+    assert str(error.value).startswith(f"a.fmu: {message}")
+    assert "\n" not in str(error.value)
+    assert {file.name for file in tmp_path.iterdir()} <= {"unpacked"}
+
+
+def test_prove_and_study_refuse_it_in_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    add, message = BAD["a path upwards"]
+    (tmp_path / "bad.fmu").write_bytes(_archive(add).getvalue())
+    (tmp_path / "plan.toml").write_text(_STUDY)
+    for command in (["prove", "bad.fmu", "--report", "a.html"], ["study", "plan.toml", "-o", "results"]):
+        assert main([command[0], *(str(tmp_path / one) if "." in one else one for one in command[1:])]) == 2
+        out, err = capsys.readouterr()
+        assert (out, err.count("\n")) == ("", 1)
+        assert err.startswith(f"rov-fmu: {tmp_path / 'bad.fmu'}: {message}")
+
+
+GB, MB = 10**9, 10**6
+
+
+@pytest.mark.parametrize(
+    ("most", "packed", "said"),
+    [
+        (2 * GB, GB, "would take 2 GB unpacked; at most 2 GB are allowed"),
+        (100 * MB, 1, "would take 100 MB unpacked, 100000001 times the size of the archive; above 100 MB at most 100 "),
+        (200 * MB, 2 * MB, "would take 200 MB unpacked, 100 times the size of the archive; above 100 MB at most 100 "),
+    ],
+)
+def test_an_archive_may_unpack_to_so_many_bytes(most: int, packed: int, said: str) -> None:
+    for size in (most, most + 1):
+        member = zipfile.ZipInfo("a")
+        member.file_size = size
+        archive: Any = SimpleNamespace(infolist=lambda member=member: [member], start_dir=packed)
+        reason = refusal(archive)
+        assert reason[: len(said)] == (said if size > most else "")
+
+
+def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
+    """The archive declares 3 GB, and nothing is written."""
+    content = bytearray(_archive(_member("modelDescription.xml", b"a" * 100, method=zipfile.ZIP_STORED)).getvalue())
+    size = content.rindex(b"PK\x01\x02") + 24
+    struct.pack_into("<I", content, size, 3_000_000_000)
+    start = time.perf_counter()
+    with pytest.raises(FileError, match=r"^a\.fmu: would take 3 GB unpacked; at most 2 GB are allowed$"):
+        unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
+    assert time.perf_counter() - start < 5.0
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp_path: Path) -> None:
+    content = bytearray(_archive(_zeros(20)).getvalue())
+    for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
+        struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
+    with pytest.raises(FileError, match=r"^a\.fmu: member 'resources/zeros.bin': its header and its content must"):
+        unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
+    assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
+
+
+def test_a_file_that_is_no_archive_is_one_line(tmp_path: Path) -> None:
+    for path, reason in ((tmp_path / "none.fmu", "there is no such file"), (Path(__file__), "is not an FMU, or is")):
+        with pytest.raises(FileError, match=f"^{path}: {reason}"):
+            unpack_fmu(path, path, tmp_path)
