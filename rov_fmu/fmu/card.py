@@ -12,9 +12,9 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.forces import EXPECTED, effects_of
 from rov_fmu.equation.layout import EVERY_COMMAND, Layout, Range
 from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE
 from rov_fmu.vehicle.published import load_tables
-from rov_fmu.vehicle.uncertainty import significant
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")

@@ -29,13 +29,13 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import significant, with_interval
 from rov_fmu.tank import findings
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
-from rov_fmu.vehicle.uncertainty import significant, with_interval
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Heading = Literal["Warnings", "Doubts", "Facts"]

@@ -21,8 +21,8 @@ from rov_fmu.identify.findings import (
 )
 from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
 from rov_fmu.identify.tuning import Tuning
+from rov_fmu.io.numbers import with_interval
 from rov_fmu.report.console import DEVIATION, console, paragraph, print_table, table, text
-from rov_fmu.vehicle.uncertainty import with_interval
 
 
 def print_identification(identification: Identification) -> None:

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from markupsafe import Markup
 
+from rov_fmu.io import numbers
 from rov_fmu.io.templates import render
 from rov_fmu.report import console
 from rov_fmu.report.palette import PALETTE
-from rov_fmu.vehicle import uncertainty
 
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 """The translation of digits to superscripts."""
@@ -67,7 +67,7 @@ def number(value: float | None, digits: int | None = None) -> str:
 
 def with_interval(value: float, interval: tuple[float, float] | None) -> list[str]:
     """Return a value and the ends of its interval for readers, with digits that suit the interval."""
-    texts = uncertainty.with_interval(value, interval)
+    texts = numbers.with_interval(value, interval)
     return [_with_signs(text).replace("inf", "∞").replace("nan", "–") for text in texts]
 
 

@@ -6,8 +6,7 @@ has the normal distribution.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from decimal import Decimal
-from math import floor, inf, isfinite, log, log10
+from math import inf, log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -176,57 +175,6 @@ def quantile(degrees_of_freedom: float) -> float:
 
 NORMAL = quantile(inf)
 """Half the width of a 95 % interval in standard errors, by the normal distribution."""
-_EXACT = 1e-9
-"""The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
-_WIDTH_IN_UNITS = 3.0
-"""The least width of a written interval in units of the last digit. The width is then known to a third."""
-_NEAR_ZERO = 1e-6
-"""The value relative to the width of an interval around 0 below which it is written as 0."""
-
-
-def with_interval(value: float, interval: tuple[float, float] | None, digits: int = 4) -> tuple[str, str, str]:
-    """Return a value and the ends of its interval as text, with digits that suit the width of the interval.
-
-    36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
-    least three units of the last one wide. Where this would leave less than two digits of the value, each number has
-    two significant digits of its own, and a value that is tiny beside an interval around 0 becomes 0. Rounding keeps
-    the order of numbers, so an interval that contains its value is never written as one that does not. Where there is
-    no interval, or one that is as narrow as rounding, the value has the given number of significant digits. The ends
-    are empty where there is no interval.
-    """
-    if interval is None:
-        return significant(value, digits), "", ""
-    value_text, low, high = in_interval((value,), interval, digits)
-    return value_text, low, high
-
-
-def in_interval(values: Sequence[float], interval: tuple[float, float], digits: int = 4) -> list[str]:
-    """Return values that share an interval, and its ends, as text. All have the digits of the least value."""
-    width = interval[1] - interval[0]
-    around_zero = interval[0] <= 0.0 <= interval[1]
-    values = [0.0 if around_zero and abs(value) < _NEAR_ZERO * width else value for value in values]
-    numbers, least = [*values, *interval], min(map(abs, values))
-    if width > _EXACT * least and all(map(isfinite, numbers)):
-        place = floor(log10(width / _WIDTH_IN_UNITS))
-        if least >= 10.0 ** (place + 1):
-            return [_rounded(number, place) for number in numbers]
-        digits = 2
-    return [significant(number, digits) for number in numbers]
-
-
-def _rounded(number: float, place: int) -> str:
-    """Return a number rounded to a multiple of a power of ten: 36.98 for 36.982 and -2."""
-    return _plain(+Decimal(number).quantize(Decimal(1).scaleb(place)))  # the sign makes 0 of -0
-
-
-def significant(number: float, digits: int) -> str:
-    """Return a number as text with `digits` significant digits: 0.30, 420."""
-    return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
-
-
-def _plain(number: Decimal) -> str:
-    """Return a decimal number with its digits, and with an exponent only where it is very small or very large."""
-    return f"{number:f}" if not number or -5 <= number.adjusted() < 6 else f"{number:e}"
 
 
 def _half_width(name: str, value: float, interval: tuple[float, float], declaration: Declaration) -> float:

@@ -34,7 +34,7 @@ def subject(call: Callable[..., Any], *experiments: Experiment, **given: Any) ->
             yield SimpleNamespace(call=call)
 
     bounds = given.pop("bounds", {"a_d_u": {"min": "0.5"}, "F_0_u": {"max": "4"}})
-    other = {"type": "Real", "start": "0", "nominal": "-2", "dimensions": [], "min": None, "max": None}
+    other: dict[str, Any] = {"type": "Real", "start": "0", "nominal": "-2", "dimensions": [], "min": None, "max": None}
     variables = [
         SimpleNamespace(name=name, causality=causality, **{**other, "declaredType": None, **bounds.get(name, {})})
         for name, causality in _VARIABLES.items()

@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 from scipy.stats import kstest, norm, qmc, spearmanr
 
@@ -19,7 +17,7 @@ from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.schema import Estimated
-from rov_fmu.vehicle.uncertainty import Uncertainty, with_interval
+from rov_fmu.vehicle.uncertainty import Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
@@ -222,44 +220,3 @@ def test_draws_at_a_bound_agree_with_bounded_fits(b: float) -> None:
     for numbers in ([1.0, 0.0], [0.0, 1.0], [0.36, 0.6]):  # a, b, and the force at x = 0.6
         assert kstest(drawn @ numbers, fits @ numbers).statistic < 0.06
     assert np.mean(drawn[:, 1] == 0.0) == pytest.approx(np.mean(fits[:, 1] < 1e-12), abs=0.05)
-
-
-# ---- Intervals as text -----------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("value", "interval", "texts"),
-    [
-        (36.98, (36.974, 37.004), ("36.98", "36.97", "37.00")),
-        (12345.0, (12201.0, 12500.0), ("12340", "12200", "12500")),
-        (-0.004, (-1.2, 1.2), ("-0.0040", "-1.2", "1.2")),
-        (5.8e-12, (-0.35, 0.35), ("0", "-0.35", "0.35")),
-        (2.5, None, ("2.500", "", "")),
-        (1234567.0, None, ("1.235e+6", "", "")),
-        (123456.0, None, ("123500", "", "")),
-        (1.23456e-5, None, ("0.00001235", "", "")),
-        (1.23456e-6, None, ("1.235e-6", "", "")),
-        (39.99999999999999, (39.99999999999998, 40.00000000000001), ("40.00", "40.00", "40.00")),
-    ],
-)
-def test_a_value_has_the_digits_of_its_interval(
-    value: float, interval: tuple[float, float] | None, texts: tuple[str, str, str]
-) -> None:
-    assert with_interval(value, interval) == texts
-
-
-SIZES = st.floats(-1e12, 1e12).filter(lambda x: x == 0.0 or abs(x) > 1e-12)
-"""Numbers of every size that a coefficient may have."""
-PARTS = st.floats(1e-9, 1e9)
-"""Half the width of an interval, as a part of its value."""
-
-
-@given(SIZES, PARTS, PARTS)
-def test_no_written_interval_excludes_its_value_or_hides_its_width(value: float, below: float, above: float) -> None:
-    size = abs(value) or 1.0
-    low, high = value - below * size, value + above * size
-    middle, *ends = (float(text) for text in with_interval(value, (low, high)))
-    assert ends[0] <= middle <= ends[1]
-    assert 0.5 * (high - low) <= ends[1] - ends[0] <= 1.5 * (high - low)
-    if abs(value) > 1e-6 * (high - low):
-        assert abs(middle / value - 1.0) < 0.051, "the value keeps two digits"

@@ -1,0 +1,49 @@
+"""Numbers as text, with the digits that their intervals or their readers need."""
+
+from decimal import Decimal
+from math import floor, isfinite, log10
+
+_EXACT = 1e-9
+"""The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
+_WIDTH_IN_UNITS = 3.0
+"""The least width of a written interval in units of the last digit. The width is then known to a third."""
+_NEAR_ZERO = 1e-6
+"""The value relative to the width of an interval around 0 below which it is written as 0."""
+
+
+def with_interval(value: float, interval: tuple[float, float] | None, digits: int = 4) -> tuple[str, str, str]:
+    """Return a value and the ends of its interval as text, with digits that suit the width of the interval.
+
+    36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
+    least three units of the last one wide. Where this would leave less than two digits of the value, each number has
+    two significant digits of its own, and a value that is tiny beside an interval around 0 becomes 0. Rounding keeps
+    the order of numbers, so an interval that contains its value is never written as one that does not. Where there is
+    no interval, or one that is as narrow as rounding, the value has the given number of significant digits. The ends
+    are empty where there is no interval.
+    """
+    if interval is None:
+        return significant(value, digits), "", ""
+    low, high = interval
+    width = high - low
+    if low <= 0.0 <= high and abs(value) < _NEAR_ZERO * width:
+        value = 0.0
+    if width > _EXACT * abs(value) and all(map(isfinite, (value, low, high))):
+        place, digits = floor(log10(width / _WIDTH_IN_UNITS)), 2
+        if abs(value) >= 10.0 ** (place + 1):
+            return _rounded(value, place), _rounded(low, place), _rounded(high, place)
+    return significant(value, digits), significant(low, digits), significant(high, digits)
+
+
+def _rounded(number: float, place: int) -> str:
+    """Return a number rounded to a multiple of a power of ten: 36.98 for 36.982 and -2."""
+    return _plain(+Decimal(number).quantize(Decimal(1).scaleb(place)))  # the sign makes 0 of -0
+
+
+def significant(number: float, digits: int) -> str:
+    """Return a number as text with `digits` significant digits: 0.30, 420."""
+    return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
+
+
+def _plain(number: Decimal) -> str:
+    """Return a decimal number with its digits, and with an exponent only where it is very small or very large."""
+    return f"{number:f}" if not number or -5 <= number.adjusted() < 6 else f"{number:e}"
