@@ -915,7 +915,7 @@ def _schema() -> None:
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper with the printed, computed and measured values."""
     from rov_fmu.report.console import print_tables
-    from rov_fmu.vehicle.published import load_tables
+    from rov_fmu.report.published import load_tables
     from rov_fmu.vehicle.vehicle import load_vehicle
 
     loaded = load_vehicle(vehicle)

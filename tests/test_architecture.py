@@ -59,6 +59,7 @@ LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/io": 13,
     "tests/fmu": 13,
+    "tests/report": 13,
     "tests/fmu/calls": 16,
     "tests/equation": 14,
 }

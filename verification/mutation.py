@@ -61,7 +61,7 @@ TESTS = {
     "fmu_src/c/[ls]*.c": "equation/test_step.py equation/test_alone.py equation c fmu/calls",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls "
     "fmu/results/test_ballast.py",
-    "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py vehicle/test_published.py",
+    "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py report/test_published.py",
     "rov_fmu/equation/[cl]a*.py": "equation/table docs/test_docs.py equation/test_rov.py vehicle equation",
     "rov_fmu/equation/dependencies.py": "equation/table/test_dependencies.py fmu/test_dependencies.py",
     "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation",

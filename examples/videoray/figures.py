@@ -22,9 +22,9 @@ from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.report.plots.steps import draw_steps, from_zero, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, add_knots, add_legend, name_axes, saved, with_even_text
+from rov_fmu.report.published import ResponseTable
 from rov_fmu.report.templates import pretty_unit
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.vehicle.published import ResponseTable, untuned
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -201,7 +201,7 @@ def _drag(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
 
 def _steps(ax: Axes, k: Vehicle, table: ResponseTable) -> None:
     steps = [measured_step(table, Decimal(command)) for command in _STEPS]
-    draw_steps(ax, table.axis, steps, [(untuned(k), "--"), (k, "-")])
+    draw_steps(ax, table.axis, steps, [(k.untuned, "--"), (k, "-")])
     looks = {"--": "non-linear model", "-": "scaled model", ":": "measured steady velocity"}
     if any(step.Tau for step in steps):
         looks["o"] = "measured time constant"

@@ -14,7 +14,6 @@ from rov_fmu.equation.layout import EVERY_COMMAND, Layout, Range
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE
-from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
@@ -43,8 +42,6 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     if tuned := [*_tuned(vehicle)]:
         data += tuned
         trust += ["The predictions are those of the vehicle before it was tuned."] if made else []
-    if vehicle.data and (off := _off_measured(vehicle)):
-        trust[-1] += f" V_ss is up to {max(off):.0%} off what was measured."
     if vehicle.layout.identified:
         holds += [f"Tested: {words}." for words in map(_in_words, vehicle.layout.identified) if words]
         holds.append(
@@ -78,12 +75,6 @@ def _in_words(known: Range) -> str:
     name = (velocities | {"phi": "roll", "theta": "pitch", "z": "depth"})[known.name]
     low, high = (significant(factor * end, 2) for end in (known.low, known.high))
     return f"{name}: {low} to {high} {shown}"
-
-
-def _off_measured(vehicle: Vehicle) -> list[float]:
-    """Return the relative differences of V_ss from the measured ones in the published tables."""
-    cells = (row.scaled.V_ss for table in load_tables(vehicle) for row in table.rows)
-    return [abs(cell.from_measured) for cell in cells if cell.from_measured is not None]
 
 
 def card_text(vehicle: Vehicle) -> str:

@@ -1,8 +1,8 @@
 """Write the experiments, the expected results and the evidence in an FMU, in the form of the standard FMI-LS-REF.
 
-The experiments are a step of each axis from rest to its largest command, and a manoeuvre of all axes, which begins
-tilted if the vehicle rolls or pitches. If the vehicle has published tables, the steps are those of the tables, with and
-without its tuning. The expected results are computed in plain Python, and not with the C code that they prove.
+The experiments are a step of each axis from rest to its largest command, with and without the vehicle's tuning, and a
+manoeuvre of all axes, which begins tilted if the vehicle rolls or pitches. The expected results are computed in plain
+Python, and not with the C code that they prove.
 
 If coefficients have confidence intervals, further experiments repeat the manoeuvre at the ends of these intervals. They
 have no expected results, because they are there to show how uncertain the motion is.
@@ -19,7 +19,6 @@ from rov_fmu.fmu.archive import FOLDER, MANIFEST
 from rov_fmu.fmu.related import Related, ends_of_intervals, manifest, origin
 from rov_fmu.io.messages import listed
 from rov_fmu.io.templates import render
-from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 TOLERANCE = 1e-9
@@ -174,50 +173,29 @@ def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: _Experiment) -> list[_Exp
 
 
 def _steps(vehicle: Vehicle) -> Iterator[_Experiment]:
-    """Yield the experiments in which one axis steps to a constant command from rest."""
-    if vehicle.data:
-        for table in load_tables(vehicle):
-            for row in table.rows:
-                for name, model, printed in (
-                    ("tuned", vehicle, row.scaled),
-                    ("untuned", untuned(vehicle), row.non_linear),
-                ):
-                    cells = {"V_ss": printed.V_ss, "Tau": printed.Tau}
-                    yield _step(model, table.axis, float(row.command), name, table, cells)
-    else:
-        largest = round(100.0 * min(1.0, vehicle.command_range[1]), 6)
-        for axis in (part.axis for part in vehicle.layout.axes if vehicle.layout.signs(part.axis)):
-            yield _step(vehicle, axis, largest)
+    """Yield the experiments in which one axis steps to its largest command from rest.
+
+    A vehicle that is tuned takes each step with its tuning and without, so that the tunable parameters have an effect.
+    """
+    is_tuned = any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
+    percent = round(100.0 * min(1.0, vehicle.command_range[1]), 6)
+    for axis in (part.axis for part in vehicle.layout.axes if vehicle.layout.signs(part.axis)):
+        for name, model in {"tuned": vehicle, "untuned": vehicle.untuned}.items() if is_tuned else [("", vehicle)]:
+            yield _step(model, axis, percent, name)
 
 
-def _step(
-    vehicle: Vehicle,
-    axis: Axis,
-    percent: float,
-    tuning: str = "",
-    table: ResponseTable | None = None,
-    cells: Mapping[str, Cell] | None = None,
-) -> _Experiment:
-    """Return a step to a command in %, with its V_ss and Tau in words beside those of a table."""
+def _step(vehicle: Vehicle, axis: Axis, percent: float, tuning: str) -> _Experiment:
+    """Return a step to a command in %, with its V_ss and Tau in words."""
     layout, inputs = vehicle.layout, vehicle.held_inputs(axis, percent / 100.0)
     V_ss, Tau = vehicle.response(axis, percent / 100.0)
     lag = max((vehicle[curve.coefficient("T")] for curve in layout.curves if curve.has_lag), default=0.0)
     unit = float(f"{min(Tau + lag, _LONGEST_TAU, _HORIZON / _fastest_rate(vehicle, inputs)):.3g}")
-
-    def published(quantity: str) -> str:
-        cell = cells[quantity] if cells else None
-        values = {"printed": cell.printed, "measured": cell.measured} if cell else {}
-        words = ", ".join(f"{origin} {value}" for origin, value in values.items() if value is not None)
-        return f" ({words})" if words else ""
-
     neglected = ["the lag"] if layout.lagging else []
     neglected += ["the dead time"] if layout.has_dead_time else []
     neglected += ["righting moments"] if layout.has_attitude and layout.restoring else []
     description = (
-        f"{f'Table {table.number}: ' if table else ''}{axis.name}, {percent:g} % from rest"
-        f"{', ' * bool(tuning)}{tuning}: "
-        f"V_ss = {V_ss:.4g} {axis.unit}{published('V_ss')}, Tau = {Tau:.4g} s{published('Tau')}"
-        f"{', without ' * bool(neglected)}{listed(neglected)}"
+        f"{axis.name}, {percent:g} % from rest{', ' * bool(tuning)}{tuning}: "
+        f"V_ss = {V_ss:.4g} {axis.unit}, Tau = {Tau:.4g} s{', without ' * bool(neglected)}{listed(neglected)}"
     )
     tunable = {name: vehicle[name] for name in layout.tuning}
     return _Experiment(

@@ -18,7 +18,7 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from rov_fmu.io.messages import listed, one_line, wrapped
-from rov_fmu.vehicle.published import Cell, ResponseTable
+from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:

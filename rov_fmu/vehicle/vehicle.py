@@ -145,6 +145,11 @@ class Vehicle:
         """The content of the file that was read, if the vehicle is still the one that it describes."""
         return self.file.content if self.file and self.file.vehicle == self else None
 
+    @property
+    def untuned(self) -> Self:
+        """This vehicle with every α and β equal to 1: the model of the paper before it was tuned by (18)."""
+        return self.with_(**dict.fromkeys(self.layout.tuning, 1.0))
+
     def with_(self, layout: Layout | None = None, /, **coefficients: float) -> Self:
         """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
 

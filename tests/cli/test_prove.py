@@ -50,7 +50,7 @@ def test_the_videoray_proves_itself(interface: str | None, videoray_fmu: Path, c
     out, err = capsys.readouterr()
     assert err == ""
     assert "FAIL" not in out
-    assert out.startswith(f"{28 + 1} experiments, {28 * 2 + 7} results: {28 * 2 + 7} of {28 * 2 + 7} pass. ")
+    assert out.startswith(f"{6 + 1} experiments, {6 * 2 + 7} results: {6 * 2 + 7} of {6 * 2 + 7} pass. ")
     found = prove(videoray_fmu, interface)
     assert max(f.deviation for f in found) < (1e-9 if interface == "model-exchange" else 1e-10)
     assert {f.tolerance for f in found} == {1e-7 if interface == "model-exchange" else 1e-9}
@@ -65,7 +65,7 @@ def test_a_binary_with_another_motion_is_found(videoray_fmu: Path, tmp_path: Pat
     assert main(["prove", str(other)]) == 1
     out, err = capsys.readouterr()
     failed = [line.split() for line in out.splitlines() if "FAIL" in line]
-    assert err == f"rov-fmu: {other}: {len(failed)} of 13 results are not as expected\n"
+    assert err == f"rov-fmu: {other}: {len(failed)} of 19 results are not as expected\n"
     assert {line[4] for line in failed} == {"u", "w", "x", "y", "z"}, "its mass has no part in yaw"
     assert main(["prove", str(other), "--tolerance", "1e-5"]) == 0
 
@@ -194,7 +194,7 @@ def test_an_fmu_that_ends_its_process_is_one_line(videoray_fmu: Path, tmp_path: 
     assert main(["prove", str(fmu)]) == 1
     out, err = capsys.readouterr()
     assert out == ""
-    where = f"rov-fmu: {fmu}: experiment 'heave_20_tuned': the FMU ended its process: "
+    where = f"rov-fmu: {fmu}: experiment 'surge_70_tuned': the FMU ended its process: "
     assert err in {f"{where}SIGBUS\n", f"{where}SIGSEGV\n"}
 
 

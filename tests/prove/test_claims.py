@@ -165,7 +165,7 @@ def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path) -> None:
     )
     found = measured(measures.expected, fmu)
     assert found.result == "fails"
-    assert "62 of 63 results of 29" in found.sentence
+    assert "18 of 19 results of 7" in found.sentence
     assert "Experiment surge_70_tuned: x deviates by" in found.sentence
 
 

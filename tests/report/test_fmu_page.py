@@ -16,8 +16,8 @@ from lxml import html
 from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.published import load_tables
 from rov_fmu.report.templates import number
-from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, row_of, rows, text_of
 from tests.vehicles import SIX, VEHICLES, a_vehicle

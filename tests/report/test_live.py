@@ -15,11 +15,11 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, Axis
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.csv_table import PULSES, DataFileError
+from rov_fmu.report.published import load_tables
 from rov_fmu.tank.columns import Names, columns_of_log
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import unwrapped
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.vehicle.published import load_tables
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.conftest import Visit, flown_vehicle, get, until

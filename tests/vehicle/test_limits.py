@@ -8,8 +8,8 @@ import pytest
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Declaration
 from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.report.published import Cell
 from rov_fmu.vehicle.geometry import check_mass
-from rov_fmu.vehicle.published import Cell
 from rov_fmu.vehicle.quantity import derivative_hint, within
 from tests.vehicles import numbered
 

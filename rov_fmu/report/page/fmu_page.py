@@ -37,9 +37,9 @@ from rov_fmu.report.plots.steps import (
     tables_by_axis,
 )
 from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes
+from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.report.templates import page
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.vehicle.published import Cell, ResponseTable, untuned
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
@@ -218,7 +218,7 @@ def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | N
     commands = range(least, 101, 2)
     models = [("tuned", vehicle, "blue", "-")]
     if _is_tuned(vehicle):
-        models.insert(0, ("without tuning", untuned(vehicle), "grey", "--"))
+        models.insert(0, ("without tuning", vehicle.untuned, "grey", "--"))
     for label, model, color, dashes in models:
         V_ss = [factor * model.response(axis, c / 100.0)[0] for c in commands]
         name = label if len(models) > 1 else None

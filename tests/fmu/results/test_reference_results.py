@@ -19,7 +19,6 @@ from lxml import etree
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmu.archive import FOLDER, MANIFEST, archive
 from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
-from rov_fmu.vehicle.published import load_tables, untuned
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
@@ -96,53 +95,41 @@ def test_the_files_have_the_form_of_the_standards(name: str) -> None:
     for title, experiment in _experiments(files).items():
         assert experiment.find("References").get("source") == f"{title}_expected.csv"
     assert len(archive(files)) < (40_000 if name == "identified" else 25_000)
-    if name != "videoray":
-        check_experiments_of_axes(vehicle, files)
+    check_experiments_of_axes(vehicle, files)
 
 
 def check_experiments_of_axes(vehicle: Vehicle, files: Mapping[str, bytes]) -> None:
-    """Assert that a vehicle without the paper's tables has one step of each axis, and a manoeuvre of all states."""
-    assert not [path for path, content in files.items() if b"Table" in content and not path.endswith(".toml")]
+    """Assert that a vehicle has a step of each axis, twice if it is tuned, and a manoeuvre of all states."""
     experiments = _experiments(files)
     largest = f"{100.0 * vehicle.command_range[1]:g}"
-    assert [*experiments] == [*(f"{form.axis.name}_{largest}" for form in vehicle.layout.axes), "manoeuvre"]
+    is_tuned = any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
+    ends = ("_tuned", "_untuned") if is_tuned else ("",)
+    steps = [f"{form.axis.name}_{largest}{end}" for form in vehicle.layout.axes for end in ends]
+    assert [*experiments] == [*steps, "manoeuvre"]
     moved = _rows(files, experiments["manoeuvre"].find("References").get("source"))[-1]
     assert moved.keys() - {"time"} == (vehicle.layout.state | vehicle.layout.angles).keys() - set(QUATERNION)
 
 
-def test_the_tables_of_the_paper_are_experiments() -> None:
+def test_a_tuned_vehicle_takes_each_step_with_its_tuning_and_without() -> None:
     vehicle, files = _shipped("videoray")
-    experiments, printed = _experiments(files), 0
-    for table in load_tables(vehicle):
-        v = table.axis.velocity
-        for row in table.rows:
-            for name, model, response in (
-                ("tuned", vehicle, row.scaled),
-                ("untuned", untuned(vehicle), row.non_linear),
-            ):
-                experiment = experiments.pop(f"{table.axis.name}_{row.command}_{name}")
-                printed += 1
-                assert experiment.get("description").startswith(
-                    f"Table {table.number}: {table.axis.name}, {row.command} %"
-                )
-                for cell in (response.V_ss, response.Tau):
-                    assert cell.printed is None or f"printed {cell.printed}" in experiment.get("description")
-                V_ss, Tau = table.response(model, row.command)
-                start, after_tau, *_, last = _rows(files, experiment.find("References").get("source"))
-                assert start[v] == 0.0
-                assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
-                assert after_tau[v] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
-                assert last[v] == pytest.approx(V_ss, rel=1e-3)
-                tau = after_tau["time"]
-                assert [row["time"] for row in _rows(files, experiment.find("References").get("source"))] == (
-                    pytest.approx([0.0, tau, 2.0 * tau, 4.0 * tau, 8.0 * tau])
-                )
-                attributes = {key: float(experiment.get(key)) for key in ("startTime", "stopTime", "stepSize")}
-                assert [*attributes.values()] == pytest.approx([0.0, 8.0 * tau, 0.1 * tau])
-                parameters = _parameters(files, experiment.find("Parameters").get("source"))
-                assert parameters == {key: model[key] for key in parameters}
-                assert len(parameters) == 6
-    assert printed == 28
+    experiments = _experiments(files)
+    for axis in (form.axis for form in vehicle.layout.axes):
+        for name, model in (("tuned", vehicle), ("untuned", vehicle.untuned)):
+            experiment = experiments.pop(f"{axis.name}_70_{name}")
+            V_ss, Tau = model.response(axis, 0.7)
+            rows = _rows(files, experiment.find("References").get("source"))
+            start, after_tau, *_, last = rows
+            assert start[axis.velocity] == 0.0
+            assert after_tau["time"] == pytest.approx(Tau, rel=5e-3)
+            assert after_tau[axis.velocity] == pytest.approx((1.0 - 1.0 / e) * V_ss, rel=5e-3)
+            assert last[axis.velocity] == pytest.approx(V_ss, rel=1e-3)
+            tau = after_tau["time"]
+            assert [row["time"] for row in rows] == pytest.approx([0.0, tau, 2.0 * tau, 4.0 * tau, 8.0 * tau])
+            attributes = {key: float(experiment.get(key)) for key in ("startTime", "stopTime", "stepSize")}
+            assert [*attributes.values()] == pytest.approx([0.0, 8.0 * tau, 0.1 * tau])
+            parameters = _parameters(files, experiment.find("Parameters").get("source"))
+            assert parameters == {key: model[key] for key in parameters}
+            assert len(parameters) == 6
     assert list(experiments) == ["manoeuvre"]
 
 
@@ -203,7 +190,7 @@ def _check(rov: Vehicle, files: Mapping[str, bytes], name: str) -> None:
 @pytest.mark.parametrize(
     ("name", "experiments"),
     [
-        ("videoray", ["surge_30_tuned", "manoeuvre"]),
+        ("videoray", ["surge_70_tuned", "manoeuvre"]),
         pytest.param("bluerov2_heavy", ["heave_100"], marks=pytest.mark.long),
         pytest.param("videoray", [], marks=pytest.mark.long),
         *(pytest.param(name, [], marks=pytest.mark.weekly) for name in SHIPPED if name != "videoray"),
@@ -213,7 +200,7 @@ def test_expected_values_are_right_to_their_last_digit(name: str, experiments: l
     """Those of all experiments if none is named; with coupling and lag, 50 digits take minutes."""
     vehicle, files = _shipped(name)
     for experiment in experiments or _experiments(files):
-        _check(untuned(vehicle) if experiment.endswith("_untuned") else vehicle, files, experiment)
+        _check(vehicle.untuned if experiment.endswith("_untuned") else vehicle, files, experiment)
 
 
 _HASH = """

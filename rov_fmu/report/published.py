@@ -101,11 +101,6 @@ STEP_TESTS = (
 )
 
 
-def untuned(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle with every α and β equal to 1, which is the paper's non-linear model."""
-    return vehicle.with_(**dict.fromkeys(vehicle.layout.tuning, 1.0))
-
-
 def load_tables(vehicle: Vehicle) -> tuple[ResponseTable, ...]:
     """Return Tables 6–8 of a vehicle. Raises DataFileError.
 
@@ -148,7 +143,7 @@ def _load_table(folder: Path, vehicle: Vehicle, test: StepTest) -> ResponseTable
     rows = []
     for command, (*printed, V_measured, Tau_measured) in responses.items():
         measured = steady.get(command) if V_measured is None else V_measured, Tau_measured
-        non_linear = Response(*map(Cell, printed[:2], test.response(untuned(vehicle), command), measured))
+        non_linear = Response(*map(Cell, printed[:2], test.response(vehicle.untuned, command), measured))
         scaled = Response(*map(Cell, printed[2:], test.response(vehicle, command), measured))
         rows.append(ResponseRow(command, non_linear, scaled))
     return ResponseTable(**vars(test), rows=tuple(rows), steady=steady)

@@ -10,7 +10,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.vehicle.published import Cell, ResponseTable, load_tables
+from rov_fmu.report.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
@@ -62,6 +62,13 @@ def test_the_files_hold_the_printed_cells_and_the_tables_have_the_computed_ones(
     assert [*map(str, measured["r"])] == ["1.34", "1.51", "2.61", "4.06"]
     assert str(tables["w"].steady[Decimal(50)]) == "0.28", "downward, which comes last"
     assert measured["u"] == [*tables["u"].steady.values()], "its table of responses has no measured V_ss"
+
+
+def test_the_vehicle_file_tells_how_far_steady_velocities_are_off(vehicle: Vehicle) -> None:
+    cells = [row.scaled.V_ss for table in load_tables(vehicle) for row in table.rows]
+    worst = max(abs(cell.from_measured) for cell in cells if cell.from_measured is not None)
+    said = f"Steady velocities are up to {worst:.0%} off the measured ones of Tables 3 to 5."
+    assert said.replace("%", " %") in vehicle.limits
 
 
 # ---- rov-fmu tables -------------------------------------------------------------------------------------
