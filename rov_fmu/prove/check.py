@@ -101,7 +101,10 @@ def _changes(archive: zipfile.ZipFile, evidence: MetaData) -> Iterator[str]:
     file.seek(0)
     before = hash_of(file, "sha3_256", entry.header_offset).hex()
     if before != evidence.before or file.read(len(expected) + 1) != expected:
-        yield "the archive was altered after the FMU was built, although its files are the same"
+        if evidence.before:
+            yield "the archive was altered after the FMU was built, although its files are the same"
+        else:
+            yield "the archive has no hash, because an earlier rov-fmu built it: build it again"
 
 
 def _hash(archive: zipfile.ZipFile, name: str) -> str:

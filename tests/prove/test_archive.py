@@ -1,6 +1,7 @@
 """Every reader of an archive that `prove` accepts finds the same files, and no bit of an FMU of ours can be changed."""
 
 import random
+import re
 import struct
 import zipfile
 import zlib
@@ -13,8 +14,8 @@ from typing import Any
 
 import pytest
 
-from rov_fmu.fmu.archive import archive
-from rov_fmu.fmu.meta_data import meta_data
+from rov_fmu.fmu.archive import META_DATA, archive
+from rov_fmu.fmu.meta_data import meta_data, own_hash
 from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.unpacking import unpack_fmu
@@ -120,6 +121,18 @@ def test_a_date_or_an_attribute_of_a_file_is_found_and_named(small: bytes, tmp_p
         path.write_bytes(flipped(small, place, 0))
         with pytest.raises(ProofError, match=r"small\.fmu: the archive was altered after the FMU was built, although"):
             check_evidence(path)
+
+
+def test_an_fmu_of_an_earlier_version_is_to_be_built_again(tmp_path: Path) -> None:
+    """Its meta-data have no hash of the archive."""
+    document = meta_data(load_vehicle(SHIPPED["videoray"]), _FILES, b"")
+    old = re.sub(rb'(?s) *<stc:Classification type="rov-fmu.archive">.*?</stc:Classification>\n', b"", document)
+    assert len(old) < len(document)
+    place = old.index(b'">', old.index(META_DATA.encode())) + 2
+    old = old[:place] + own_hash(old).encode() + old[place + 64 :]
+    (tmp_path / "old.fmu").write_bytes(archive(_FILES, lambda _: old))
+    with pytest.raises(ProofError, match="no hash, because an earlier rov-fmu built it: build it again"):
+        check_evidence(tmp_path / "old.fmu")
 
 
 # ---- FMUs of others --------------------------------------------------------------------------------------------------
