@@ -84,8 +84,10 @@ TESTS = {
     "rov_fmu/identify/findings.py": "identify/test_findings.py report/test_report.py report/test_console.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
     "rov_fmu/fmu/card.py": "fmu/results/test_card.py report/test_card.py fmu",
-    "rov_fmu/prove/experiments.py": "cli/test_prove.py fmu",
-    "rov_fmu/prove/proof.py": "cli/test_prove.py fmu",
+    "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
+    "rov_fmu/prove/proof.py": "cli/test_prove.py prove",
+    "rov_fmu/prove/check.py": "prove/test_archive.py fmu/results/test_evidence.py",
+    "rov_fmu/prove/signature.py": "fmu/results/test_evidence.py",
     "rov_fmu/prove/*": "prove",
     "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "

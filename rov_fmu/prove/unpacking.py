@@ -29,6 +29,8 @@ _UTF_8, _SIZES_BEHIND = 0x800, 8
 """The flags of a file whose name is in UTF-8, and of one whose sizes follow its content."""
 _LARGE = b"\1\0\x10\0"
 """How the extra field with the sizes of a large file begins."""
+_END = "<4s4H2LH"
+"""The form of the end of an archive: disks, counts, the size and the place of the directory (APPNOTE 4.3.16)."""
 _PIECE = 2**14
 """The number of bytes that are unpacked at a time."""
 
@@ -116,10 +118,13 @@ def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
             raise FileError(f"{where}: its header and its content must be as the directory of the archive says")
         size += 46 + len(_encoded(entry)) + len(entry.extra) + len(entry.comment)
     file.seek(place + size)
-    end = file.read(100 + len(zipped.comment))
-    if end.startswith(b"PK\6\6"):  # the records of large archives, of 56 and 20 bytes
-        end = end[76:]
-    if zipped.start_dir != place or not end.startswith(b"PK\5\6") or len(end) != 22 + len(zipped.comment):
+    end, count = file.read(100 + len(zipped.comment)), len(zipped.infolist())
+    largest = (2**16 - 1, 2**16 - 1, 2**32 - 1, 2**32 - 1) if end.startswith(b"PK\6\6") else ()
+    end = end[76:] if largest else end  # after the records of large archives, of 56 and 20 bytes
+    expected = b"PK\5\6", 0, 0, count, count, size, place, len(zipped.comment)
+    if len(end) != 22 + len(zipped.comment) or any(
+        number not in (right, *largest) for number, right in zip(struct.unpack(_END, end[:22]), expected, strict=True)
+    ):
         raise FileError(f"{fmu}: has bytes beside its files and its directory that belong to nothing")
 
 
@@ -135,10 +140,10 @@ def _end_of(file: IO[bytes], entry: zipfile.ZipInfo) -> int:
     without a signature (APPNOTE 4.3.9).
     """
     file.seek(entry.header_offset)
-    _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4x5H3L2H", file.read(30))
+    sign, _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4s5H3L2H", file.read(30))
     year, month, day, hour, minute, second = entry.date_time
     written = hour << 11 | minute << 5 | second // 2, (year - 1980) << 9 | month << 5 | day
-    if (flags, method, time, date) != (entry.flag_bits, entry.compress_type, *written):
+    if (sign, flags, method, time, date) != (b"PK\3\4", entry.flag_bits, entry.compress_type, *written):
         return 0
     if file.read(name) != _encoded(entry):
         return 0

@@ -256,6 +256,15 @@ HIDDEN: dict[str, tuple[Callable[[], bytes], str]] = {
     "another date": (lambda: flipped(ONE, 12, 0), "member 'modelDescription.xml': its header and its content must be"),
     "an entry in the content": (lambda: _hidden_behind_a_stream(ONE), "member 'modelDescription.xml': its header and"),
     "a word behind": (lambda: ONE + b"more", "has bytes beside its files and its directory that belong to nothing"),
+    "another count": (lambda: flipped(ONE, len(ONE) - 12, 1), "has bytes beside its files and its directory that"),
+    "offsets that are too large": (
+        lambda: _moved(ONE, 5),
+        "has bytes beside its files and its directory that belong to nothing",
+    ),
+    "a folder without its sign": (
+        lambda: flipped(archive({"a/": b""}), 2, 3),
+        "member 'a/': its header and its content",
+    ),
     "a folder with content": (lambda: archive({"a/": b"x"}), "member 'a/': is a folder, and must have no content"),
     "a number that is too large": (
         lambda: ONE[: DIRECTORY + 42] + b"\xff\xff\xff\x7f" + ONE[DIRECTORY + 46 :],
