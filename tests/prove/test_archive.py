@@ -177,6 +177,15 @@ def _large(zipped: zipfile.ZipFile) -> None:
             file.write(content)
 
 
+def _many() -> bytes:
+    """Return an archive with the records of one that has more than 65,535 files."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(zipfile, "ZIP_FILECOUNT_LIMIT", 1)
+        content = _written(_plain)
+    assert b"PK\6\6" in content
+    return content
+
+
 def _with_extra_fields(zipped: zipfile.ZipFile) -> None:
     for name, content in _FILES.items():
         entry = zipfile.ZipInfo(name, (2024, 2, 29, 1, 2, 4))
@@ -199,6 +208,7 @@ HONEST: dict[str, Callable[[], bytes]] = {
     "as a stream": lambda: _written(_plain, _Stream()),
     "as a stream of large files": lambda: _written(_large, _Stream()),
     "large files": lambda: _written(_large),
+    "many files": _many,
     "without the optional signature": lambda: _without_signatures(
         _written(lambda zipped: zipped.writestr("modelDescription.xml", b"<a/>" * 9), _Stream())
     ),
