@@ -69,7 +69,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = slips(tests, known, fit.objective, fit.best.z)
+    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors)
     held_out = held_out_rows(fit)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests.given)
