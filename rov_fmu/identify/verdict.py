@@ -16,12 +16,12 @@ from rov_fmu.identify.result import (
     Prediction,
     Slip,
     Verdict,
-    Word,
     coverage_of,
     relative_error,
     score_of,
 )
 from rov_fmu.io.messages import listed
+from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
 MOST_GAIN = 0.3

@@ -186,7 +186,7 @@ class Drawn:
                 sticks[axis][at:end] = random.choice([0.0, -1.0, 1.0], p=[0.25, 0.35, 0.4]) * random.uniform(0.15, most)
                 at = end
         surge, yaw = sticks["surge"], sticks["yaw"]
-        return np.round(np.clip([surge + yaw, surge - yaw, sticks["heave"]], -1.0, 1.0), 3)
+        return np.asarray(np.round(np.clip([surge + yaw, surge - yaw, sticks["heave"]], -1.0, 1.0), 3))
 
     def _log(self, body: Body, commands: Array, random: np.random.Generator) -> Table:
         """Return the columns of a log."""
