@@ -12,7 +12,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, refits
 from rov_fmu.identify.result import (
     DISAGREEMENT,
@@ -49,6 +49,8 @@ _OF_THRUST = 0.7
 _EXPONENT = 0.15
 """The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
 of the command and the velocity that are known to about a tenth each."""
+_WIDEST_HALF = 50.0
+"""The largest half-width of an interval of a logarithm."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
 _STOPPED = 0.1
@@ -85,7 +87,7 @@ def predictions(objective: Objective, best: Minimum, against: Vehicle | None = N
     left_out = [*_left_out(objective)]
     found = refits(objective, best, [rest for _, rest in left_out])
     for (part, _), without in zip(left_out, found, strict=True):
-        covariance = Posterior.of(objective.table, without.z, without.information).averaged.covariance
+        covariance = Posterior.of(objective.table, without.z, without.information).covariance
         if len(objective.logs) > 1:
             covariance = _with_currents(objective, best, covariance, part.log)
         yield from _predicted(objective, part, cautious(objective, without.z), covariance, other)
@@ -109,10 +111,8 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
     """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
     if not against or against.layout.gains != table.layout.gains:
         return None
-    values = against.with_(table.layout).coefficients
-    if len(values) < len(against.coefficients):
-        return None
-    return replace(table, base={**table.base, **values}, exact=frozenset(values), shape_deviation=0.0)
+    is_whole = len(against.with_(table.layout).coefficients) == len(against.coefficients)
+    return table.of_vehicle(against) if is_whole else None
 
 
 def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
@@ -231,16 +231,14 @@ def _unchanged(time: Array, values: Array, span: float) -> float:
 
 
 def answers(
-    posterior: Posterior, axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = (), strongest: float = 1.0
+    posteriors: Sequence[Posterior], axis: Axis, vehicle: Vehicle, pushes: Sequence[float] = (), strongest: float = 1.0
 ) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
-    those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves
-    bend freely, the intervals are wider by the difference. They are also wider for commands beyond the strongest one of
-    the tests.
+    those of the vehicle file, and each interval contains those of all posteriors. They are wider for commands beyond
+    the strongest one of the tests.
     """
-    table = posterior.table
 
     def values(vehicle: Vehicle, shapes: Shapes) -> Array:
         rest = shapes.motions(vehicle, axis, np.zeros(1))
@@ -250,36 +248,37 @@ def answers(
         push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
         return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
 
-    def logarithms(z: Array) -> Array:
-        fitted = values(*table.model(z))
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.log(np.abs(fitted)).reshape(3 * len(fitted), -1)
+    def intervals(posterior: Posterior) -> tuple[Array, Array]:
+        """Return the logarithms of the ends of all intervals."""
 
-    with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
-        slopes = posterior.slopes(logarithms)
-    slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-    variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
-    # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-    variances[:, :2] += (_OF_THRUST * table.get(posterior.z, "slow gain")) ** 2
-    sizes = np.abs(pushes or ANSWERED)
-    variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
+        def logarithms(z: Array) -> Array:
+            some = values(*posterior.table.model(z))
+            with np.errstate(divide="ignore", invalid="ignore"):  # a speed of 0 has no logarithm
+                return np.log(np.abs(some)).reshape(3 * len(some), -1)
+
+        with np.errstate(invalid="ignore"):
+            slopes = posterior.slopes(logarithms)
+        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
+        # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
+        variances[:, :2] += (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2
+        sizes = np.abs(pushes or ANSWERED)
+        variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
+        half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), EXACT), _WIDEST_HALF)
+        middle = logarithms(posterior.z[:, None]).reshape(half.shape)
+        return middle - half, middle + half
+
     of_file = values(vehicle, NO_SHAPES)
     with np.errstate(divide="ignore", invalid="ignore"):
-        beside = np.abs(np.log(np.abs(of_file)) - logarithms(posterior.z[:, None]).reshape(of_file.shape)) / QUANTILE
-    errors = np.maximum(np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0), EXACT / QUANTILE)
+        middle = np.log(np.abs(of_file))
+        lows, highs = zip(*map(intervals, posteriors), strict=True)
+        low, high = (np.where(np.isfinite(end), end, middle) for end in (np.min(lows, axis=0), np.max(highs, axis=0)))
+        ends = np.exp(np.stack([np.minimum(low, middle - EXACT), np.maximum(high, middle + EXACT)], axis=-1))
     found = []
-    for command, error, (V, rise, stop) in zip(ANSWERED, errors, of_file.tolist(), strict=True):
-        steady = around(abs(V), abs(V) * error[0], positive=True)
+    for command, (V, rise, stop), intervals_of in zip(ANSWERED, of_file.tolist(), ends.tolist(), strict=True):
+        steady, of_rise, of_stop = map(tuple, intervals_of)
         signed = steady if V >= 0.0 else (-steady[1], -steady[0])
-        found.append(
-            Answer(
-                axis,
-                command,
-                (V, signed),
-                (rise, around(rise, rise * error[1], positive=True)),
-                (stop, around(stop, stop * error[2], positive=True)),
-            )
-        )
+        found.append(Answer(axis, command, (V, signed), (rise, of_rise), (stop, of_stop)))
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 

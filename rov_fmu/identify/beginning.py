@@ -235,8 +235,9 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     has_lag = any(name.startswith("T_") for name in given.base)
     exact = _exact(given, vehicle.layout, measured)
     errors = _thrust_errors(given, curves)
+    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
-        vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
+        vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors, bent
     )
     return known, logs, [*_table_rows(tests, vehicle)]
 

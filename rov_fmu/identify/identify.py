@@ -14,7 +14,7 @@ from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import beyond_thrusters, told
-from rov_fmu.identify.identified_vehicle import identified_vehicle, rounded, with_own_inputs
+from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Effect, Identification, Prediction, Slip
@@ -69,15 +69,16 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out, effects)
         if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
             strongest = fit.command_range[1]
-            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes, strongest))
+            one = replace(one, answers=assess.answers(fit.posteriors, axis, vehicle, pushes, strongest))
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
+    of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
-        vehicle=rounded(of_file),
+        vehicle=of_file,
         against=against,
         axes=tuple(axes),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
@@ -109,7 +110,7 @@ def _axis(
 ) -> AxisResult:
     own = tuple(p for p in predicted if p.axis is axis)
     is_told = _is_thrust_told(tests, vehicle, axis)
-    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1]) if is_told else ()
+    answers = assess.answers(fit.posteriors, axis, vehicle, strongest=fit.command_range[1]) if is_told else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
@@ -117,6 +118,7 @@ def _axis(
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     limits = tests.given.description.tables.limits
+    shown = replace(fit.posterior, z=fit.file.posterior.z)
     return AxisResult(
         axis=axis,
         verdict=assess.verdict(
@@ -126,7 +128,7 @@ def _axis(
         known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
         predictions=own,
         points=(*steady, *times),
-        next_test=next_test(fit.objective, fit.averaged, axis, limits, answers) if is_told else None,
+        next_test=next_test(fit.objective, shown, axis, limits, answers) if is_told else None,
     )
 
 

@@ -15,7 +15,7 @@ farther they are. The rows of the tables of tank tests are samples too: their in
 is the square of their noise.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -203,6 +203,14 @@ class Objective:
         found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
         found.whole = Part(range(len(part.logs)), range(len(part.rows)), part.chosen)
         found.__dict__.pop("_of_rows", None)
+        return found
+
+    def without(self, absent: Iterable[int]) -> "Objective":
+        """Return J where some effects are absent, by their places: their bounds are where they are absent."""
+        found = copy(self)
+        found.low, found.high = self.low.copy(), self.high.copy()
+        for n in absent:
+            found.low[n] = found.high[n] = self.table.parameters[n].null
         return found
 
     # ---- One log ----
