@@ -24,11 +24,11 @@ from rov_fmu.identify.result import (
     Prediction,
     Slip,
     Verdict,
-    Word,
     coverage_of,
     relative_error,
 )
 from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.uncertainty import LEVEL, NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -10,13 +10,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
     PLACED,
     Answer,
+    AxisOfBase,
     AxisResult,
     Coefficient,
     Disturbance,
@@ -241,7 +242,7 @@ def told(identification: Identification) -> Identification:
         "warnings": warnings(findings),
         # other files beside the tests say nothing about the vehicle
         "facts": facts(finding for finding in findings if finding.kind != "other files"),
-        "verdicts": tuple(map(verdict_in_words, identification.axes)),
+        "verdicts": tuple(verdict.of(axis) for axis, verdict in identification.verdicts.items()),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }
     made = made.model_copy(update=sentences_of)
@@ -289,16 +290,6 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
 
 
-def verdict_in_words(result: AxisResult) -> str:
-    """Return the verdict of an axis with its reasons: `surge: good. The 95% bands contain 97% ...`."""
-    return f"{result.axis.name}: {result.verdict.word}. {' '.join(map(with_stop, result.verdict.reasons))}"
-
-
-def with_stop(sentence: str) -> str:
-    """Return a sentence that ends with a full stop or a question mark."""
-    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
-
-
 def name_of(p: Prediction) -> str:
     """Return the name of what is predicted: `heave depth, 10 s ahead`."""
     quantity = p.quantity if p.axis.name in p.quantity else f"{p.axis.name} {p.quantity}"
@@ -318,8 +309,28 @@ def next_tests(identification: Identification) -> list[str]:
     """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
-    any test there is none.
+    any test there is none. How to identify the other axes of the vehicle comes last.
     """
+    others = [f"{one.axis.name}: {how_to_identify(one)}." for one in identification.axes_of_base]
+    return [*_next_tests(identification), *others]
+
+
+def how_to_identify(one: AxisOfBase) -> str:
+    """Return what an owner can record, so that an axis of the base is identified."""
+    axis, sensor = one.axis, "its angle and its rate"
+    if axis is HEAVE:
+        sensor = "the depth"
+    elif axis is YAW:
+        sensor = "the heading or the turn rate"
+    elif not axis.is_rotation:
+        sensor = (
+            "its velocity (a DVL). Without one, film the vehicle along a tape on the floor, and write time, command "
+            f"and distance into log_{axis.name}_1.csv; a track from a video does, too"
+        )
+    return f"{one.reason}. Command it both ways, and log {sensor}"
+
+
+def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."

@@ -55,7 +55,9 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
     changed = _changed(file, rov)
     coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
-    identified = {name: one.interval for name, one in coefficients.items() if one.interval}
+    forms = (form for form in layout.axes if form.axis in fit.known.unseen)
+    unseen = {form.coefficient(key) for form in forms for key in (*form.keys, "beta")}
+    identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = given.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
@@ -70,13 +72,13 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     names = [name for name in changed if name in identified or name in intervals]
     for name in changed:
         sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
-        if name not in names:
+        if name not in {*names, *unseen}:
             sources[name] = "Assumed: the tests do not determine it"
     if names:
         held = [  # a file without a dead band has an exact one of 0
             name
             for name, (*_, key) in fit.known.layout.keys_in_file.items()
-            if name not in names and (name in changed or key in _DEAD_BAND)
+            if name not in {*names, *unseen} and (name in changed or key in _DEAD_BAND)
         ]
         of_file, full = (_numbers(posterior, fit, [*names, *held]) for posterior in fit.posteriors)
         shift = full.values - of_file.values

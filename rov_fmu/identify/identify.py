@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -17,12 +17,22 @@ from rov_fmu.identify.findings import beyond_thrusters, told
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Effect, Identification, Prediction, Slip
+from rov_fmu.identify.result import (
+    AxisOfBase,
+    AxisResult,
+    Coefficient,
+    Disturbance,
+    Effect,
+    Identification,
+    Prediction,
+    Slip,
+)
 from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
+from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
@@ -59,7 +69,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = slips(tests, known, fit.objective, fit.best.z)
+    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors)
     held_out = held_out_rows(fit)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests.given)
@@ -81,6 +91,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         vehicle=of_file,
         against=against,
         axes=tuple(axes),
+        axes_of_base=tuple(_of_base(tests, fit, of_file)),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
         forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
         effects=effects,
@@ -130,6 +141,20 @@ def _axis(
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if is_told else None,
     )
+
+
+def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
+    """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them."""
+    description = tests.given.description
+    shown = {m.sensor.axis for one in fit.objective.logs for m in one.measured}
+    for axis in (form.axis for form in vehicle.layout.axes if form.axis not in fit.known.fitted):
+        is_of_file = axis.coefficient("a_d") in description.known
+        told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
+        if axis.name in tests.tested.axes:
+            told = "no test changes it"
+        elif axis in shown:
+            told = "nothing in the logs drives it"
+        yield AxisOfBase(axis, ROV_FILE if is_of_file else description.base_name, told)
 
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:

@@ -14,10 +14,10 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
+from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Interval = tuple[float, float]
-Word = Literal["good", "usable", "do not use"]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
@@ -245,6 +245,32 @@ class Verdict:
     reasons: tuple[str, ...]
     """Sentences: what keeps it from being better, or for `good` what it rests on."""
 
+    def of(self, axis: Axis) -> str:
+        """Return the verdict of an axis as a sentence: `surge: good. The 95% bands contain 97% ...`."""
+        stop = ":" if self.word == "not identified" else "."
+        return f"{axis.name}: {self.word}{stop} {' '.join(map(with_stop, self.reasons))}"
+
+
+def with_stop(sentence: str) -> str:
+    """Return a sentence that ends with a full stop or a question mark."""
+    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
+
+
+@dataclass(frozen=True)
+class AxisOfBase:
+    """An axis of the vehicle that no test identifies."""
+
+    axis: Axis
+    source: str
+    """The base, or rov.toml."""
+    reason: str
+    """Such as `nothing in the logs shows it`."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The word, with where its coefficients are from."""
+        return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+
 
 @dataclass(frozen=True)
 class NextTest:
@@ -340,8 +366,16 @@ class Identification:
     """The slow force along each moving axis of each log."""
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
+    axes_of_base: tuple[AxisOfBase, ...] = ()
+    """The other axes of the vehicle."""
     findings: tuple[Finding, ...] = ()
     """What to tell, in the order of its weight. The sentences and severities are in findings.py."""
+
+    @property
+    def verdicts(self) -> dict[Axis, Verdict]:
+        """The verdict of every axis of the vehicle, those that are identified first."""
+        found = {one.axis: one.verdict for one in self.axes}
+        return found | {one.axis: one.verdict for one in self.axes_of_base}
 
     @property
     def seconds(self) -> float:

@@ -16,7 +16,6 @@ from rov_fmu.identify.findings import (
     not_read,
     repairs,
     size_in_words,
-    verdict_in_words,
     with_error,
 )
 from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
@@ -35,8 +34,8 @@ def print_identification(identification: Identification) -> None:
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for words in repairs(identification):
         paragraph(out, f"First: {words}")
-    for result in identification.axes:
-        paragraph(out, f"- {verdict_in_words(result)}")
+    for axis, verdict in identification.verdicts.items():
+        paragraph(out, f"- {verdict.of(axis)}")
     asides = [*driven_aside(identification), *extrapolated(vehicle)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:

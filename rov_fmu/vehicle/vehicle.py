@@ -253,9 +253,8 @@ class Vehicle:
         An axis without a verdict, or in a file without verdicts an axis of which no coefficient has an interval, was
         not identified.
         """
-        sentences = self.provenance.verdicts if self.provenance else ()
-        words = {axis: rest.partition(".")[0] for axis, _, rest in (one.partition(": ") for one in sentences)}
-        if not sentences:
+        words = self.provenance.words if self.provenance else {}
+        if not words:
             places = [keys for name, keys in self.layout.keys_in_file.items() if name in self.intervals]
             words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
         found = {axis: words.get(axis, "not identified") for axis in self.layout.kinds}

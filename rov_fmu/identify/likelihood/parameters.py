@@ -342,6 +342,8 @@ class Beginning:
     """The names of the coefficients that no fit changes."""
     thrust_errors: Mapping[str, float] = field(default_factory=dict)
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
+    unseen: Sequence[Axis] = ()
+    """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
     bent: frozenset[str] = frozenset()
     """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
@@ -441,7 +443,7 @@ def _held(p: Parameter) -> Parameter:
 
 
 def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
-    for axis in known.fitted:
+    for axis in (*known.fitted, *known.unseen):
         name, c = axis.name, known.coefficients
         if axis.coefficient("beta") not in known.exact:
             yield Parameter("inertia", name, deviation=prior("inertia"), is_log=True)
@@ -452,7 +454,7 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
             if axis.coefficient(key) not in known.exact:
                 mean = log(max(c[axis.coefficient(key)], 1e-9))
                 yield Parameter(kind, name, mean=mean, deviation=width, is_log=True)
-        free = {*known.layout.coefficients} - known.exact
+        free = {*known.layout.coefficients} - known.exact if axis in known.fitted else ()
         if axis.coefficient(f"a_d{REVERSE}") in free:
             yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
         if (load := known.layout.kinds[name].coefficient("F_0")) in free:

@@ -11,8 +11,9 @@ import numpy as np
 
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.result import Identification, Interval, Prediction, Word
+from rov_fmu.identify.result import Identification, Interval, Prediction
 from rov_fmu.io.messages import FileError
+from rov_fmu.vehicle.description import Word
 from tests.identify.scenarios.scenario import UNSEEN, Scenario, Truths, steady_name
 
 _POSSIBLE = {
