@@ -319,9 +319,9 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
 
 
 def _responses(motions: Motions, rest: Motions) -> Array:
-    """Return V_ss, Tau, and the way from V_ss to a tenth of it without any force: commands x 3, or commands x 3 x n."""
+    """Return V_ss, Tau and the stopping distance, from V_ss to a tenth of it: commands x 3, or commands x 3 x n."""
     V, Tau = motions.response()
-    return np.stack([V, Tau, rest.stopping_way(V, _STOPPED)], axis=1)
+    return np.stack([V, Tau, rest.stopping_distance(V, _STOPPED)], axis=1)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------

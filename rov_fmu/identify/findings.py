@@ -55,8 +55,8 @@ _MOST_OUTLIERS = 0.005
 SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
-    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop is "
-    "that without thrust, from the steady speed to a tenth of it."
+    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The "
+    "stopping distance is that without thrust, from the steady speed to a tenth of it."
 )
 _ASIDE = 0.2
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,

@@ -61,7 +61,7 @@ class Answer:
     rise: tuple[float, Interval]
     """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
     stop: tuple[float, Interval]
-    """The way from it to a tenth of it without thrust, m or rad."""
+    """The stopping distance: from it to a tenth of it without thrust, m or rad."""
 
 
 @dataclass(frozen=True, eq=False)

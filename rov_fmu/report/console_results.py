@@ -51,7 +51,7 @@ def print_identification(identification: Identification) -> None:
 def _answers(axes: Sequence[AxisResult]) -> Table:
     """Return the table of what an owner asks about each axis."""
     speeds = [f"speed at {share:.0%}" for share in SHARES]
-    found = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "way to stop"])
+    found = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "stopping distance"])
     for result in axes:
         axis, half = result.axis, answer_at(result, 0.5)
         cells = [_known(answer_at(result, share), "steady", axis.unit) for share in SHARES]

@@ -133,7 +133,7 @@ def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() 
 
     def numbers(rov: Vehicle, command: float) -> np.ndarray:
         V, Tau = rov.response(SURGE, command)
-        return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_way(abs(V), 0.1)])
+        return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_distance(abs(V), 0.1)])
 
     more, less = (VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(s)) for s in (0.01, -0.01))
     found = answers([uncertain], SURGE, file)
@@ -166,7 +166,7 @@ def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_te
     V, _ = losing.response(SURGE, 0.5)
     assert VIDEORAY.response(SURGE, 0.5)[0] > V
     coasting = VIDEORAY.alone(SURGE, VIDEORAY.layout.usual_inputs)
-    assert half.stop[0] == pytest.approx(coasting.stopping_way(V, 0.1))
+    assert half.stop[0] == pytest.approx(coasting.stopping_distance(V, 0.1))
     assert half.steady[1][1] / half.steady[0] == pytest.approx(np.exp(0.01))
     for value, (_, high) in (full.steady, full.rise, full.stop):
         assert np.log(high / value) == pytest.approx(t.ppf(0.975, 10) * 0.15 * np.log(2.0))

@@ -184,7 +184,7 @@ def identified(folder: Path, rov: str, columns: Mapping[str, np.ndarray], name: 
 @pytest.mark.long
 @pytest.mark.parametrize("lost", [12.0, 0.0])
 def test_thrust_that_falls_with_the_speed_is_found(lost: float, tmp_path: Path) -> None:
-    """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the way to stop has no thrust."""
+    """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the stopping distance has no thrust."""
     h, speeds, v = 0.001, [], 0.0
     commands = np.repeat(HELD, round(4.0 / h))
     for c in commands.tolist():

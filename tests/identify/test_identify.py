@@ -49,7 +49,7 @@ def kinds(found: Identification) -> set[tuple[str, str]]:
 
 
 def check_answers(result: AxisResult, near: float, commands: tuple[float, ...] = COMMANDS) -> None:
-    """Check V_ss, Tau and the way to stop against the truth, which each interval contains (if it is 1.6 times as wide).
+    """Check V_ss, Tau and the stopping distance: each interval contains the truth (if it is 1.6 times as wide).
 
     One of twenty intervals misses the truth, and a single log has twelve of them.
     """
