@@ -118,6 +118,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "{axes}: no motion was predicted that the fit had not seen, so the errors of predictions are not known. "
             "Another log would show them"
         ),
+        "assumed thrust": (
+            "{curve} thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A "
+            "spring balance tells it: pull with full command, and write command and force into thrust_{curve}.csv"
+        ),
         "not identified": "{of}: the tests do not determine {coefficients}{instead}",
         "points differ": "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from the model",
         "saturation": (
@@ -248,7 +252,9 @@ def told(identification: Identification) -> Identification:
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
     layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
-    vehicle = replace(vehicle, layout=layout, provenance=made)
+    units = " (in units of the assumed thrust)" if any(one.kind == "assumed thrust" for one in findings) else ""
+    data = vehicle.measured_from + units
+    vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
 
 
@@ -273,7 +279,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         found += _on_points(result)
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += _on_forces(identification)
+    found += [*_on_forces(identification), *_on_scale(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
     found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
@@ -541,6 +547,21 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+
+
+def _on_scale(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding for each curve whose thrust is an assumption: neither a test nor rov.toml tells it."""
+    layout, description = identification.vehicle.layout, identification.folder.rov_file.description
+    told = {p.subject for p in identification.forces} | ({*description.known} if description else set())
+    for curve, known in identification.curves.items():
+        a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
+        if a_t in {one.name for one in known} and not {curve, a_t} & told:
+            yield Finding("assumed thrust", curve=curve)
+
+
+def assumed_thrust(identification: Identification) -> tuple[str, ...]:
+    """Return a sentence for each curve whose thrust is an assumption: it says in which units the forces are."""
+    return sentences(finding for finding in identification.findings if finding.kind == "assumed thrust")
 
 
 _REMEDIES = {

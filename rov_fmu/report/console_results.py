@@ -8,6 +8,7 @@ from rov_fmu.identify.findings import (
     SHARES,
     STOPPING,
     answer_at,
+    assumed_thrust,
     by_heading,
     driven_aside,
     extrapolated,
@@ -84,11 +85,13 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     if kept := [effect for effect in identification.effects if effect.kept]:
         words = (f"{e.name} ({f'{e.of} {size_in_words(e.value, e.unit)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
+    yield from (f"{sentence}." for sentence in assumed_thrust(identification))
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
     others = not_read(identification.findings)
     yield from others
+    others += assumed_thrust(identification)
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))

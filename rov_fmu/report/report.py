@@ -71,6 +71,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         card=card(results.vehicle),
         asides=findings.driven_aside(results),
         extrapolated=findings.extrapolated(results.vehicle),
+        assumed=findings.assumed_thrust(results),
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,

@@ -12,9 +12,9 @@ from scipy.stats import t
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
 from rov_fmu.identify import beginning
-from rov_fmu.identify.assess import ahead, cautious
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.held_out import ahead, cautious
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit

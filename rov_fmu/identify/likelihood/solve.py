@@ -164,9 +164,7 @@ class _Refit:
     def __init__(self, objective: Objective, part: Part, best: Minimum, *, is_inside: bool) -> None:
         self.objective, self.part, self.z = objective, part, best.z
         self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
-        self.data = [best.data[n] for n in part.logs]
-        if part.rows:
-            self.data.append(best.data[-1].part(part.rows))
+        self.data = _data_of(part, best)
         self.value = objective.value(self.z, self.runs) if is_inside else np.inf
         self.damping = 0.0
 
@@ -194,13 +192,24 @@ class _Refit:
                 self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
 
 
+def _data_of(part: Part, best: Minimum) -> list[Data]:
+    """Return the data of a minimum for a part of its logs and rows."""
+    rows = [best.data[-1].part(part.rows)] if part.rows else []
+    return [*(best.data[n] for n in part.logs), *rows]
+
+
+def information_of(objective: Objective, best: Minimum, part: Part) -> Array:
+    """Return the information of a part of the data at the minimum for all, with that of the prior."""
+    return total(objective.of(part), best.z, _data_of(part, best))[1]
+
+
 def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
     """Return the gradient and the information of J, with those of the prior."""
     weight = 1.0 / objective.deviation**2
     size = len(z)
     gradient, information = np.zeros(size), np.zeros((size, size))
     for n, some in enumerate(data):
-        g, H = some.information(objective.whole.chosen if n < len(objective.logs) else slice(None))
+        g, H = some.information(objective.chosen(n))
         gradient, information = gradient + g, information + H
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)

@@ -4,7 +4,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify import assess
+from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -40,9 +40,9 @@ class Identified:
         z[here], covariance[np.ix_(here, here)] = own.z[there], own.covariance[np.ix_(there, there)]
         for n, p in enumerate(table.parameters):
             if p.kind == "current":
-                covariance[n, n] = assess.unseen_current(own.table, own.z, own.covariance, p.of)
+                covariance[n, n] = held_out.unseen_current(own.table, own.z, own.covariance, p.of)
         objective = Objective(table, [recording.log], [])
-        off, deviations = assess.ahead(objective, 0, assess.cautious(objective, z), covariance, begin, span)
+        off, deviations = held_out.ahead(objective, 0, held_out.cautious(objective, z), covariance, begin, span)
         return recording.log.record.value - off, deviations**2
 
     def coefficients(self, axis: Axis) -> Known:
