@@ -10,7 +10,7 @@ from scipy.stats.qmc import Sobol
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import Answer
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
@@ -25,6 +25,8 @@ _OF_THRUST = 0.7
 _EXPONENT = 0.15
 """The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
 of the command and the velocity that are known to about a tenth each."""
+_WIDEST_HALF = 50.0
+"""The largest half-width of an interval of a logarithm."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
 _STOPPED = 0.1
@@ -61,7 +63,7 @@ def logarithms(
 
 
 def answers(
-    posterior: Posterior,
+    posteriors: Sequence[Posterior],
     axis: Axis,
     vehicle: Vehicle,
     pushes: Sequence[float] = (),
@@ -71,45 +73,39 @@ def answers(
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
-    those of the vehicle file, whose thrust curves are quadratic. Where they differ from those of the fit, whose curves
-    bend freely, the intervals are wider by the difference. They are also wider for commands beyond the strongest one of
-    the tests, and contain the answers of those of `fits`, which lack a part of the data, that disagree: the difference
-    of a fit to all data and of one to a part has the variance by which theirs differ (Hausman 1978,
-    doi:10.2307/1913827).
+    those of the vehicle file, and each interval contains those of all posteriors. They are wider for commands beyond
+    the strongest one of the tests, and contain the answers of those of `fits`, which lack a part of the data, that
+    disagree with the last posterior: the difference of a fit to all data and of one to a part has the variance by which
+    theirs differ (Hausman 1978, doi:10.2307/1913827).
     """
-    table = posterior.table
-    fitted = logarithms(table, axis, pushes=pushes)
-    with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
-        slopes = posterior.slopes(fitted)
-    slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-    variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(len(ANSWERED), 3)
-    # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-    variances[:, :2] += (_OF_THRUST * table.get(posterior.z, "slow gain")) ** 2
     sizes = np.abs(pushes or ANSWERED)
-    variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
     of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-    beside = np.abs(own - fitted(posterior.z[:, None]).reshape(own.shape)) / QUANTILE
-    errors = np.sqrt(variances) + np.where(np.isfinite(beside), beside, 0.0)
+    ends = [own - EXACT, own + EXACT]
+    for posterior in posteriors:
+        fitted = logarithms(posterior.table, axis, pushes=pushes)
+        with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
+            slopes = posterior.slopes(fitted)
+        slopes = np.where(np.isfinite(slopes), slopes, 0.0)
+        variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(own.shape)
+        # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
+        variances[:, :2] += (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2
+        variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
+        half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), EXACT), _WIDEST_HALF)
+        middle = fitted(posterior.z[:, None]).reshape(own.shape)
+        ends += [middle - half, middle + half]
     for fit in fits:
-        apart = np.abs(fitted(fit.z[:, None]).reshape(own.shape) - own) / QUANTILE
+        other = fitted(fit.z[:, None]).reshape(own.shape)
         lost = np.einsum("ni,ij,nj->n", slopes, fit.covariance - posterior.covariance, slopes).reshape(own.shape)
-        errors = np.where(apart**2 > lost, np.fmax(errors, apart), errors)
-    errors = np.maximum(errors, EXACT / QUANTILE)
+        ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
+    low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     found = []
-    for command, error, (V, rise, stop) in zip(ANSWERED, errors, of_file.tolist(), strict=True):
-        steady = around(abs(V), abs(V) * error[0], positive=True)
+    intervals = np.stack([low, high], axis=-1).tolist()
+    for command, (V, rise, stop), own_ends in zip(ANSWERED, of_file.tolist(), intervals, strict=True):
+        steady, of_rise, of_stop = map(tuple, own_ends)
         signed = steady if V >= 0.0 else (-steady[1], -steady[0])
-        found.append(
-            Answer(
-                axis,
-                command,
-                (V, signed),
-                (rise, around(rise, rise * error[1], positive=True)),
-                (stop, around(stop, stop * error[2], positive=True)),
-            )
-        )
+        found.append(Answer(axis, command, (V, signed), (rise, of_rise), (stop, of_stop)))
     return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
 
 

@@ -136,10 +136,8 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
     """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
     if not against or against.layout.gains != table.layout.gains:
         return None
-    values = against.with_(table.layout).coefficients
-    if len(values) < len(against.coefficients):
-        return None
-    return replace(table, base={**table.base, **values}, exact=frozenset(values), shape_deviation=0.0)
+    is_whole = len(against.with_(table.layout).coefficients) == len(against.coefficients)
+    return table.of_vehicle(against) if is_whole else None
 
 
 def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:

@@ -15,7 +15,7 @@ from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import beyond_thrusters, told
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions, structure
-from rov_fmu.identify.identified_vehicle import identified_vehicle, rounded, with_own_inputs
+from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import (
@@ -86,11 +86,12 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
+    of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
-        vehicle=rounded(of_file),
+        vehicle=of_file,
         against=against,
         axes=tuple(axes),
         axes_of_base=tuple(_of_base(tests, fit, of_file)),
@@ -128,7 +129,7 @@ def _axis(
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
-    answers = assess.answers(fit.averaged, axis, vehicle, pushes, strongest, fits) if is_told and is_steady else ()
+    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, strongest, fits) if is_told and is_steady else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
@@ -136,6 +137,7 @@ def _axis(
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     limits = tests.given.description.tables.limits
+    shown = replace(fit.posterior, z=fit.file.posterior.z)
     known = _those_of(coefficients, vehicle.layout.kinds[axis.name], "beta")
     evidence = Evidence(
         predictions=own,
@@ -159,7 +161,7 @@ def _axis(
         known=known,
         predictions=own,
         points=(*steady, *times),
-        next_test=next_test(fit.objective, fit.averaged, axis, limits, answers) if answers else None,
+        next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
     )
 
 

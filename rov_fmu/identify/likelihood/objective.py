@@ -15,7 +15,7 @@ farther they are. The rows of the tables of tank tests are samples too: their in
 is the square of their noise.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -204,6 +204,14 @@ class Objective:
         chosen = {place: part.chosen[n] for place, n in enumerate(part.logs) if n in part.chosen}
         found.whole = Part(range(len(part.logs)), range(len(part.rows)), chosen)
         found.__dict__.pop("_of_rows", None)
+        return found
+
+    def without(self, absent: Iterable[int]) -> "Objective":
+        """Return J where some effects are absent, by their places: their bounds are where they are absent."""
+        found = copy(self)
+        found.low, found.high = self.low.copy(), self.high.copy()
+        for n in absent:
+            found.low[n] = found.high[n] = self.table.parameters[n].null
         return found
 
     # ---- One log ----

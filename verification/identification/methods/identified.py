@@ -31,7 +31,7 @@ class Identified:
 
     def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
-        own = self.found.averaged
+        own = self.found.posterior
         table = table_of(self.found.known, [recording.log], [])
         z = np.array([p.mean for p in table.parameters])
         covariance = np.diag([p.deviation**2 for p in table.parameters])
@@ -47,10 +47,10 @@ class Identified:
 
     def coefficients(self, axis: Axis) -> Known:
         """Return the answers that `rov-fmu identify` gives, and the drag over the inertia with its posterior."""
-        own = self.found.averaged
+        own = self.found.posterior
         vehicle, _ = identified_vehicle(self.tests, self.found)
         known: dict[str, tuple[float, float, float]] = {}
-        for answer in assess.answers(own, axis, vehicle):
+        for answer in assess.answers(self.found.posteriors, axis, vehicle):
             if answer.command in assess.COMMANDS:
                 low, high = sorted(map(abs, answer.steady[1]))
                 known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high
