@@ -250,10 +250,12 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     moved = {form.axis for one in logs for form in one.layout.axes}
     exact = _exact(given, vehicle.layout, measured, moved, shown)
     errors = _thrust_errors(given, curves)
+    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
         vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
     )
-    known = replace(known, unseen=[form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}])
+    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
+    known = replace(known, unseen=unseen, bent=bent)
     return known, logs, [*_table_rows(tests, vehicle)]
 
 

@@ -445,7 +445,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     `coming` is the path of a report that is about to be written, so it need not exist yet.
     """
     path = Path(path)
-    content = read_bytes(path, VehicleFileError, most=LARGEST)
+    return read_vehicle(path, read_bytes(path, VehicleFileError, most=LARGEST), coming=coming)
+
+
+def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> Vehicle:
+    """Return the vehicle that the content of a file with a path describes, as load_vehicle does."""
     data = parse_toml(path, content, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
     if "format" not in data:
