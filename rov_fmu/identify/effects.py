@@ -30,7 +30,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             full = fit.known.full[p.of]
             value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
         if p.kind == "centre of buoyancy":
-            value += table.base[CENTRE[p.part]]
+            value += file.table.base[CENTRE[p.part]]
         low, high = around(value, error)
         if p.kind in ("reverse thrust", "dead band astern", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
