@@ -5,7 +5,7 @@ of 20 ms), and shares no line with the identification. The folders are small, so
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import copysign, cos, exp, log, sin, sqrt
 from pathlib import Path
 
@@ -130,11 +130,6 @@ class Drawn:
     """True if each log drives one axis only."""
     seconds: float = 60.0
     expected: Expected = NOTHING_SPECIAL
-
-    @property
-    def is_right(self) -> bool:
-        """True if the model of a log has all that the water does."""
-        return replace(self.fault, current=0.0, sag=0.0) == Fault()
 
     def truths(self, seed: int) -> Truths:
         """Return the answers of each axis that a sensor shows, those of a weak pair with its weakness."""
