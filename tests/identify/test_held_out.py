@@ -14,6 +14,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.result import score_of
 from tests.folders import DOWN, SPEED, folder_of, pulled
 from tests.vehicles import VIDEORAY
 
@@ -43,9 +44,10 @@ def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit)
     assert [(one.log, one.by) for one in out] == [
         (n, f"the {half} half and the other log") for n in (0, 1) for half in ("first", "second")
     ]
-    own = [*predictions(objective, best, out)]
-    assert {p.axis for p in own} == {HEAVE, YAW}
-    assert all(p.loss < 1.0 + 2.0 * np.log(p.unchanged) for p in own if p.is_judged), "better than no change"
+    own = [p for p in predictions(objective, best, out) if p.is_judged]
+    assert [(p.axis, p.by) for p in own] == [(axis, one.by) for one in out for axis in one.axes]
+    assert all(p.coverage > 0.8 for p in own)
+    assert score_of(own) > 0.5
 
 
 def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:
@@ -63,7 +65,9 @@ def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:
 
 
 def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:
-    assert all(0.3 < ratio < 1.5 for ratio in structure(fit.objective, fit.best).values())
+    ratios = structure(fit.objective, fit.best)
+    assert {*ratios} == {HEAVE, YAW}
+    assert max(ratios.values()) < 1.3
 
 
 @pytest.mark.parametrize(
