@@ -150,8 +150,8 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         "effect": "{of}the {name} is {value}{note}",
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
         "rocking": (
-            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to better "
-            "than 3 %"
+            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
+            "better than 3 %"
         ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
