@@ -255,7 +255,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
         vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
     )
     unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
-    known = replace(known, unseen=unseen, bent=bent)
+    known = replace(known, unseen=unseen, bent=bent, has_times=bool(tests.tested.time_constants))
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
@@ -332,10 +332,10 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
                 more[curve.coefficient("c_0")] = 0.0
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
-        if logged:
+        if logged or tests.tested.time_constants:
             more[curve.coefficient("T")] = LEAST_LAG
-            if not (layout.has_wrench or curve.tables):
-                more[curve.coefficient("d")] = 0.0
+        if logged and not (layout.has_wrench or curve.tables):
+            more[curve.coefficient("d")] = 0.0
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 
