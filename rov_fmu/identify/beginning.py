@@ -7,13 +7,21 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis
+from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout
-from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
+from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
-from rov_fmu.identify.likelihood.records import SampledLog, changes, driven_axes, recorded, typical, velocities
+from rov_fmu.identify.likelihood.records import (
+    SampledLog,
+    changes,
+    driven_axes,
+    recorded,
+    shown_axes,
+    typical,
+    velocities,
+)
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
@@ -194,11 +202,15 @@ def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
 def _layout_of(log: Log, of: Folder | Layout) -> Layout:
     """Return the part of the vehicle that a log concerns: one axis alone for a test of this axis.
 
-    Of a folder, it is that of the largest layout that the vehicle can have.
+    Of a folder, it is that of the largest layout that the vehicle can have. A dive that does not show how the vehicle
+    turns concerns only the axes that it shows: turns that nothing corrects would run away and, by the coupling, carry
+    the motion along these axes with them.
     """
     layout = of if isinstance(of, Layout) else of.layout if log.axis else of.logged
     assert layout
-    return with_axis_alone(layout, log.axis) if log.axis and log.axis.name in layout.kinds else layout
+    shown = [log.axis] if log.axis else shown_axes(log, layout)
+    is_part = bool(log.axis) or (layout.has(YAW) and YAW not in shown)
+    return with_axes_alone(layout, shown) if is_part and layout.has(*shown) else layout
 
 
 # ---- The prior -------------------------------------------------------------------------------------------------------
@@ -209,7 +221,9 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     given = tests.given
     deviations = given.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
-    vehicle = _extended(given.vehicle, measured, tests)
+    dives = [log for log in tests.folder.logs if not log.axis]
+    shown = {axis for log in dives for axis in shown_axes(log, given.vehicle.layout)}
+    vehicle = _extended(given.vehicle, measured, tests, shown)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
@@ -233,20 +247,37 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
     has_lag = any(name.startswith("T_") for name in given.base)
-    exact = _exact(given, vehicle.layout, measured)
+    moved = {form.axis for one in logs for form in one.layout.axes}
+    exact = _exact(given, vehicle.layout, measured, moved, shown)
     errors = _thrust_errors(given, curves)
+    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
         vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
     )
+    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
+    known = replace(known, unseen=unseen, bent=bent, has_times=bool(tests.tested.time_constants))
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
-def _exact(given: GivenVehicle, layout: Layout, measured: Collection[str]) -> frozenset[str]:
+def _exact(
+    given: GivenVehicle, layout: Layout, measured: Collection[str], moved: Collection[Axis], shown: Collection[Axis]
+) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
-    leave as they are. The curves of a base are uncertain unless their forces were measured, and so is a lag."""
+    leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, the drag
+    and the inertia of all axes along which a log moves, which by the coupling decide about the other axes, and what
+    loads the axes that a dive shows."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
+    keys = ("beta", *(f"{key}{end}" for key in ("a_d", "b_d") for end in ("", REVERSE)))
+    uncertain |= {axis.coefficient(key) for axis in moved for key in keys}
+    uncertain |= {axis.coefficient("F_0") for axis in shown} | {*_centres(layout, shown)}
     own = given.description.known
     return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
+
+
+def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
+    """Return the coordinates of the centre of buoyancy about which the attitude in a dive tells."""
+    needed = {"x_B": {PITCH}, "y_B": {ROLL}, "z_B": {ROLL, PITCH}}
+    return [key for key, axes in needed.items() if layout.restoring and axes & {*shown}]
 
 
 def _thrust_errors(given: GivenVehicle, curves: Sequence[Curve]) -> dict[str, float]:
@@ -265,23 +296,29 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> Vehicle:
+def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, shown: Collection[Axis]) -> Vehicle:
     """Return the vehicle with every coefficient that a parameter may change, where each effect is absent.
 
-    `measured` has the curves whose forces were measured, and whether astern, too.
+    `measured` has the curves whose forces were measured, and whether astern, too. `shown` has the axes that dives show:
+    a load along them stays from dive to dive. About roll and pitch, it is that of the centre of buoyancy.
     """
     base, deviations = tests.given.base, tests.given.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
     vehicle = Vehicle(
         replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
     )  # a log tells thrusters' commands
-    layout = vehicle.layout
+    centres = dict.fromkeys(_centres(vehicle.layout, shown), 0.0)
+    restoring = tuple(key for key in RESTORING if key in {*vehicle.layout.restoring, *centres})
+    layout = replace(vehicle.layout, restoring=restoring)
+    vehicle, values = Vehicle(layout, {**centres, **vehicle.coefficients}), {**centres, **values}
     more: dict[str, float] = {}
     logged = {*tests.tested.logs}
     for form in layout.axes:
         axis = form.axis
         if axis.name in logged or tests.tested.steady.get(axis.name):
             more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
+        is_loaded = axis.name in logged or tests.tested.steady.get(axis.name) or axis in shown
+        if is_loaded and not (centres and axis in (ROLL, PITCH)):
             more[form.name_of("F_0")] = 0.0
     vehicle = _with_voltage(vehicle, base, tests)
     layout = vehicle.layout
@@ -295,16 +332,19 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> V
                 more[curve.coefficient("c_0")] = 0.0
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
-        if logged:
+        if logged or tests.tested.time_constants:
             more[curve.coefficient("T")] = LEAST_LAG
-            if not (layout.has_wrench or curve.tables):
-                more[curve.coefficient("d")] = 0.0
+        if logged and not (layout.has_wrench or curve.tables):
+            more[curve.coefficient("d")] = 0.0
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 
 
 def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
-    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it."""
+    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it.
+
+    Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
+    """
     requests = tests.given.requests
     values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
     if not values or vehicle.layout.voltage is not None:
@@ -314,12 +354,14 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
         return vehicle
     more = {}
     is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
-    for curve in vehicle.layout.curves:
-        if len(curve.tables) < 2:
-            measured_at = tests.given.description.measured_at.get(curve.name, mean)
-            more[curve.name_of("V_0")] = base.get(curve.name_of("V_0"), measured_at)
-            more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
-    layout = replace(vehicle.layout, voltage=round(mean, 3), voltage_source="Mean voltage of the logs")
+    curves = [curve for curve in vehicle.layout.curves if len(curve.tables) < 2]
+    told = {c.name: base[c.name_of("V_0")] for c in curves if c.name_of("V_0") in base}
+    known = {**tests.given.description.measured_at, **told}
+    for curve in curves:
+        more[curve.name_of("V_0")] = known.get(curve.name, mean)
+        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
+    source = "Voltage of the measured thrust" if known else "Mean voltage of the logs"
+    layout = replace(vehicle.layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
     return _with(layout, vehicle.coefficients, more)
 
 

@@ -5,18 +5,22 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from math import inf, isfinite, log
+from math import floor, inf, isfinite, log, log10
 from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
     PLACED,
+    RATIOS,
     Answer,
+    AxisOfBase,
     AxisResult,
     Coefficient,
     Disturbance,
@@ -34,6 +38,7 @@ from rov_fmu.tank import findings
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
+from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -54,8 +59,8 @@ _MOST_OUTLIERS = 0.005
 SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
-    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop is "
-    "that without thrust, from the steady speed to a tenth of it."
+    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The "
+    "stopping distance is that without thrust, from the steady speed to a tenth of it."
 )
 _ASIDE = 0.2
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
@@ -117,6 +122,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "{axes}: no motion was predicted that the fit had not seen, so the errors of predictions are not known. "
             "Another log would show them"
         ),
+        "assumed thrust": (
+            "{curve} thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A "
+            "spring balance tells it: pull with full command, and write command and force into thrust_{curve}.csv"
+        ),
         "not identified": "{of}: the tests do not determine {coefficients}{instead}",
         "points differ": "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from the model",
         "saturation": (
@@ -140,6 +149,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
+        "rocking": (
+            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
+            "better than 3 %"
+        ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
         ),
@@ -241,13 +254,15 @@ def told(identification: Identification) -> Identification:
         "warnings": warnings(findings),
         # other files beside the tests say nothing about the vehicle
         "facts": facts(finding for finding in findings if finding.kind != "other files"),
-        "verdicts": tuple(map(verdict_in_words, identification.axes)),
+        "verdicts": tuple(verdict.of(axis) for axis, verdict in identification.verdicts.items()),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
     layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
-    vehicle = replace(vehicle, layout=layout, provenance=made)
+    units = " (in units of the assumed thrust)" if any(one.kind == "assumed thrust" for one in findings) else ""
+    data = vehicle.measured_from + units
+    vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
 
 
@@ -269,10 +284,12 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     found = [*identification.folder.findings]
     for result in identification.axes:
         found += [*_on_predictions(result), *_on_coefficients(identification, result)]
-        found += _on_points(result)
+        found += [*_on_points(result)]
+        if may_rock(identification.folder, result.axis):
+            found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += _on_forces(identification)
+    found += [*_on_forces(identification), *_on_scale(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
     found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
@@ -287,16 +304,6 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
-
-
-def verdict_in_words(result: AxisResult) -> str:
-    """Return the verdict of an axis with its reasons: `surge: good. The 95% bands contain 97% ...`."""
-    return f"{result.axis.name}: {result.verdict.word}. {' '.join(map(with_stop, result.verdict.reasons))}"
-
-
-def with_stop(sentence: str) -> str:
-    """Return a sentence that ends with a full stop or a question mark."""
-    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
 
 
 def name_of(p: Prediction) -> str:
@@ -318,8 +325,28 @@ def next_tests(identification: Identification) -> list[str]:
     """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
-    any test there is none.
+    any test there is none. How to identify the other axes of the vehicle comes last.
     """
+    others = [f"{one.axis.name}: {how_to_identify(one)}." for one in identification.axes_of_base]
+    return [*_next_tests(identification), *others]
+
+
+def how_to_identify(one: AxisOfBase) -> str:
+    """Return what an owner can record, so that an axis of the base is identified."""
+    axis, sensor = one.axis, "its angle and its rate"
+    if axis is HEAVE:
+        sensor = "the depth"
+    elif axis is YAW:
+        sensor = "the heading or the turn rate"
+    elif not axis.is_rotation:
+        sensor = (
+            "its velocity (a DVL). Without one, film the vehicle along a tape on the floor, and write time, command "
+            f"and distance into log_{axis.name}_1.csv; a track from a video does, too"
+        )
+    return f"{one.reason}. Command it both ways, and log {sensor}"
+
+
+def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
@@ -404,6 +431,22 @@ def extrapolated(vehicle: Vehicle) -> list[str]:
     return [words] if SHARES[-1] > high else []
 
 
+def with_lag(identification: Identification) -> list[str]:
+    """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
+    vehicle, told = identification.vehicle, []
+    for result in identification.axes:
+        axis, half = result.axis, answer_at(result, 0.5)
+        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.drivers(axis)}
+        T = max(({*lags} & vehicle.coefficients.keys()), key=lambda name: vehicle[name], default="")
+        if half and T:
+            row = TableRow("", axis, "Tau", half.command, half.rise[0], 1.0)
+            time = float(modelled([row], vehicle, NO_SHAPES)[0])
+            ends = zip(half.rise[1], vehicle.intervals.get(T, (vehicle[T],) * 2), strict=True)
+            low, high = (time + end - half.rise[0] + lag - vehicle[T] for end, lag in ends)
+            told.append(f"{with_error((time, (low, high)), 's')} ({axis.name})")
+    return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
+
+
 def with_error(known: tuple[float, Interval], unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
     value, interval = known
@@ -450,6 +493,13 @@ def size_in_words(value: float, unit: str) -> str:
     """Return a size with two digits and its unit; angles are in degrees."""
     factor, shown = in_degrees(unit)
     return f"{significant(factor * value, 2)}{unit_after(shown)}"
+
+
+def effect_in_words(effect: Effect) -> str:
+    """Return the size of an effect; a ratio has two digits of how far it is from 1."""
+    if effect.kind not in RATIOS or effect.value == 1.0:
+        return size_in_words(effect.value, effect.unit)
+    return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
 
 def in_words(value: float, interval: Interval, unit: str) -> str:
@@ -530,6 +580,28 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+
+
+def may_rock(folder: Folder, axis: Axis) -> bool:
+    """Return True if only dives tell how fast an axis is, and none of them shows roll and pitch."""
+    logs = [log for log in folder.logs if log.axis in (None, axis)]
+    are_level = (log.axis or (log.used("roll angle") and log.used("pitch angle")) for log in logs)
+    return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
+
+
+def _on_scale(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding for each curve whose thrust is an assumption: neither a test nor rov.toml tells it."""
+    layout, description = identification.vehicle.layout, identification.folder.rov_file.description
+    told = {p.subject for p in identification.forces} | ({*description.known} if description else set())
+    for curve, known in identification.curves.items():
+        a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
+        if a_t in {one.name for one in known} and not {curve, a_t} & told:
+            yield Finding("assumed thrust", curve=curve)
+
+
+def assumed_thrust(identification: Identification) -> tuple[str, ...]:
+    """Return a sentence for each curve whose thrust is an assumption: it says in which units the forces are."""
+    return sentences(finding for finding in identification.findings if finding.kind == "assumed thrust")
 
 
 _REMEDIES = {
