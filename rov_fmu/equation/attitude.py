@@ -4,7 +4,7 @@ The state of the vehicle is a quaternion (eta, epsilon_1, epsilon_2, epsilon_3),
 contains the rotation matrix R from the body frame to the earth frame instead: R' = R S(omega) is a sum of products.
 """
 
-from .expression import Expression, Name, call, directed, scaled, total, where
+from .expression import Expression, Name, call, directed, total, where
 
 Formulas = dict[str, Expression]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
@@ -95,8 +95,8 @@ def quaternion_rates(velocities: frozenset[str]) -> Formulas:
     }
     rates = {}
     for name, terms in products.items():
-        parts = [scaled(sign, Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
-        rates[name] = 0.5 * total(parts) if parts else total(())
+        parts = [sign * (Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
+        rates[name] = 0.5 * total(parts)
     return rates
 
 

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from .expression import Expression, Name, Names, minus, product, scaled, total
+from .expression import Expression, Name, Names, product, total
 
 _KIRCHHOFF = {
     "u": ((1, "v", "r"), (-1, "w", "q")),
@@ -83,7 +83,7 @@ class MassMatrix:
             for m in reversed(range(n)):
                 column = block[m]
                 formulas[self._name("undo", row, column).identifier] = total(
-                    minus(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
+                    -(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
                     for k in block[m + 1 : n + 1]
                     if (k, column) in factor
                 )
@@ -105,14 +105,14 @@ class MassMatrix:
             for m, column in enumerate(block[:n]):
                 parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
                 parts += [
-                    minus(factor[row, k] * factor[column, k] * pivot[k])
+                    -(factor[row, k] * factor[column, k] * pivot[k])
                     for k in block[:m]
                     if {(row, k), (column, k)} <= factor.keys()
                 ]
                 if parts:
                     factor[row, column] = self._name("factor", row, column)
                     formulas[factor[row, column].identifier] = total(parts) / pivot[column]
-            squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
+            squares = [-(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
             formulas[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
         return formulas, factor
 
@@ -121,7 +121,7 @@ class MassMatrix:
         by_pair: dict[tuple[str, str], list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self.products(other).items():
-                parts = (scaled(sign, self._term(inverse, entry)) for sign, entry in entries)
+                parts = (sign * self._term(inverse, entry) for sign, entry in entries)
                 by_pair.setdefault(pair, []).extend(parts)
         return {pair: total(parts) for pair, parts in sorted(by_pair.items(), key=lambda item: _places(item[0]))}
 

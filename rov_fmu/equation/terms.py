@@ -10,13 +10,12 @@ effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from itertools import combinations
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import Expression, Name, Names, call, directed, of, product, scaled, total, where
+from .expression import Expression, Name, Names, call, directed, of, product, total, where
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
 from .layout import EVERY_COMMAND, Curve, Layout, Range, ThrustTable
 from .mass import MassMatrix
@@ -36,10 +35,7 @@ class Term:
     @property
     def formula(self) -> Expression:
         """The term as a formula."""
-        states = map(Name, self.factors)
-        if self.factors and self.coefficient in (ONE, -ONE):
-            return scaled(1.0 if self.coefficient == ONE else -1.0, product(*states))
-        return product(self.coefficient, *states)
+        return product(self.coefficient, *map(Name, self.factors))
 
 
 ONE = of(1.0)
@@ -229,10 +225,8 @@ def equation_of(layout: Layout) -> Equation:
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
     rows |= table.lags() | attitude | table.pose()
-    rows, products = quadratic(rows, table.names)
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
-    starts |= products
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     starts |= rotation
@@ -397,37 +391,6 @@ class _Table:
 Rows = dict[str, tuple[Term, ...]]
 
 
-def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
-    """Return rows without products of three states, and the products that became states of their own.
-
-    With s = w w, a cubic drag is c s w, and s' = 2 w w' again has products of at most two states: w w is s.
-    """
-    products: dict[tuple[str, ...], str] = {}
-    new_rows: Rows = {}
-    waiting = dict(rows)
-
-    def shortened(factors: tuple[str, ...]) -> tuple[str, ...]:
-        if len(factors) < 3:
-            return factors
-        pairs = [*combinations(sorted(name for name in factors if name in rows), 2)]
-        pair = next((pair for pair in pairs if pair in products), pairs[0])
-        if pair not in products:
-            products[pair] = names("product", *pair).identifier
-            moving = zip(pair, reversed(pair), strict=True)
-            waiting[products[pair]] = tuple(
-                replace(term, factors=(*term.factors, other)) for name, other in moving for term in rows[name]
-            )
-        rest = [*factors]
-        for name in pair:
-            rest.remove(name)
-        return shortened((products[pair], *rest))
-
-    while waiting:
-        name = next(iter(waiting))
-        new_rows[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
-    return new_rows, {name: product(*map(Name, pair)) for pair, name in products.items()}
-
-
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     """Return the mass matrix with the tuning of (18)."""
     gains: dict[str, Expression] = {}
@@ -454,7 +417,7 @@ def _inertia_of_two_axes(layout: Layout) -> dict[tuple[str, str], list[Expressio
     for pair, (sign, coordinate) in _OF_CENTRE.items():
         present = [axis for axis in pair if axis in layout.by_velocity]
         if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
-            parts.setdefault(pair, []).append(scaled(sign, Name("m_rov") * Name(coordinate)))
+            parts.setdefault(pair, []).append(sign * (Name("m_rov") * Name(coordinate)))
     return parts
 
 
@@ -483,9 +446,7 @@ def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Exp
         for axis in "xyz":
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
             formulas[names("righting", axis).identifier] = total(
-                scaled(sign, Name(force) * Name(centre))
-                for sign, force, centre in moments
-                if centre in layout.restoring
+                sign * (Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring
             )
     return formulas
 

@@ -11,13 +11,12 @@ from .expression import (
     call,
     directed,
     equal,
-    minus,
     of,
     product,
     saturated,
-    scaled,
     total,
     where,
+    with_positive_zero,
 )
 from .layout import Curve, Layout
 
@@ -49,7 +48,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
             formulas[command_of] = parts[0][1]
         else:
             mixed = names("mixed", name)
-            formulas[mixed.identifier] = total(scaled(*part) for part in parts)
+            formulas[mixed.identifier] = total(gain * part for gain, part in parts)
             formulas[command_of] = saturated(mixed)
         if name in layout.curve_of:
             formulas |= _steady_thrust(name, layout.curve_of[name], names)
@@ -89,23 +88,17 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
 
 def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
-    command, share = names("command", name), _share(curve)
+    command, share = names("command", name), 1.0 / curve.together
     formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        loss = product(by_direction(command, curve, "d"), call("abs", command), *share)
+        loss = product(by_direction(command, curve, "d"), call("abs", command), share)
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
-        force = product(force, *share)
-    # + 0 makes 0.0 of -0.0
-    return formulas | {steady_name(name, curve, names).identifier: force + 0.0}
-
-
-def _share(curve: Curve) -> tuple[float, ...]:
-    """Return the factor for one of the thrusters that a curve describes together, if there are several."""
-    return (1.0 / curve.together,) if curve.together != 1 else ()
+        force = product(force, share)
+    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:
@@ -138,8 +131,8 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
     a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
     has_dead_band = "c_0" in curve.keys
-    force = directed(command, size, minus(size))
+    force = directed(command, size, -size)
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(a_t * beyond + b_t, beyond, *_share(curve)),
+        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.together),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force

@@ -10,17 +10,13 @@ from markupsafe import escape
 
 from rov_fmu.equation.catalogue import REVERSE, YAW, delayed_name
 from rov_fmu.equation.expression import (
-    MATHML,
-    TEXT,
     Expression,
     Name,
     Number,
     Operation,
     call,
-    collected,
     product,
     replaced,
-    scaled,
     total,
     written,
 )
@@ -28,6 +24,7 @@ from rov_fmu.equation.forces import COUPLING, forces_of
 from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
 from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
 from rov_fmu.equation.thrust import steady_name
+from rov_fmu.equation.typeset import MATHML, TEXT, collected
 from rov_fmu.report.templates import number
 
 
@@ -112,7 +109,7 @@ def equations_of(layout: Layout) -> Equations:
             return line(Name(form.axis.inertia) * _rate(v), right, form.axis.equations[1])
         if layout.coupled:
             munk = [(sign, _entry(*entry), pair) for pair, own in mass.products(v).items() for sign, entry in own]
-            loads += [scaled(sign, product(entry, *map(Name, pair))) for sign, entry, pair in munk]
+            loads += [sign * product(entry, *map(Name, pair)) for sign, entry, pair in munk]
         partners = {b if a == v else a: _entry(a, b) for a, b in mass.entries if v in (a, b)}
         masses = {v: _entry(v, v), **partners}
         left = total(entry * _rate(axis) for axis, entry in masses.items() if axis in layout.by_velocity)
