@@ -121,7 +121,7 @@ def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
         "COEFFICIENTS": {name: vehicle[name] for name in layout.coefficients},
         "COMMANDS": {name: layout.usual_inputs[name] for name in layout.commands},
         "INPUTS": {name: x for name, x in layout.usual_inputs.items() if name not in layout.commands},
-        "DELAYED": dict(zip(layout.commands, layout.delayed, strict=False)),
+        "DELAYED": layout.acting,
         "LAGGING": [*layout.lagging],
         "FORCES": [f"F_{thruster.name}" for thruster in layout.thrusters],
         "EXAMPLE": layout.example(layout.axes[0].axis),

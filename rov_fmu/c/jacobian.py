@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.io.messages import InputError, did_you_mean, listed
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -81,7 +80,7 @@ def step_jacobian(
     def after(rows: Array) -> Array:
         """Return the states after a step with the numbers `free` in each row (states x rows)."""
         given = dict(zip(free, rows.T[:, :, np.newaxis], strict=True))
-        given |= {delayed_name(name): given[name] for name in layout.commands if layout.has_dead_time}
+        given |= {later: given[name] for name, later in layout.acting.items()}
         return simulate(vehicle, [0.0, h], given, vehicles=len(rows), workers=1).values[:, :, 1]
 
     present = after(at[np.newaxis])

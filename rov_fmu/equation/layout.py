@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import hypot, inf, sin
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, TypeVar
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import AfterValidator, BeforeValidator, InstanceOf, WithJsonSchema
 
@@ -58,7 +58,6 @@ from .catalogue import (
     velocity_declaration,
     voltage_declaration,
 )
-from .expression import unused
 from .step import interpolated
 
 
@@ -116,7 +115,6 @@ class Part:
     """A part of a layout with optional coefficients: a thrust curve or an axis."""
 
     keys: tuple[str, ...]
-    others: tuple[tuple[str, str], ...]
 
     @property
     def owner(self) -> str:
@@ -129,7 +127,7 @@ class Part:
 
     def name_of(self, key: str) -> str:
         """Return the name that the coefficient with a key has, or would have if it were added."""
-        return dict(self.others).get(key) or coefficient_name(key, self.owner)
+        return coefficient_name(key, self.owner)
 
 
 @dataclass(frozen=True)
@@ -151,8 +149,6 @@ class Curve(Part):
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
     electric_current: CurrentTable | None = field(default=None, compare=False)
     """The current of one thruster. All curves of a vehicle have it, or none."""
-    others: tuple[tuple[str, str], ...] = ()
-    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
     @property
     def owner(self) -> str:
@@ -306,16 +302,11 @@ class VehicleAxis(Part):
     axis: Axis
     keys: tuple[str, ...] = ("a_d", "b_d")
     """The keys of AXIS that the vehicle has. It always has α and β."""
-    others: tuple[tuple[str, str], ...] = ()
-    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
 
     @property
     def owner(self) -> str:
         """The velocity along the axis."""
         return self.axis.velocity
-
-
-_Part = TypeVar("_Part", Curve, VehicleAxis)
 
 
 class Range(NamedTuple):
@@ -373,29 +364,6 @@ class Layout:
     """The source of `voltage`."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
-    has_fixed_names: bool = field(default=False, compare=False)
-    """True when the coefficients keep their names if parts or coefficients are added or removed."""
-
-    def __post_init__(self) -> None:
-        """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
-
-        A name that is taken gets a number, so the names of parts are free.
-        """
-        if self.has_fixed_names:
-            return
-        taken = {*(f"F_{thruster.name}" for thruster in self.thrusters), *(COMMANDS if self.has_dead_time else ())}
-
-        def named(part: _Part) -> _Part:
-            others = []
-            for key in part.keys:
-                usual = coefficient_name(key, part.owner)
-                name = unused(usual, taken)
-                taken.add(name)
-                others += [(key, name)] if name != usual else []
-            return replace(part, others=tuple(others)) if others or part.others else part
-
-        object.__setattr__(self, "axes", tuple(map(named, self.axes)))
-        object.__setattr__(self, "curves", tuple(map(named, self.curves)))
 
     def with_keys(self, has: Callable[[Part, str], bool]) -> "Layout":
         """Return the layout whose curves and axes have just the coefficients for which `has(part, key)` is true."""
@@ -408,19 +376,6 @@ class Layout:
             axes=tuple(replace(vehicle_axis, keys=keys(vehicle_axis, AXIS)) for vehicle_axis in self.axes),
             curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
         )
-
-    def with_fixed_names(self) -> "Layout":
-        """Return the layout whose coefficients keep their names, whatever is added or removed.
-
-        They are the names beside every coefficient that the vehicle could have.
-        """
-        every = replace(self.with_keys(lambda *_: True), has_dead_time=True, has_fixed_names=False)
-
-        def named(parts: tuple[_Part, ...], among: tuple[_Part, ...]) -> tuple[_Part, ...]:
-            return tuple(replace(part, others=one.others) for part, one in zip(parts, among, strict=True))
-
-        axes, curves = named(self.axes, every.axes), named(self.curves, every.curves)
-        return replace(self, axes=axes, curves=curves, has_fixed_names=True)
 
     @classmethod
     def of_wrench(cls, axes: "Iterable[VehicleAxis]") -> "Layout":
@@ -610,11 +565,14 @@ class Layout:
         return max(-1.0, min(1.0, command))
 
     @cached_property
+    def acting(self) -> dict[str, str]:
+        """The variable with the command that acts, by the name of the command, if commands act after a dead time."""
+        return {name: delayed_name(name) for name in self.commands} if self.has_dead_time else {}
+
+    @cached_property
     def delayed(self) -> dict[str, Declaration]:
         """The commands that act after the dead time, if the vehicle has one."""
-        if not self.has_dead_time:
-            return {}
-        return {delayed_name(name): delayed_declaration(name, command) for name, command in self.commands.items()}
+        return {later: delayed_declaration(name, self.commands[name]) for name, later in self.acting.items()}
 
     @cached_property
     def inputs(self) -> dict[str, Declaration]:

@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from .catalogue import REVERSE, delayed_name
+from .catalogue import REVERSE
 from .expression import (
     Expression,
     Name,
@@ -35,7 +35,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
     for name, gains in layout.gains.items():
         parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
-            acting = Name(delayed_name(command) if layout.has_dead_time else command)
+            acting = Name(layout.acting.get(command, command))
             if layout.pulse:
                 fraction = names("fraction", command)
                 formulas[fraction.identifier] = _fraction(acting, layout.pulse)

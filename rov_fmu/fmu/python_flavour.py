@@ -8,7 +8,6 @@ from pathlib import Path
 import pythonfmu
 
 from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
-from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.equation.printed import printed
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -26,7 +25,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
     declaration = {
         "identifier": vehicle.identifier,
         "log_categories": LOG_CATEGORIES,
-        "commands": {name: delayed_name(name) for name in layout.commands} if layout.has_dead_time else {},
+        "commands": layout.acting,
         "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }

@@ -152,9 +152,8 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         place, about = len(result), (declaration.description, declaration.unit)
         result.append(Variable(name, place, *about, causality, variability, **given))
 
-    held = layout.commands if layout.has_dead_time else ()
     for name, declaration in layout.inputs.items():
-        variability = "discrete" if name in held else "continuous"
+        variability = "discrete" if name in layout.acting else "continuous"
         add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
     for name, declaration in layout.state.items():
         add(

@@ -42,7 +42,6 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     """
     given, kept = tests.given, fit.kept
     layout = _layout(tests, fit)
-    own = replace(layout, has_fixed_names=False)  # the names that the vehicle has when its file is read
     values = {name: float(value) for name, value in _in_file(fit, kept.z).items()}
     values |= {  # a file has no smaller exponent
         c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
@@ -103,9 +102,8 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
-    ).with_(own)
-    renamed = dict(zip(layout.coefficients, own.coefficients, strict=True))
-    return vehicle, {renamed[name]: replace(one, name=renamed[name]) for name, one in coefficients.items()}
+    )
+    return vehicle, coefficients
 
 
 def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:

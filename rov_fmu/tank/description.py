@@ -42,7 +42,7 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
-from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, check_tables_of_thrust
+from rov_fmu.vehicle.checks import check_distinct_names, check_names_and_keys, check_quantities, check_tables_of_thrust
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
@@ -440,16 +440,13 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
 
 
 def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) -> Layout:
-    """Add every axis that the thrusters drive, and the keys of the file's own axis tables.
-
-    Effects come and go while a vehicle is identified, so its coefficients have fixed names.
-    """
+    """Add every axis that the thrusters drive, and the keys of the file's own axis tables."""
     forms = []
     for name, axis in AXES.items():
         if layout.signs(axis) or name in layout.kinds or name in axis_keys:
             form = layout.kinds.get(name, VehicleAxis(axis))
             forms.append(VehicleAxis(axis, (*form.keys, *axis_keys.get(name, ()))))
-    return replace(layout, axes=tuple(forms)).with_fixed_names()
+    return replace(layout, axes=tuple(forms))
 
 
 # ---- Mistakes that depend on the vehicle's hardware ------------------------------------------------------------------
@@ -458,6 +455,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) ->
 def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
+    yield from check_distinct_names(layout.with_keys(lambda *_: True))  # effects come and go during the identification
     yield from _unknown_effects(layout, description.base_name)
     if thrusters := description.thrusters:  # one table is used as it is
         untold = tuple(replace(curve, tables=curve.tables[1:]) for curve in thrusters.curves)

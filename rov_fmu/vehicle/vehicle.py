@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, TypeVar
 from typing_extensions import Self
 
 from rov_fmu.equation.alone import AxisAlone, alone_formulas
-from rov_fmu.equation.catalogue import ARM, YAW, Axis, delayed_name
+from rov_fmu.equation.catalogue import ARM, YAW, Axis
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis, arm
 from rov_fmu.equation.printed import model_of
@@ -151,12 +151,11 @@ class Vehicle:
         Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
         intervals. `vehicle.layout.coefficients` has the names, units and bounds.
 
-        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too. A
-        coefficient may have another name there: its place in the vehicle file tells which one it is.
+        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too.
 
         Raises InputError if the vehicle has no such coefficient, or cannot have the value.
         """
-        vehicle = self._in_layout(layout) if layout else self
+        vehicle = self._with_layout(layout) if layout else self
         values = {name: _number(name, value) for name, value in coefficients.items()}
         check_coefficients(vehicle.layout, values)
         changed = {**vehicle.coefficients, **values}
@@ -170,24 +169,20 @@ class Vehicle:
             estimates=some_estimates(vehicle.estimates, vehicle.coefficients.keys() - values.keys()),
         )
 
-    def _in_layout(self, layout: Layout) -> Self:
+    def _with_layout(self, layout: Layout) -> Self:
         """Return the vehicle with another layout, and with those of its coefficients that this layout has, too."""
-        there = {keys: name for name, keys in layout.keys_in_file.items()}
-        names = {name: there[keys] for name, keys in self.layout.keys_in_file.items() if keys in there}
+        names = layout.coefficients.keys()
 
-        def renamed(values: Mapping[str, _Value]) -> dict[str, _Value]:
-            return {names[name]: value for name, value in values.items() if name in names}
+        def kept(values: Mapping[str, _Value]) -> dict[str, _Value]:
+            return {name: value for name, value in values.items() if name in names}
 
         return replace(
             self,
             layout=layout,
-            coefficients=renamed(self.coefficients),
-            sources=renamed(self.sources),
-            intervals=renamed(self.intervals),
-            estimates={
-                name: row.model_copy(update={"correlation": renamed(row.correlation)})
-                for name, row in renamed(self.estimates).items()
-            },
+            coefficients=kept(self.coefficients),
+            sources=kept(self.sources),
+            intervals=kept(self.intervals),
+            estimates=some_estimates(self.estimates, names),
         )
 
     def __repr__(self) -> str:
@@ -300,9 +295,7 @@ class Vehicle:
 
     def _acting(self, inputs: Values) -> dict[str, float]:
         """Return the commands that act after the dead time: those that are given, or else the present ones."""
-        if not self.layout.has_dead_time:
-            return {}
-        return {delayed_name(name): inputs.get(delayed_name(name), inputs[name]) for name in self.layout.commands}
+        return {later: inputs.get(later, inputs[name]) for name, later in self.layout.acting.items()}
 
     def _values(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
@@ -345,11 +338,7 @@ class Vehicle:
 
     def delay_line(self) -> DelayLine:
         """Return the commands that act before the first one, and nothing that waits for the dead time."""
-        commands = self.layout.commands if self.layout.has_dead_time else {}
-        return DelayLine(
-            {name: declaration.start for name, declaration in commands.items()},
-            {name: delayed_name(name) for name in commands},
-        )
+        return DelayLine(self.layout.usual_inputs, self.layout.acting)
 
     # ---- One axis alone ----
 
