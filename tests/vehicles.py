@@ -13,12 +13,11 @@ from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL
 from rov_fmu.equation.layout import (
     EVERY_COMMAND,
     Curve,
-    Direction,
     Driven,
     Fin,
     Layout,
-    Position,
     Range,
+    SourcedVector,
     Thruster,
     Vector,
     VehicleAxis,
@@ -37,8 +36,11 @@ Side = Literal["port", "starboard"] | None
 
 
 def _places(direction: Vector, position: Vector | None) -> dict[str, Any]:
-    at = position and Position(value=position, unit="m", source="a drawing")
-    return {"direction": Direction(value=direction, source="a drawing"), "position": at}
+    x, y, z = direction
+    length = hypot(x, y, z)
+    along = direction if abs(length - 1.0) <= 1e-12 else (x / length, y / length, z / length)
+    at = position and SourcedVector(position, "a drawing")
+    return {"direction": SourcedVector(along, "a drawing"), "position": at}
 
 
 def thruster(

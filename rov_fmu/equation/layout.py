@@ -1,22 +1,18 @@
 """The layout of a vehicle: its axes, thrust curves, thrusters and fins, and which coefficients it has.
 
 A layout does not contain the values of the coefficients. `catalogue.py` declares the kinds of coefficients and
-variables. Thrusters are the tables of the vehicle file themselves.
+variables.
 """
 
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import hypot, inf, sin
+from math import inf, sin
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
-from pydantic import AfterValidator, BeforeValidator, InstanceOf, WithJsonSchema
-
-from rov_fmu.io.field_types import Finite, Name, Symbol, Text
 from rov_fmu.io.messages import listed
-from rov_fmu.io.toml_file import Strict
 
 from .catalogue import (
     ANGLES,
@@ -174,72 +170,25 @@ def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
     return force[axis.place]
 
 
-_FARTHEST = 100.0
-"""The largest coordinate of a position, m."""
+class SourcedVector(NamedTuple):
+    """A direction or a position in the body frame, and where it comes from."""
+
+    value: Vector
+    """Forward, starboard, down: a unit vector, or a position from the origin (m)."""
+    source: str
 
 
-def _vector(vector: object) -> object:
-    """Return a list of three entries as a tuple. Raises ValueError."""
-    if not isinstance(vector, list | tuple) or len(vector) != 3:
-        raise ValueError("must be three numbers: forward, starboard, down")
-    return tuple(vector)
-
-
-def _near(vector: Vector) -> Vector:
-    """Return a position if it can be on a vehicle. Raises ValueError."""
-    if max(map(abs, vector)) > _FARTHEST:
-        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
-    return vector
-
-
-def _unit_vector(direction: Vector) -> Vector:
-    """Return a direction as a unit vector. Raises ValueError if its length is zero or extreme."""
-    x, y, z = direction
-    length = hypot(x, y, z)
-    if not 1e-6 <= length <= 1e6:
-        raise ValueError("must have a length, from 1e-6 to 1e6")
-    if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
-        length = 1.0
-    return x / length, y / length, z / length
-
-
-_Vector = Annotated[
-    tuple[Finite, Finite, Finite],
-    BeforeValidator(_vector),
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
-]
-
-
-class Direction(Strict):
-    """The direction of the force at a positive command, or of a fin's lift ahead: forward, starboard, down. It has any
-    length except zero."""
-
-    value: Annotated[_Vector, AfterValidator(_unit_vector)]
-    """Three numbers: forward, starboard, down."""
-    source: Text
-    """Where the value comes from."""
-
-
-class Position(Strict):
-    """The position from the origin of the body frame: forward, starboard, down. It is needed for roll, pitch and yaw,
-    unless the thruster has the key `arm`, or only turns in yaw and acts straight up or down."""
-
-    value: Annotated[_Vector, AfterValidator(_near)]
-    """Three numbers: forward, starboard, down."""
-    unit: Literal["m"]
-    source: Text
-    """Where the value comes from."""
-
-
-class Driven(Strict):
+@dataclass(frozen=True, kw_only=True)
+class Driven:
     """A thruster or a fin: a part that commands drive, without its numbers."""
 
-    name: Symbol
+    name: str
     """The name in the FMU: the command is `u_<name>`, and the force of a thruster `F_<name>`."""
-    description: Name = ""
+    description: str = ""
     """For example "left thruster" or "rudder"."""
-    direction: Direction
-    position: Position | None = None
+    direction: SourcedVector
+    """The direction of the force at a positive command, or of a fin's lift ahead."""
+    position: SourcedVector | None = None
 
     @property
     def place(self) -> Vector:
@@ -247,6 +196,7 @@ class Driven(Strict):
         return self.position.value if self.position else (0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True, kw_only=True)
 class Thruster(Driven):
     """A thruster: its curve, its direction and its place."""
 
@@ -270,16 +220,18 @@ class Thruster(Driven):
         return effect_along(axis, self.direction.value, self.place)
 
 
+@dataclass(frozen=True, kw_only=True)
 class BodyForce(Thruster):
     """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
 
-    axis: InstanceOf[Axis]
+    axis: Axis
 
     def effect(self, axis: Axis) -> float:
         """Return 1 for its own axis, and 0 for the others."""
         return float(axis is self.axis)
 
 
+@dataclass(frozen=True, kw_only=True)
 class Fin(Driven):
     """A control surface. Its lift is proportional to its angle."""
 
@@ -384,11 +336,11 @@ class Layout:
         Each axis has a force of its own, which is linear in its command. It has the name of the load from outside.
         """
         axes, source = tuple(axes), "The axis of the body"
-        centre = Position(value=(0.0, 0.0, 0.0), unit="m", source=source)
+        centre = SourcedVector((0.0, 0.0, 0.0), source)
         forces = []
         for axis in (vehicle_axis.axis for vehicle_axis in axes):
             x, y, z = (float(n == axis.place) for n in range(3))
-            along, name = Direction(value=(x, y, z), source=source), axis.external
+            along, name = SourcedVector((x, y, z), source), axis.external
             forces.append(BodyForce(name=name, curve=name, direction=along, position=centre, axis=axis))
         return cls(axes, tuple(Curve(force.name) for force in forces), tuple(forces))
 

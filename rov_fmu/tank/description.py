@@ -26,7 +26,7 @@ from rov_fmu.equation.catalogue import (
     YAW,
     Declaration,
 )
-from rov_fmu.equation.layout import Direction, Layout, Part, VehicleAxis
+from rov_fmu.equation.layout import Layout, Part, VehicleAxis
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -420,10 +420,7 @@ def _start(file: RovTables) -> Layout:
     if file.thruster:
         return file.layout
     paper = load_vehicle(VIDEORAY).layout
-    thrusters = [
-        one.model_copy(update={"direction": Direction(value=one.direction.value, source=_FORM)})
-        for one in paper.thrusters
-    ]
+    thrusters = [replace(one, direction=one.direction._replace(source=_FORM)) for one in paper.thrusters]
     return replace(paper, thrusters=tuple(thrusters))
 
 

@@ -1,6 +1,6 @@
 """The pydantic models of the vehicle file, with every table and key.
 
-`equation/catalogue.py` declares the coefficients, and `equation/layout.py` has the tables of thrusters and fins.
+`equation/catalogue.py` declares the coefficients.
 """
 
 import os
@@ -8,6 +8,7 @@ from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import cached_property, reduce
 from itertools import pairwise
+from math import hypot
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, TypeVar
@@ -31,7 +32,7 @@ from rov_fmu.equation.catalogue import (
     cross_of,
     declarations_of,
 )
-from rov_fmu.equation.layout import CurrentTable, Driven, Layout, Position, Thruster, ThrustTable, VehicleAxis
+from rov_fmu.equation.layout import CurrentTable, Layout, SourcedVector, ThrustTable, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.field_types import Finite, Name, Symbol, Text, not_blank
 from rov_fmu.io.paths import inside_or_shipped
@@ -241,7 +242,95 @@ class Axes(table_of("_Axes", Strict, _axes)):  # type: ignore[misc]
     """The axes that the vehicle has."""
 
 
-# ---- Fins, battery ---------------------------------------------------------------------------------------------------
+# ---- Thrusters, fins, battery ----------------------------------------------------------------------------------------
+
+
+_FARTHEST = 100.0
+"""The largest coordinate of a position, m."""
+
+
+def _vector(vector: object) -> object:
+    """Return a list of three entries as a tuple. Raises ValueError."""
+    if not isinstance(vector, list | tuple) or len(vector) != 3:
+        raise ValueError("must be three numbers: forward, starboard, down")
+    return tuple(vector)
+
+
+def _near(vector: Vector) -> Vector:
+    """Return a position if it can be on a vehicle. Raises ValueError."""
+    if max(map(abs, vector)) > _FARTHEST:
+        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
+    return vector
+
+
+def _unit_vector(direction: Vector) -> Vector:
+    """Return a direction as a unit vector. Raises ValueError if its length is zero or extreme."""
+    x, y, z = direction
+    length = hypot(x, y, z)
+    if not 1e-6 <= length <= 1e6:
+        raise ValueError("must have a length, from 1e-6 to 1e6")
+    if abs(length - 1.0) <= 1e-12:  # a unit vector stays as it is
+        length = 1.0
+    return x / length, y / length, z / length
+
+
+_Vector = Annotated[
+    tuple[Finite, Finite, Finite],
+    BeforeValidator(_vector),
+    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
+]
+
+
+class Direction(Strict):
+    """The direction of the force at a positive command, or of a fin's lift ahead: forward, starboard, down. It has any
+    length except zero."""
+
+    value: Annotated[_Vector, AfterValidator(_unit_vector)]
+    """Three numbers: forward, starboard, down."""
+    source: Text
+    """Where the value comes from."""
+
+
+class Position(Strict):
+    """The position from the origin of the body frame: forward, starboard, down. It is needed for roll, pitch and yaw,
+    unless the thruster has the key `arm`, or only turns in yaw and acts straight up or down."""
+
+    value: Annotated[_Vector, AfterValidator(_near)]
+    """Three numbers: forward, starboard, down."""
+    unit: Literal["m"]
+    source: Text
+    """Where the value comes from."""
+
+
+class Driven(Strict):
+    """A thruster or a fin."""
+
+    name: Symbol
+    """The name in the FMU: the command is `u_<name>`, and the force of a thruster `F_<name>`."""
+    description: Name = ""
+    """For example "left thruster" or "rudder"."""
+    direction: Direction
+    position: Position | None = None
+
+    @property
+    def in_model(self) -> dict[str, Any]:
+        """The arguments of the thruster or fin of the model, which has no other numbers than these vectors."""
+        at = self.position and SourcedVector(self.position.value, self.position.source)
+        along = SourcedVector(self.direction.value, self.direction.source)
+        return {"name": self.name, "description": self.description, "direction": along, "position": at}
+
+
+class Thruster(Driven):
+    """A thruster: its curve, its direction and its place."""
+
+    curve: str
+    """The name of the thrust curve."""
+    arm: Literal["port", "starboard"] | None = None
+    """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
+
+    def for_model(self) -> layout.Thruster:
+        """Return the thruster of the model."""
+        return layout.Thruster(**self.in_model, curve=self.curve, arm=self.arm)
 
 
 _FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
@@ -256,9 +345,8 @@ class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
     position: Position
 
     def for_model(self) -> layout.Fin:
-        """Return the fin of the model, which has no numbers."""
-        own = {key: getattr(self, key) for key in Driven.model_fields}
-        return layout.Fin.model_construct(**own, has_drag=self.drag is not None)
+        """Return the fin of the model."""
+        return layout.Fin(**self.in_model, has_drag=self.drag is not None)
 
 
 class Battery(Strict):
@@ -347,7 +435,7 @@ class Tables(Strict):
         return Layout(
             axes=tuple(VehicleAxis(axis, _coefficient_keys(table, AXIS)) for axis, table in self.axis_tables.items()),
             curves=tuple(curve.for_model(name) for name, curve in self.curves.items()),
-            thrusters=tuple(self.thruster),
+            thrusters=tuple(thruster.for_model() for thruster in self.thruster),
             mix=self.inputs,
             coupled=bool(body and body.coupling),
             cross=tuple(filter(None, map(cross_of, self.cross))),

@@ -10,7 +10,7 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Curve, Layout
+from rov_fmu.equation.layout import EVERY_COMMAND, Curve, Driven, Layout
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
@@ -57,9 +57,10 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "battery": {} if layout.voltage is None else {"voltage": voltage},
         "curves": {curve.name: _curve(curve) for curve in layout.curves},
         "thruster": [
-            {"name": t.name, "description": t.description, "curve": t.curve, **t.model_dump()} for t in layout.thrusters
+            {"name": t.name, "description": t.description, "curve": t.curve, **_vectors(t), "arm": t.arm}
+            for t in layout.thrusters
         ],
-        "fin": [fin.model_dump(exclude={"has_drag"}) for fin in layout.fins],
+        "fin": [{"name": fin.name, "description": fin.description, **_vectors(fin)} for fin in layout.fins],
         "axes": {name: {} for name in layout.kinds},
         "cross": {},
         "inputs": layout.mix,
@@ -111,6 +112,13 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "tables": tables if len(tables) > 1 else None,
         "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
     }
+
+
+def _vectors(driven: Driven) -> dict[str, Any]:
+    """Return the tables of the direction and the position of a thruster or a fin."""
+    at = driven.position
+    position = at and {"value": at.value, "unit": "m", "source": at.source}
+    return {"direction": driven.direction._asdict(), "position": position}
 
 
 def _table_at(tables: Any, path: Iterable[str]) -> Any:

@@ -435,7 +435,7 @@ def test_the_notes_say_what_is_otherwise_in_the_file_too(case: str) -> None:
 
 def renamed(vehicle: Vehicle, old: str, new: str) -> Vehicle:
     """Return a vehicle with another name of a thruster."""
-    thrusters = (t.model_copy(update={"name": new}) if t.name == old else t for t in vehicle.layout.thrusters)
+    thrusters = (replace(t, name=new) if t.name == old else t for t in vehicle.layout.thrusters)
     return replace(vehicle, layout=replace(vehicle.layout, thrusters=tuple(thrusters)))
 
 

@@ -12,7 +12,7 @@ from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import Position
+from rov_fmu.equation.layout import SourcedVector
 from rov_fmu.equation.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -124,9 +124,7 @@ def test_the_speed_of_advance_of_an_arm_is_that_of_its_place() -> None:
     rov = extended(VIDEORAY, d_rear=5.0, d_top=2.0)
     distance = rov["R"] * math.sin(rov["gamma"])
     thrusters = [
-        t.model_copy(
-            update={"arm": None, "position": Position(value=(0.0, -t.side * distance, 0.0), unit="m", source="drawn")}
-        )
+        replace(t, arm=None, position=SourcedVector((0.0, -t.side * distance, 0.0), "drawn"))
         for t in rov.layout.thrusters
     ]
     layout = replace(rov.layout, thrusters=tuple(thrusters))

@@ -1,7 +1,7 @@
 """Contradictions in vehicle files: each gives a line with the key, the value and what is allowed."""
 
 import re
-from math import isclose, sqrt
+from math import isclose, nextafter, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +9,7 @@ import pytest
 import tomlkit
 
 from rov_fmu.io.messages import InputError
+from rov_fmu.vehicle.schema import Direction, Position
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.damage import toml_of
 from tests.vehicle.test_vehicle import refusal
@@ -23,6 +24,17 @@ def everything() -> Vehicle:
 
 
 # ---- A vehicle with every key ----------------------------------------------------------------------------------------
+
+
+def test_a_direction_has_a_length_and_a_position_is_near() -> None:
+    for length in (1e-6, 0.5, 1.0, 1e6):
+        assert Direction(value=(0.0, 0.6 * length, -0.8 * length), source="S").value == pytest.approx((0.0, 0.6, -0.8))
+    for length in (0.9e-6, 1.1e6):
+        with pytest.raises(ValueError, match="must have a length, from 1e-6 to 1e6"):
+            Direction(value=(0.0, 0.6 * length, -0.8 * length), source="S")
+    assert Position(value=(100.0, -100.0, 0.0), unit="m", source="S").value == (100.0, -100.0, 0.0)
+    with pytest.raises(ValueError, match=r"must be within -100 ... 100 m"):
+        Position(value=(0.0, 0.0, nextafter(-100.0, -101.0)), unit="m", source="S")
 
 
 def test_a_direction_of_any_length_is_a_unit_vector(everything: Vehicle) -> None:

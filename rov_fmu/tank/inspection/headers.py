@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
-from rov_fmu.equation.layout import Curve, Direction, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Curve, Layout, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
@@ -87,8 +87,8 @@ def axis_in_name(path: Path) -> Axis | None:
 def layout_of(thrusters: Iterable[str]) -> Layout:
     """Return a layout with all axes, and with thrusters of which only the names are known."""
     axes = tuple(VehicleAxis(axis) for axis in AXES.values())
-    ahead = Direction(value=(1.0, 0.0, 0.0), source="a guess")
-    known = [Thruster.model_construct(name=name, curve="t", direction=ahead, arm="port") for name in thrusters]
+    ahead = SourcedVector((1.0, 0.0, 0.0), "a guess")
+    known = [Thruster(name=name, curve="t", direction=ahead, arm="port") for name in thrusters]
     return Layout(axes, (Curve("t"),), tuple(known))  # the names are those of a stranger, and are not checked
 
 

@@ -1,7 +1,7 @@
 """The declarations of a vehicle's variables (rov_fmu/equation/catalogue.py and layout.py)."""
 
 from dataclasses import replace
-from math import nextafter, sin
+from math import sin
 
 import pytest
 
@@ -18,7 +18,7 @@ from rov_fmu.equation.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.equation.layout import Direction, Position, arm, effect_along
+from rov_fmu.equation.layout import arm, effect_along
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VIDEORAY, fin, pulsed, thruster, with_axes
 
@@ -99,17 +99,6 @@ def test_a_coefficient_of_several_axes_has_the_unit_of_its_axes() -> None:
         assert row
         assert (said(name, cross_declaration(*row)), cross_name(*row)) == (line, name)
     assert [cross_of(name) for name in ("m_a_u", "a_d_uu_reverse", "T_ur", "alpha_u")] == [None] * 4
-
-
-def test_a_direction_has_a_length_and_a_position_is_near() -> None:
-    for length in (1e-6, 0.5, 1.0, 1e6):
-        assert Direction(value=(0.0, 0.6 * length, -0.8 * length), source="S").value == pytest.approx((0.0, 0.6, -0.8))
-    for length in (0.9e-6, 1.1e6):
-        with pytest.raises(ValueError, match="must have a length, from 1e-6 to 1e6"):
-            Direction(value=(0.0, 0.6 * length, -0.8 * length), source="S")
-    assert Position(value=(100.0, -100.0, 0.0), unit="m", source="S").value == (100.0, -100.0, 0.0)
-    with pytest.raises(ValueError, match=r"must be within -100 ... 100 m"):
-        Position(value=(0.0, 0.0, nextafter(-100.0, -101.0)), unit="m", source="S")
 
 
 # ---- Effects and commands ----

@@ -121,10 +121,9 @@ def renamed(layout: Layout, names: Names) -> Layout:
         layout,
         curves=tuple(map(named, layout.curves)),
         thrusters=tuple(
-            one.model_copy(update={"name": of("driven", one.name), "curve": of("curves", one.curve)})
-            for one in layout.thrusters
+            replace(one, name=of("driven", one.name), curve=of("curves", one.curve)) for one in layout.thrusters
         ),
-        fins=tuple(one.model_copy(update={"name": of("driven", one.name)}) for one in layout.fins),
+        fins=tuple(replace(one, name=of("driven", one.name)) for one in layout.fins),
         mix={
             of("inputs", name): {of("driven", one): gain for one, gain in gains.items()}
             for name, gains in layout.mix.items()
