@@ -23,7 +23,7 @@ _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
 _AHEAD, _DOWN = (SourcedVector(along, "drawing") for along in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 _LAYOUT = Layout(
     (VehicleAxis(SURGE), VehicleAxis(HEAVE, ("a_d", "b_d", "F_0")), VehicleAxis(YAW)),
-    (Curve("rear", _CURVE, together=2), Curve("top", _CURVE)),
+    (Curve("rear", _CURVE, n_thrusters=2), Curve("top", _CURVE)),
     (
         Thruster(name="l", curve="rear", direction=_AHEAD, arm="port"),
         Thruster(name="r", curve="rear", direction=_AHEAD, arm="starboard"),

@@ -366,5 +366,5 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
         *of(_CURRENT, layout.inputs),
         *of(DRIFTS, layout.state),
         *of([QUATERNION[0], "psi"], layout.state),
-        *of([layout.kinds[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
+        *of([layout.by_name[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
     ]

@@ -128,7 +128,7 @@ def thrusts(
     `force_of` gives another force of a thruster in place of its thrust, by its name and its curve.
     """
     parts = []
-    for t in layout.drivers(axis):
+    for t in layout.thrusters_along(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
             parts.append(t.effect(axis) * _with_arm(t, axis, force_of(t.name, own), names))

@@ -113,7 +113,7 @@ class Part:
     keys: tuple[str, ...]
 
     @property
-    def owner(self) -> str:
+    def suffix(self) -> str:
         """The end of the names of its coefficients."""
         raise NotImplementedError
 
@@ -123,21 +123,21 @@ class Part:
 
     def name_of(self, key: str) -> str:
         """Return the name that the coefficient with a key has, or would have if it were added."""
-        return coefficient_name(key, self.owner)
+        return coefficient_name(key, self.suffix)
 
 
 @dataclass(frozen=True)
 class Curve(Part):
     """A thrust curve.
 
-    For c > 0, the force of `together` thrusters is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
+    For c > 0, the force of the thrusters together is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
     mirrored, unless it has coefficients for reverse. Tables replace both.
     """
 
     name: str
     keys: tuple[str, ...] = ("a_t", "b_t")
     """The keys of CURVE that the vehicle has."""
-    together: int = 1
+    n_thrusters: int = 1
     description: str = ""
     equation: str = ""
     """Where the curve is published: the number of an equation of the paper, or another source."""
@@ -147,7 +147,7 @@ class Curve(Part):
     """The current of one thruster. All curves of a vehicle have it, or none."""
 
     @property
-    def owner(self) -> str:
+    def suffix(self) -> str:
         """The name of the curve."""
         return self.name
 
@@ -179,7 +179,7 @@ class SourcedVector(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Driven:
+class Actuator:
     """A thruster or a fin: a part that commands drive, without its numbers."""
 
     name: str
@@ -197,7 +197,7 @@ class Driven:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thruster(Driven):
+class Thruster(Actuator):
     """A thruster: its curve, its direction and its place."""
 
     curve: str
@@ -232,7 +232,7 @@ class BodyForce(Thruster):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Fin(Driven):
+class Fin(Actuator):
     """A control surface. Its lift is proportional to its angle."""
 
     has_drag: bool = False
@@ -256,7 +256,7 @@ class VehicleAxis(Part):
     """The keys of AXIS that the vehicle has. It always has α and β."""
 
     @property
-    def owner(self) -> str:
+    def suffix(self) -> str:
         """The velocity along the axis."""
         return self.axis.velocity
 
@@ -274,16 +274,16 @@ EVERY_COMMAND = "command"
 """The quantity whose range limits the size of the commands of all thrusters."""
 
 
-class Owner(NamedTuple):
+class CoefficientTable(NamedTuple):
     """A table of the vehicle file with coefficients."""
 
     place: tuple[str, ...]
     """The tables around it, and its own name."""
     names: Mapping[str, str]
     """The names of its coefficients, by key."""
-    kinds: Mapping[str, Declaration]
+    declarations: Mapping[str, Declaration]
     words: Mapping[str, str]
-    """What fills the fields in the texts of `kinds`."""
+    """What fills the fields in their texts."""
 
 
 @dataclass(frozen=True)
@@ -352,7 +352,7 @@ class Layout:
     # -- lookup --
 
     @cached_property
-    def kinds(self) -> dict[str, VehicleAxis]:
+    def by_name(self) -> dict[str, VehicleAxis]:
         """The axes by name."""
         return {vehicle_axis.axis.name: vehicle_axis for vehicle_axis in self.axes}
 
@@ -373,7 +373,7 @@ class Layout:
 
     def has(self, *axes: Axis) -> bool:
         """Return True when the vehicle has one of these axes."""
-        return any(axis.name in self.kinds for axis in axes)
+        return any(axis.name in self.by_name for axis in axes)
 
     @cached_property
     def has_arm(self) -> bool:
@@ -396,7 +396,7 @@ class Layout:
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
-    def driven(self) -> "tuple[Thruster | Fin, ...]":
+    def actuators(self) -> "tuple[Thruster | Fin, ...]":
         """Everything that commands drive: the thrusters and the fins."""
         return (*self.thrusters, *self.fins)
 
@@ -404,13 +404,13 @@ class Layout:
     def gains(self) -> dict[str, dict[str, float]]:
         """For each thruster and each fin, the gains of the inputs that drive it."""
         if not self.mix:
-            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.driven}
+            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.actuators}
         return {
             driven.name: {f"u_{name}": gains[driven.name] for name, gains in self.mix.items() if gains.get(driven.name)}
-            for driven in self.driven
+            for driven in self.actuators
         }
 
-    def drivers(self, axis: Axis) -> list[Thruster]:
+    def thrusters_along(self, axis: Axis) -> list[Thruster]:
         """Return the thrusters that act on an axis."""
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
@@ -420,24 +420,24 @@ class Layout:
         When the thrusters are symmetric, these commands leave the other axes at rest.
         """
         effects: dict[str, float] = {}
-        for thruster in self.drivers(axis):
+        for thruster in self.thrusters_along(axis):
             for name, gain in self.gains[thruster.name].items():
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
-    def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
+    def commands_along(self, axis: Axis, fraction: float) -> dict[str, float]:
         """Return the commands that drive an axis in its positive direction with a fraction of the full command."""
         return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
 
     def example(self, axis: Axis) -> dict[str, float]:
         """Return inputs that drive an axis in its positive direction: 30 % of the command, or 5 N or N.m from outside
         where nothing drives it."""
-        return self.driving(axis, 0.3) or {axis.external: 5.0}
+        return self.commands_along(axis, 0.3) or {axis.external: 5.0}
 
     # -- declarations --
 
     @cached_property
-    def owners(self) -> tuple[Owner, ...]:
+    def coefficient_tables(self) -> tuple[CoefficientTable, ...]:
         """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
         inertias = {vehicle_axis.axis.inertia for vehicle_axis in self.axes}
         of_vehicle = (
@@ -447,32 +447,34 @@ class Layout:
             ("commands", COMMANDS if self.has_dead_time else (), COMMANDS),
         )
         return (
-            *(Owner((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
+            *(CoefficientTable((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
             *map(_of_curve, self.curves),
             *map(_of_fin, self.fins),
-            *self._owners_of_axes,
+            *self._tables_of_axes,
         )
 
     @property
-    def _owners_of_axes(self) -> Iterator[Owner]:
+    def _tables_of_axes(self) -> Iterator[CoefficientTable]:
         for kinds in (AXIS, TUNING):
             for vehicle_axis in self.axes:
                 names = {
                     key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys
                 }
-                yield Owner(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
+                yield CoefficientTable(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
         """The tables and the key of each coefficient in the vehicle file, by its name in the FMU."""
-        places = {name: (*owner.place, key) for owner in self.owners for key, name in owner.names.items()}
+        places = {name: (*table.place, key) for table in self.coefficient_tables for key, name in table.names.items()}
         return places | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
 
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
         declared = {
-            name: owner.kinds[key].filled(**owner.words) for owner in self.owners for key, name in owner.names.items()
+            name: table.declarations[key].filled(**table.words)
+            for table in self.coefficient_tables
+            for key, name in table.names.items()
         }
         declared |= {cross_name(*row): cross_declaration(*row) for row in self.cross}
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
@@ -498,7 +500,7 @@ class Layout:
         words = {
             name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
             for name, gains in self.mix.items()
-        } or {driven.name: _command(driven) for driven in self.driven}
+        } or {driven.name: _command(driven) for driven in self.actuators}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
@@ -632,19 +634,19 @@ class Layout:
     @cached_property
     def turning_curves(self) -> tuple[Curve, ...]:
         """The curves whose thrusters turn the vehicle."""
-        driving = {t.curve for t in self.drivers(YAW)} if self.has(YAW) else set()
+        driving = {t.curve for t in self.thrusters_along(YAW)} if self.has(YAW) else set()
         return tuple(curve for curve in self.curves if curve.name in driving)
 
 
-def _of_curve(curve: Curve) -> Owner:
+def _of_curve(curve: Curve) -> CoefficientTable:
     words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
     names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
-    return Owner(("curves", curve.name), names, CURVE, words)
+    return CoefficientTable(("curves", curve.name), names, CURVE, words)
 
 
-def _of_fin(fin: Fin) -> Owner:
+def _of_fin(fin: Fin) -> CoefficientTable:
     names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-    return Owner(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
+    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:
@@ -665,7 +667,7 @@ def _command(driven: Thruster | Fin) -> str:
 
 def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
     words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
-    share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
+    share = {1: "", 2: ", half of the pair's"}.get(curve.n_thrusters, f", 1/{curve.n_thrusters} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
     return Declaration(
         "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"

@@ -48,7 +48,7 @@ class MassMatrix:
             blocks = [block for block in blocks if block not in joined_blocks] + [set(pair).union(*joined_blocks)]
         return tuple(tuple(name for name in self.gains if name in block) for block in blocks)
 
-    def _is_alone(self, axis: str) -> bool:
+    def _is_uncoupled(self, axis: str) -> bool:
         return not any(axis in block for block in self.blocks)
 
     def inverse(self, axis: str) -> dict[str, Name]:
@@ -127,8 +127,8 @@ class MassMatrix:
 
     def _term(self, inverse: Name, entry: tuple[str, str]) -> Expression:
         a, b = entry
-        is_alone = a == b and self._is_alone(a)
-        return inverse / self.names("gain", a) if is_alone else inverse * self._name("mass", a, b)
+        is_uncoupled = a == b and self._is_uncoupled(a)
+        return inverse / self.names("gain", a) if is_uncoupled else inverse * self._name("mass", a, b)
 
     def products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
         """Return the right side of Kirchhoff's equations for an axis.

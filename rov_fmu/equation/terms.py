@@ -310,13 +310,13 @@ class _Table:
             raise ValueError("a force with another power of the same states needs an effect of its own")
         constant = total(gain * total(loads[other]) for other, gain in inverse.items())
         coriolis = self._mass.coriolis(v) if self.layout.coupled else {}
-        is_alone = len(coriolis) == 1
+        has_one_product = len(coriolis) == 1
         return (
             Term(self._named(constant, "constant", v)),
             *self._arriving(v, inverse),
             *(self._term(v, forces, inverse) for forces in alike.values()),
             *(
-                Term(self._named(formula, "coupling", v, *([] if is_alone else ["".join(pair)])), pair, COUPLING)
+                Term(self._named(formula, "coupling", v, *([] if has_one_product else ["".join(pair)])), pair, COUPLING)
                 for pair, formula in coriolis.items()
             ),
         )

@@ -88,7 +88,7 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
 
 def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
-    command, share = names("command", name), 1.0 / curve.together
+    command, share = names("command", name), 1.0 / curve.n_thrusters
     formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
@@ -134,5 +134,5 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     force = directed(command, size, -size)
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.together),
+        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force

@@ -493,12 +493,12 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
     yield from _not_identified(result.known, axis.name, instead, axis=axis.name)
     beta = next((known for known in result.known if known.name == axis.coefficient("beta")), None)
     if beta and beta.interval:
-        has_added = "m_a" in identification.vehicle.layout.kinds[axis.name].keys
+        has_added = "m_a" in identification.vehicle.layout.by_name[axis.name].keys
         low, high = BETA_WITH_ADDED_MASS if has_added else BETA
         if beta.interval[1] < low or beta.interval[0] > high:
             inertia = f"{axis.inertia} with the added one" if has_added else axis.inertia
             names = {"factor": significant(1.0 / beta.value, 2), "inertia": inertia, "mass": axis.inertia}
-            curves = {thruster.curve for thruster in identification.vehicle.layout.drivers(axis)}
+            curves = {thruster.curve for thruster in identification.vehicle.layout.thrusters_along(axis)}
             files = [*dict.fromkeys(p.file for p in identification.forces if p.subject in curves)]
             names["forces"] = f" (in {listed(files)})" if files else ""
             yield Finding("implausible inertia", axis.name, names=names)

@@ -113,7 +113,7 @@ def _axis(
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
-    drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
+    drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     limits = tests.given.description.tables.limits
@@ -123,7 +123,7 @@ def _axis(
             own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting, misfits
         ),
         answers=answers,
-        known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
+        known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=own,
         points=(*steady, *times),
         next_test=next_test(fit.objective, fit.averaged, axis, limits, answers) if is_told else None,
@@ -132,7 +132,7 @@ def _axis(
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:
     """Return False if the thrust along an axis is the largest force of the logs, and none of them has any."""
-    drivers = {thruster.name for thruster in vehicle.layout.drivers(axis)}
+    drivers = {thruster.name for thruster in vehicle.layout.thrusters_along(axis)}
     largest = (most for log in tests.folder.logs if log.commands for most in log.commands.largest.items())
     return not vehicle.layout.has_wrench or any(most for name, most in largest if name in drivers)
 

@@ -28,11 +28,15 @@ def points_of(tests: Tests, held_out: HeldOut, vehicle: Vehicle, kind: str, only
             of: Curve | Axis = (
                 next(c for c in vehicle.layout.curves if c.name == subject)
                 if kind == "thrust"
-                else vehicle.layout.kinds[subject].axis
+                else vehicle.layout.by_name[subject].axis
             )
             one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
             unit = (
-                "N" if kind == "thrust" else "s" if kind == "time_constant" else vehicle.layout.kinds[subject].axis.unit
+                "N"
+                if kind == "thrust"
+                else "s"
+                if kind == "time_constant"
+                else vehicle.layout.by_name[subject].axis.unit
             )
             out = held_out.get((quantity, subject, row.command), np.nan)
             counts = tests.counts(kind, subject, row.command)

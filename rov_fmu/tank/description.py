@@ -399,7 +399,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         path=path,
         tables=file,
         layout=layout,
-        axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
+        axes=tuple(name for name in AXES if name in start.by_name or name in own_layout.by_name),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base.with_(layout)) if base else {},
@@ -440,8 +440,8 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) ->
     """Add every axis that the thrusters drive, and the keys of the file's own axis tables."""
     forms = []
     for name, axis in AXES.items():
-        if layout.signs(axis) or name in layout.kinds or name in axis_keys:
-            form = layout.kinds.get(name, VehicleAxis(axis))
+        if layout.signs(axis) or name in layout.by_name or name in axis_keys:
+            form = layout.by_name.get(name, VehicleAxis(axis))
             forms.append(VehicleAxis(axis, (*form.keys, *axis_keys.get(name, ()))))
     return replace(layout, axes=tuple(forms))
 
@@ -460,7 +460,7 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)
-    windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
+    windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.by_name]
     for name in file.windows:
         if name not in windows:
             yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")

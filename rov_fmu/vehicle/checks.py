@@ -72,9 +72,9 @@ def check_distinct_names(layout: Layout) -> Iterator[str]:
     Thrust astern of the curve `main`, a_t_main_reverse, has the name of thrust ahead of the curve `main_reverse`.
     """
     places = {f"F_{thruster.name}": f"thruster.{thruster.name}" for thruster in layout.thrusters}
-    for owner in layout.owners:
-        for key, name in owner.names.items():
-            place = ".".join((*owner.place, key))
+    for table in layout.coefficient_tables:
+        for key, name in table.names.items():
+            place = ".".join((*table.place, key))
             if (first := places.setdefault(name, place)) != place:
                 yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
                 return

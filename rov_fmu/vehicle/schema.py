@@ -219,7 +219,8 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
         return layout.Curve(
             name,
             keys,
-            **{key: getattr(self, key) for key in ("together", "description", "equation")},
+            **{key: getattr(self, key) for key in ("description", "equation")},
+            n_thrusters=self.together,
             tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
             electric_current=replace(current.table, voltage=current.voltage) if current else None,
         )
@@ -302,7 +303,7 @@ class Position(Strict):
     """Where the value comes from."""
 
 
-class Driven(Strict):
+class Actuator(Strict):
     """A thruster or a fin."""
 
     name: Symbol
@@ -320,7 +321,7 @@ class Driven(Strict):
         return {"name": self.name, "description": self.description, "direction": along, "position": at}
 
 
-class Thruster(Driven):
+class Thruster(Actuator):
     """A thruster: its curve, its direction and its place."""
 
     curve: str
@@ -336,7 +337,7 @@ class Thruster(Driven):
 _FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
 
 
-class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
+class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 

@@ -187,7 +187,7 @@ class Vehicle:
 
     def __repr__(self) -> str:
         """Return the name of the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
-        axes, inputs = ", ".join(self.layout.kinds), ", ".join(self.layout.commands)
+        axes, inputs = ", ".join(self.layout.by_name), ", ".join(self.layout.commands)
         title = f"{type(self).__name__} {self.identifier}: {self.name}"
         return f"<{title}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
 
@@ -253,7 +253,7 @@ class Vehicle:
         if not sentences:
             places = [keys for name, keys in self.layout.keys_in_file.items() if name in self.intervals]
             words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
-        found = {axis: words.get(axis, "not identified") for axis in self.layout.kinds}
+        found = {axis: words.get(axis, "not identified") for axis in self.layout.by_name}
         return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
 
     def picture(self, name: str) -> Path | None:
@@ -360,7 +360,7 @@ class Vehicle:
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
-        return self.layout.usual_inputs | self.layout.driving(axis, command)
+        return self.layout.usual_inputs | self.layout.commands_along(axis, command)
 
     def force(self, axis: Axis, command: float) -> float:
         """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
@@ -368,7 +368,7 @@ class Vehicle:
 
     def along(self, axis: Axis, F: Values) -> float:
         """Return the thrust (N) or torque (N.m) along an axis of thrusters with some forces, N."""
-        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.thrusters_along(axis))
 
     def side_effects(self, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
         """Yield the other axes that a command of an axis pushes, with the force (N) or torque (N.m) along them.
@@ -377,7 +377,7 @@ class Vehicle:
         """
         F = self.commanded(self.held_inputs(axis, command))
         for other in (form.axis for form in self.layout.axes if form.axis is not axis):
-            pushes = [self.effect(t, other) * F[t.name] for t in self.layout.drivers(other)]
+            pushes = [self.effect(t, other) * F[t.name] for t in self.layout.thrusters_along(other)]
             if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
                 yield other, sum(pushes)
 
@@ -385,13 +385,13 @@ class Vehicle:
         """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
 
-    def held(self, axis: Axis, command: float) -> AxisAlone:
+    def motion_at(self, axis: Axis, command: float) -> AxisAlone:
         """Return the motion of an axis alone, (18), under a held command, once the thrust is steady."""
         return self.alone(axis, self.held_inputs(axis, command))
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
         """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
-        motion = self.held(axis, command)
+        motion = self.motion_at(axis, command)
         return motion.steady_velocity(), motion.time_constant()
 
 

@@ -114,13 +114,13 @@ class Shapes:
         values: dict[str, Any] = {**vehicle.coefficients, **vehicle.layout.usual_inputs}
         values["u_one"] = _column(self.commands(curve.name, commands), vehicle)
         *_, force = _thrust_of(curve)(values).values()
-        return np.asarray(curve.together * force)
+        return np.asarray(curve.n_thrusters * force)
 
     def motions(self, vehicle: Vehicle, axis: Axis, commands: Array) -> "Motions":
         """Return the equation of an axis alone under each of m held commands, once the thrust is steady."""
         layout = vehicle.layout
         inputs: dict[str, Any] = dict(layout.usual_inputs)
-        driving = [layout.driving(axis, command) for command in commands.tolist()]
+        driving = [layout.commands_along(axis, command) for command in commands.tolist()]
         for name in driving[0]:
             acting = np.array([of_command[name] for of_command in driving])
             if curve := layout.curve_of.get(name.removeprefix("u_")):

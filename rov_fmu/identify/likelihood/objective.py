@@ -65,7 +65,7 @@ class TableRow:
         """Return True if a parameter changes the value by the model."""
         parts = {self.subject.name}
         if not isinstance(self.subject, Curve):
-            parts |= {"", *(thruster.curve for thruster in layout.drivers(self.subject))}
+            parts |= {"", *(thruster.curve for thruster in layout.thrusters_along(self.subject))}
         return parameter.of_motion and parameter.of in parts
 
 
@@ -85,7 +85,7 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
             continue
         motions = shapes.motions(vehicle, subject, commands)
         V_ss, Tau = motions.response()
-        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(subject)}
+        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(subject)}
         lags = [vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag]
         lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
         if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
@@ -239,7 +239,7 @@ class Objective:
         one = self.logs[number]
         if parameter.log is not None:
             return parameter.of == one.log.file
-        axes, curves = one.layout.kinds, {curve.name for curve in one.layout.curves}
+        axes, curves = one.layout.by_name, {curve.name for curve in one.layout.curves}
         if parameter.kind == "row noise" or parameter.low == parameter.high:
             return False
         if parameter.kind in ("white noise", "coloured noise", "correlation time"):

@@ -125,7 +125,7 @@ def equations_of(layout: Layout) -> Equations:
         shown = [line(steady, _with_sign(replaced(equation.thrust[steady.identifier], formulas)), curve.equation)]
         shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
         lag = [line(Name(curve.coefficient("T")) * _rate(force.identifier), steady - force)] if curve.has_lag else []
-        by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
+        by_arm = any(t.position is None for t in layout.thrusters_along(YAW) if t in thrusters)
         tau = Name(f"tau_{curve.name}")
         turning = equation.forces.get(tau.identifier)
         torque = [] if turning is None else [line(tau, turning, "(4)" if by_arm else "")]

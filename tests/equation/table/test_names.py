@@ -75,7 +75,7 @@ def random_rov(rng: random.Random) -> Vehicle:
     rov = rng.choice([*FILES, random_vehicle(rng), random_body(rng, "uvwpqr")])
     dropped = {(curve.name, key) for curve in rov.layout.curves for key in ("d", "T") if rng.random() < 0.3}
     layout = rov.layout.with_keys(
-        lambda part, key: key in part.keys and (part.owner, key.removesuffix("_reverse")) not in dropped
+        lambda part, key: key in part.keys and (part.suffix, key.removesuffix("_reverse")) not in dropped
     )
     layout = replace(layout, has_dead_time=layout.has_dead_time and rng.random() < 0.5)
     return Vehicle(layout, {name: rov[name] for name in layout.coefficients})
@@ -180,7 +180,7 @@ def check_python(rng: random.Random, plain: Vehicle, other: Vehicle) -> None:
         return [*found.after.values(), *np.hstack([found.states, found.inputs, found.coefficients]).flat]
 
     same(jacobian)
-    driven = [form.axis for form in plain.layout.axes if plain.layout.drivers(form.axis)]
+    driven = [form.axis for form in plain.layout.axes if plain.layout.thrusters_along(form.axis)]
     same(lambda rov, *_: [x for axis in driven for c in (0.4, -0.7) for x in rov.response(axis, c)])
 
 
