@@ -14,7 +14,8 @@ import click
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, SourcedVector, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim

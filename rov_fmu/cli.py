@@ -13,8 +13,7 @@ from functools import partial
 from math import inf, isfinite, nan, nextafter
 from pathlib import Path
 from tempfile import mkdtemp
-from time import perf_counter
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -29,16 +28,12 @@ from rov_fmu.io.messages import (
     ProofError,
     StudyError,
     did_you_mean,
-    listed,
     print_message,
     shown,
 )
 from rov_fmu.io.output import check_replaced, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
-
-if TYPE_CHECKING:
-    from rov_fmu.build import Built
 
 _EXIT_CODES = {
     FileError: 2,
@@ -223,43 +218,9 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
-    from rov_fmu.build import build, chosen_platforms
-    from rov_fmu.report.progress import compiling
-    from rov_fmu.vehicle.vehicle import load_vehicle
+    from rov_fmu.interface.build_command import build_and_print
 
-    started = perf_counter()
-    loaded = load_vehicle(vehicle)
-    chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
-    with compiling(chosen) as (begin, done):
-        built = build(
-            loaded,
-            platforms=chosen,
-            backend=backend,
-            fmi=fmi,
-            inputs=[vehicle],
-            on_content=begin,
-            on_compiled=done,
-            **options,
-        )
-    _print_built(built, perf_counter() - started)
-
-
-def _print_built(built: "Built", seconds: float) -> None:
-    """Print the size of the FMU and of its binaries, the times, what it did when it was run, and what to do next."""
-    from rov_fmu.report.console import console, paragraph, print_end, shell_words
-
-    out = console()
-    if built.lost:
-        paragraph(out, f"Replaced {shell_words(built.path)}, which also had {listed(built.lost)}.")
-    size = f"{built.size / 1000:.0f} kB, built in {seconds:.1f} s, GUID {built.guid}"
-    paragraph(out, f"{shell_words(built.path)}: {size}")
-    if len(built.binaries) > 1:
-        paragraph(out, "The compilers ran in parallel. Each time is that from their start to the end of one:")
-    for name, size_of_binary in built.binaries.items():
-        out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
-    paragraph(out, built.note)
-    following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
-    print_end([built.path, *built.beside], following)
+    build_and_print(vehicle, platforms, backend, fmi, **options)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
@@ -397,30 +358,13 @@ def _fly(
     force: bool,
 ) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.archive import web_module
-    from rov_fmu.io.output import Output, sealed
+    from rov_fmu.interface.fly_command import write_fly_page
     from rov_fmu.report.console import print_end
-    from rov_fmu.report.page.live import Flown, fly_page
-    from rov_fmu.report.page.recording import recording_of
-    from rov_fmu.vehicle.vehicle import load_vehicle
 
     if identified and not recording:
         raise click.UsageError("fly: --identified needs --recording, the log that it is about")
-    paths = [vehicle, against] if against else [vehicle]
-    loaded = [load_vehicle(path) for path in paths]
-    if output:
-        given = [path for path in (recording, identified) if path]
-        check_targets([output], [*paths, *given, *(file for one in loaded for file in one.files)])
-        check_written(output, PAGE)
-        check_replaced([output], force=force)
     with _warnings_printed():
-        flown = recording_of(recording, loaded[0], identified) if recording else None
-    names = [path.name for path in paths]
-    names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
-    shown_ones = [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, names, strict=True)]
-    page = sealed(fly_page(shown_ones, recording=flown), "<!-- {} -->", "fly").encode()
-    path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
-    write_whole(Output(path, page), force=force)
+        path = write_fly_page([vehicle, against] if against else [vehicle], recording, identified, output, force=force)
     if output:
         print_end([path], "open it in a browser")
     else:

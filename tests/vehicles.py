@@ -10,12 +10,12 @@ from typing import Any, Literal, TypeVar
 
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
-from rov_fmu.equation.layout import (
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import (
     EVERY_COMMAND,
     Actuator,
     Curve,
     Fin,
-    Layout,
     Range,
     SourcedVector,
     Thruster,

@@ -13,8 +13,9 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.expression import ARRAYS, Expression, Name, array_functions, compiled
-from rov_fmu.equation.layout import Layout, ThrustTable
-from rov_fmu.equation.step import cubic
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import ThrustTable
+from rov_fmu.equation.python.step import cubic
 from rov_fmu.equation.terms import Equation, equation_of
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.vehicle.vehicle import Vehicle

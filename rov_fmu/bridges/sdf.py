@@ -33,7 +33,7 @@ from rov_fmu.equation.forces import (
     WEIGHT,
     effects_of,
 )
-from rov_fmu.equation.layout import FAINT, Thruster, VehicleAxis
+from rov_fmu.equation.parts import FAINT, Thruster, VehicleAxis
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -217,9 +217,9 @@ class EquationSource:
         return sum(1 << other for other in {self.component_of[name] for name in self._inputs(group)})
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return one bit for each state by which a component is multiplied in other rows.
+        """Return the bit mask of the states that multiply a component in other rows; all ones mean "never skip".
 
-        While all these states are 0, the component acts on nothing. All bits are set when it may always act.
+        A component may be skipped while every such state is 0, as the heading of a vehicle that stands still.
         """
         always, partners = 2**64 - 1, 0
         needed = {*self.equation.monitored, *(self.equation.orientation if self.layout.has_attitude else ())}

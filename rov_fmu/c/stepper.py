@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import on_cores, places_of, pointer, reasons, tables_of
+from rov_fmu.c.simulation import on_cores, pointer, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -39,7 +39,7 @@ class _Memory:
         inputs, states = len(layout.inputs), len(layout.state)
         begin, width = self._memory.ctypes.data, self._memory.strides[0]
         self._c = library, [ctypes.c_void_p(begin + n * width) for n in range(len(self._memory))]
-        self._variables = self._memory[:, : len(places_of(layout))]
+        self._variables = self._memory[:, : len(layout.places)]
         self.inputs = self._memory[:, :inputs]
         """The inputs (vehicles x inputs), which are held until they are set."""
         self.states = self._memory[:, inputs : inputs + states]
@@ -70,7 +70,7 @@ class Stepper(_Memory):
         Others have their usual values. `record` names the variables that each step returns. The arguments are not
         checked. Raises BuildError when the engine cannot be compiled.
         """
-        places = places_of(vehicle.layout)
+        places = vehicle.layout.places
         self._recorded = np.array([places[name] for name in record], int)
         self.time = 0.0
         """The time, s."""

@@ -67,7 +67,8 @@ def start_formulas() -> Formulas:
 def start_angle_formulas() -> Formulas:
     """Return formulas from the Euler angles at the start to the rotation matrix and to theta.
 
-    The formulas by way of the quaternion give the same numbers, but their names do not tell which angle matters.
+    Used only to find dependencies: written in the Euler angles, R_31 shows that it does not depend on psi_0. Through
+    the quaternion it would seem to depend on all three.
     """
     (cp, ct, cs), (sp, st, ss) = ([call(function, Name(angle)) for angle in INITIAL] for function in ("cos", "sin"))
     return {

@@ -8,6 +8,7 @@ remain in a derivative give the kind: without any name, the factor is constant.
 from collections.abc import Mapping
 
 from .attitude import QUATERNION, start_angle_formulas, start_formulas
+from .catalogue import rate_name
 from .expression import ZERO, Expression, change_of, tangent
 from .layout import Layout
 from .terms import equation_of
@@ -53,13 +54,13 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
-    return (*(f"der({name})" for name in layout.state), *layout.calculated)
+    return (*map(rate_name, layout.state), *layout.calculated)
 
 
 def _formulas(layout: Layout) -> dict[str, Expression]:
     """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
-    return equation.program | {f"der({name})": equation.rates[name] for name in layout.state} | dict(equation.outputs)
+    return equation.program | {rate_name(name): equation.rates[name] for name in layout.state} | dict(equation.outputs)
 
 
 def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:

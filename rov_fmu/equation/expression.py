@@ -201,7 +201,7 @@ def directed(subject: Expression, forward: Real, reverse: Real) -> Expression:
 
 
 def beyond_dead_band(beyond: Expression, dead_band: Expression, force: Expression) -> Operation:
-    """Return a force where the command is beyond a dead band, whose width may be 0, and 0 within it."""
+    """Return 0 for |c| < c_0, and otherwise the force. `beyond` is |c| - c_0. The width c_0 may be 0."""
     return Operation("dead band", (beyond, dead_band, force))
 
 

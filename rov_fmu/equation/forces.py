@@ -12,7 +12,8 @@ from itertools import chain
 from .attitude import entry
 from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
 from .expression import Expression, Name, Names, call, directed, product, total
-from .layout import FAINT, Curve, Layout, Thruster, effect_along
+from .layout import Layout
+from .parts import FAINT, Curve, Thruster, effect_along
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Effect:
     words: str
     """What people read: "the fins"."""
     missed: str = ""
-    """The word for it where a model lacks it; empty if nobody expects it."""
+    """What the model card calls it in "There is no lag, delay ..."; empty if nobody expects it."""
 
 
 THRUST = Effect("thrust", "the thrust")

@@ -4,13 +4,10 @@ A layout does not contain the values of the coefficients. `catalogue.py` declare
 variables.
 """
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, sin
-from pathlib import Path
-from typing import Literal, NamedTuple
+from math import inf
 
 from rov_fmu.io.messages import listed
 
@@ -26,7 +23,6 @@ from .catalogue import (
     CURRENT,
     CURRENT_DOWN,
     CURVE,
-    FIN,
     HEADING,
     HEAVE,
     LEAST_BETA,
@@ -34,7 +30,6 @@ from .catalogue import (
     PITCH,
     POSITION,
     RESTORING,
-    REVERSE,
     ROLL,
     SURGE,
     SWAY,
@@ -42,248 +37,26 @@ from .catalogue import (
     YAW,
     Axis,
     Declaration,
-    axis_words,
-    cited,
-    coefficient_name,
     command_declaration,
     cross_declaration,
     cross_name,
     delayed_declaration,
     delayed_name,
     load_declaration,
+    rate_name,
     velocity_declaration,
     voltage_declaration,
 )
-from .step import interpolated
-
-
-@dataclass(frozen=True)
-class ThrustTable:
-    """Measured forces of one thruster, with a monotone cubic between the commands."""
-
-    name: str
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    forces: tuple[float, ...]
-    """The force at each command, N."""
-    slopes: tuple[float, ...]
-    """The derivative of the force with respect to the command, at each command, N."""
-    voltage: float = 0.0
-    """The voltage at which the table was measured, V; 0 if the curve has only this table."""
-    path: Path | None = field(default=None, compare=False)
-    """The file with the table."""
-
-    @property
-    def function(self) -> str:
-        """The name of the function that formulas call."""
-        return f"thrust_{self.name}"
-
-    def force(self, command: float) -> float:
-        """Return the force at a command between -1 and 1.
-
-        It is the cubic that has the forces and the slopes at the ends of the interval of the command.
-        """
-        return float(interpolated(command, (self.commands, self.forces, self.slopes)))
-
-
-@dataclass(frozen=True)
-class CurrentTable:
-    """The electric current of one thruster over its command, measured at one voltage."""
-
-    path: Path
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    currents: tuple[float, ...]
-    """The current at each command, A."""
-    voltage: float = 0.0
-    """The voltage at which the currents were measured, V."""
-
-    def current(self, command: float) -> float:
-        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
-        n = bisect_right(self.commands, command)
-        if n in (0, len(self.commands)):
-            return self.currents[min(n, len(self.commands) - 1)]
-        low, high = self.commands[n - 1 : n + 1]
-        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
-
-
-class Part:
-    """A part of a layout with optional coefficients: a thrust curve or an axis."""
-
-    keys: tuple[str, ...]
-
-    @property
-    def suffix(self) -> str:
-        """The end of the names of its coefficients."""
-        raise NotImplementedError
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return self.name_of(key if key in self.keys else key.removesuffix(REVERSE))
-
-    def name_of(self, key: str) -> str:
-        """Return the name that the coefficient with a key has, or would have if it were added."""
-        return coefficient_name(key, self.suffix)
-
-
-@dataclass(frozen=True)
-class Curve(Part):
-    """A thrust curve.
-
-    For c > 0, the force of the thrusters together is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
-    mirrored, unless it has coefficients for reverse. Tables replace both.
-    """
-
-    name: str
-    keys: tuple[str, ...] = ("a_t", "b_t")
-    """The keys of CURVE that the vehicle has."""
-    n_thrusters: int = 1
-    description: str = ""
-    equation: str = ""
-    """Where the curve is published: the number of an equation of the paper, or another source."""
-    tables: tuple[ThrustTable, ...] = ()
-    """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
-    electric_current: CurrentTable | None = field(default=None, compare=False)
-    """The current of one thruster. All curves of a vehicle have it, or none."""
-
-    @property
-    def suffix(self) -> str:
-        """The name of the curve."""
-        return self.name
-
-    @property
-    def has_lag(self) -> bool:
-        """True when the force follows the command with a lag."""
-        return "T" in self.keys
-
-
-Vector = tuple[float, float, float]
-FAINT = 1e-9
-"""Smaller effects, in N per N or m, are rounding errors of a direction."""
-
-
-def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
-    """Return the part of a force along an axis, or its moment about the axis."""
-    (X, Y, Z), (x, y, z) = force, position
-    if axis.is_rotation:
-        return (y * Z - z * Y, z * X - x * Z, x * Y - y * X)[axis.place]
-    return force[axis.place]
-
-
-class SourcedVector(NamedTuple):
-    """A direction or a position in the body frame, and where it comes from."""
-
-    value: Vector
-    """Forward, starboard, down: a unit vector, or a position from the origin (m)."""
-    source: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Actuator:
-    """A thruster or a fin: a part that commands drive, without its numbers."""
-
-    name: str
-    """The name in the FMU: the command is `u_<name>`, and the force of a thruster `F_<name>`."""
-    description: str = ""
-    """For example "left thruster" or "rudder"."""
-    direction: SourcedVector
-    """The direction of the force at a positive command, or of a fin's lift ahead."""
-    position: SourcedVector | None = None
-
-    @property
-    def place(self) -> Vector:
-        """The position (m), or the centre of mass where there is none."""
-        return self.position.value if self.position else (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thruster(Actuator):
-    """A thruster: its curve, its direction and its place."""
-
-    curve: str
-    """The name of the thrust curve."""
-    arm: Literal["port", "starboard"] | None = None
-    """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
-
-    @property
-    def side(self) -> float:
-        """1 on the port side, where a force ahead turns the bow to starboard; -1 on the other side; 0 without arm."""
-        return {None: 0.0, "port": 1.0, "starboard": -1.0}[self.arm]
-
-    def effect(self, axis: Axis) -> float:
-        """Return the force along an axis, or the torque about it, of a thrust of 1 N.
-
-        The torque by an arm is in units of R sin γ.
-        """
-        if self.position is None and axis.is_rotation:
-            return self.side if axis is YAW else 0.0
-        return effect_along(axis, self.direction.value, self.place)
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyForce(Thruster):
-    """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
-
-    axis: Axis
-
-    def effect(self, axis: Axis) -> float:
-        """Return 1 for its own axis, and 0 for the others."""
-        return float(axis is self.axis)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fin(Actuator):
-    """A control surface. Its lift is proportional to its angle."""
-
-    has_drag: bool = False
-
-    def effect(self, axis: Axis) -> float:
-        """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
-        effect = effect_along(axis, self.direction.value, self.place)
-        return effect if abs(effect) > FAINT else 0.0
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key."""
-        return f"{key}_{self.name}"
-
-
-@dataclass(frozen=True)
-class VehicleAxis(Part):
-    """An axis of a vehicle."""
-
-    axis: Axis
-    keys: tuple[str, ...] = ("a_d", "b_d")
-    """The keys of AXIS that the vehicle has. It always has α and β."""
-
-    @property
-    def suffix(self) -> str:
-        """The velocity along the axis."""
-        return self.axis.velocity
-
-
-class Range(NamedTuple):
-    """The range of a quantity over which a vehicle was identified."""
-
-    name: str
-    """The variable, or EVERY_COMMAND."""
-    low: float
-    high: float
-
-
-EVERY_COMMAND = "command"
-"""The quantity whose range limits the size of the commands of all thrusters."""
-
-
-class CoefficientTable(NamedTuple):
-    """A table of the vehicle file with coefficients."""
-
-    place: tuple[str, ...]
-    """The tables around it, and its own name."""
-    names: Mapping[str, str]
-    """The names of its coefficients, by key."""
-    declarations: Mapping[str, Declaration]
-    words: Mapping[str, str]
-    """What fills the fields in their texts."""
+from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thruster, VehicleAxis
+from .words import (
+    CoefficientTable,
+    command_words,
+    table_of_axis,
+    table_of_curve,
+    table_of_fin,
+    thrust_declaration,
+    torque_declaration,
+)
 
 
 @dataclass(frozen=True)
@@ -392,7 +165,8 @@ class Layout:
 
     @cached_property
     def continued(self) -> tuple[str, ...]:
-        """The variables that a step continues besides the states: with an attitude, the heading, which counts turns."""
+        """Variables that are carried from step to step although they are no states. With roll or pitch this is psi: a
+        quaternion does not know how many turns the vehicle has made."""
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
@@ -448,19 +222,10 @@ class Layout:
         )
         return (
             *(CoefficientTable((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
-            *map(_of_curve, self.curves),
-            *map(_of_fin, self.fins),
-            *self._tables_of_axes,
+            *map(table_of_curve, self.curves),
+            *map(table_of_fin, self.fins),
+            *(table_of_axis(vehicle_axis, kinds) for kinds in (AXIS, TUNING) for vehicle_axis in self.axes),
         )
-
-    @property
-    def _tables_of_axes(self) -> Iterator[CoefficientTable]:
-        for kinds in (AXIS, TUNING):
-            for vehicle_axis in self.axes:
-                names = {
-                    key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys
-                }
-                yield CoefficientTable(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
@@ -500,7 +265,7 @@ class Layout:
         words = {
             name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
             for name, gains in self.mix.items()
-        } or {driven.name: _command(driven) for driven in self.actuators}
+        } or {driven.name: command_words(driven) for driven in self.actuators}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
@@ -582,7 +347,7 @@ class Layout:
     def _forces(self, *, lag: bool) -> dict[str, Declaration]:
         """Return the forces of the thrusters that follow the commands with a lag, or those of the others."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
-        return {f"F_{t.name}": _thrust(t, curve) for t, curve in curves if curve.has_lag == lag}
+        return {f"F_{t.name}": thrust_declaration(t, curve) for t, curve in curves if curve.has_lag == lag}
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
@@ -596,11 +361,7 @@ class Layout:
         They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
         of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
-        torques = {}
-        for curve in self.turning_curves:
-            of = f"of the {curve.description}" if curve.description else curve.name
-            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
-            torques[f"tau_{curve.name}"] = Declaration("N.m", words)
+        torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
         return self._forces(lag=False) | torques | self.angles | self.outside
 
     @cached_property
@@ -624,56 +385,19 @@ class Layout:
         return ANGLES_AT_START if self.has_attitude else {}
 
     @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
+        rates = map(rate_name, self.state)
+        known = (*self.calculated, *self.delayed, *self.coefficients, *self.initial)
+        return (*self.inputs, *self.state, *rates, *known)
+
+    @cached_property
     def places(self) -> dict[str, int]:
-        """The index of each variable in the arrays of the C code. That of der(x) is the index of x plus len(state)."""
-        variables = [*self.inputs, *self.state]
-        others = [*self.calculated, *self.delayed, *self.coefficients, *self.initial]
-        places = {name: place for place, name in enumerate(variables)}
-        return places | {name: place for place, name in enumerate(others, len(variables) + len(self.state))}
+        """The place of each variable in this order. It is the index in the arrays of the C code."""
+        return {name: place for place, name in enumerate(self.variables)}
 
     @cached_property
     def turning_curves(self) -> tuple[Curve, ...]:
         """The curves whose thrusters turn the vehicle."""
         driving = {t.curve for t in self.thrusters_along(YAW)} if self.has(YAW) else set()
         return tuple(curve for curve in self.curves if curve.name in driving)
-
-
-def _of_curve(curve: Curve) -> CoefficientTable:
-    words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-    names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
-    return CoefficientTable(("curves", curve.name), names, CURVE, words)
-
-
-def _of_fin(fin: Fin) -> CoefficientTable:
-    names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
-
-
-def _pushes(direction: tuple[float, float, float]) -> str:
-    """Return the direction of a positive force in words."""
-    words = [
-        axis.positive if part > 0.0 else axis.negative
-        for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
-        if abs(part) > FAINT
-    ]
-    return listed(words)
-
-
-def _command(driven: Thruster | Fin) -> str:
-    kind = "fin" if isinstance(driven, Fin) else "thruster"
-    words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
-    return f"{words}, positive {_pushes(driven.direction.value)}"
-
-
-def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
-    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
-    share = {1: "", 2: ", half of the pair's"}.get(curve.n_thrusters, f", 1/{curve.n_thrusters} of their curve")
-    rest = ", in water at rest" if "d" in curve.keys else ""
-    return Declaration(
-        "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"
-    )
-
-
-def arm(R: float, gamma: float) -> float:
-    """Return R sin γ, the torque per difference of thrust (m), (4)."""
-    return R * sin(gamma)

@@ -52,9 +52,9 @@ class MassMatrix:
         return not any(axis in block for block in self.blocks)
 
     def inverse(self, axis: str) -> dict[str, Name]:
-        """Return a row of the inverse.
+        """Return the entries of a row of M^-1 by their names.
 
-        For each axis that acts on this one, it has the name of the acceleration per load along that axis.
+        A force F_j along axis j accelerates this axis by (M^-1)_ij F_j.
         """
         for block in self.blocks:
             if axis in block:

@@ -1,12 +1,25 @@
 """The equation of motion of a vehicle as a table of terms.
 
-Between reversals, and while the inputs are held, the motion is a quadratic system of ordinary differential equations,
+In Fossen's notation, with the velocities nu = (u, v, w, p, q, r) through the water and the pose eta,
+
+    M nu' + C(nu) nu + D(nu) nu + g(eta) = tau,    eta' = J(eta) nu + current.
+
+    M            mass with added mass and tuning       mass_matrix here, MassMatrix.parameters (mass.py)
+    C(nu) nu     Coriolis and Munk terms               MassMatrix.coriolis (mass.py)
+    D(nu) nu     linear and quadratic damping, lift    _drag (forces.py)
+    g(eta)       weight and buoyancy                   _restoring, or the net weight in _loads (forces.py)
+    tau          thrust, its loss with speed, fins,    _loads, _advance, _steering (forces.py),
+                 loads from outside                    from the commands: thrust_formulas (thrust.py)
+    J(eta) nu    kinematics                            _Table.pose here, rotation_terms (attitude.py)
+
+Multiplied by M^-1, and with the cosine and sine of the heading (or the rotation matrix) as states, this is a quadratic
+system of ordinary differential equations, as long as no velocity reverses and the inputs are held:
 
     y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k.
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
-formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
-effect is a new force (forces.py).
+formula for each coefficient. `python/step.py` computes a step from it in Python, and the C code is generated from it. A
+new effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,8 +30,9 @@ from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rat
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, total, where
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
-from .layout import EVERY_COMMAND, Curve, Layout, Range, ThrustTable
+from .layout import Layout
 from .mass import MassMatrix
+from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
 from .thrust import steady_name, thrust_formulas
 
 
@@ -72,9 +86,8 @@ class Equation:
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, Expression]
-    """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
-    which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
-    the arrived fractions of the lags. A state that a term contains must have a formula."""
+    """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
+    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
     lags: Mapping[str, Mapping[str, str]]
     """For the arrived fraction of each lag: the forces that lag, each with the steady thrust that it approaches.
 
@@ -123,7 +136,7 @@ class Equation:
     def used(self) -> frozenset[str]:
         """The states that a term contains, and the orientation. The other states are integrals of these.
 
-        In `rows`, the used states come first, because the C code knows only their number.
+        In `rows`, the used states come first, so that C needs one number, N_USED, to tell states from integrals.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 

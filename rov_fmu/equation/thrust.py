@@ -18,7 +18,8 @@ from .expression import (
     where,
     with_positive_zero,
 )
-from .layout import Curve, Layout
+from .layout import Layout
+from .parts import Curve
 
 Formulas = dict[str, Expression]
 _VOLTAGE = Name("voltage")
@@ -107,10 +108,7 @@ def by_direction(command: Name, curve: Curve, key: str) -> Expression:
 
 
 def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return the formula of the force of the tables, and the formula of the force times the scale.
-
-    Between two voltages, the force is interpolated linearly.
-    """
+    """Return formulas of F = k_t F_table(c), with F_table interpolated linearly in the voltage."""
     battery, (first, *_) = names("battery"), curve.tables
     forces = [call(table.function, names("command", name)) for table in curve.tables]
     force: Expression = forces[-1]

@@ -10,7 +10,8 @@ from textwrap import fill
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.forces import EXPECTED, effects_of
-from rov_fmu.equation.layout import EVERY_COMMAND, Layout, Range
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.messages import listed
 from rov_fmu.vehicle.description import UNIT_OF_RANGE
 from rov_fmu.vehicle.published import load_tables

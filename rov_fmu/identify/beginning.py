@@ -8,7 +8,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning

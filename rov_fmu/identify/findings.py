@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,

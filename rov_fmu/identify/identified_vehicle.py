@@ -9,7 +9,8 @@ import numpy as np
 
 from rov_fmu import __version__
 from rov_fmu.equation.catalogue import REVERSE
-from rov_fmu.equation.layout import Curve, Layout, Part, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Part, VehicleAxis
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.given import GivenVehicle
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest

@@ -9,7 +9,7 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
-from rov_fmu.equation.layout import Part
+from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of

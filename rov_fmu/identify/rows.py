@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.layout import Curve
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.beginning import QUANTITIES, Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.fit import Fit

@@ -26,7 +26,8 @@ from rov_fmu.equation.catalogue import (
     YAW,
     Declaration,
 )
-from rov_fmu.equation.layout import Layout, Part, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Part, VehicleAxis
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside

@@ -26,7 +26,8 @@ from rov_fmu.equation.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line
 from rov_fmu.vehicle import schema

@@ -10,7 +10,8 @@ from typing import Any
 
 from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Layout, Thruster
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Thruster
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line

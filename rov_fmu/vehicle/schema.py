@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 from pydantic_core import ErrorDetails
 
-from rov_fmu.equation import layout
+from rov_fmu.equation import parts
 from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
@@ -32,7 +32,8 @@ from rov_fmu.equation.catalogue import (
     cross_of,
     declarations_of,
 )
-from rov_fmu.equation.layout import CurrentTable, Layout, SourcedVector, ThrustTable, Vector, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import CurrentTable, SourcedVector, ThrustTable, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.field_types import Finite, Name, Symbol, Text, not_blank
 from rov_fmu.io.paths import inside_or_shipped
@@ -209,14 +210,14 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
 
     electric_current: ElectricCurrent | None = None
 
-    def for_model(self, name: str) -> layout.Curve:
+    def for_model(self, name: str) -> parts.Curve:
         """Return the curve of the model."""
         keys, current = _coefficient_keys(self, CURVE), self.electric_current
         tables = {0: (0.0, self.table)} if self.table else {}
         tables = tables or {n: (row.voltage, row.table) for n, row in enumerate(self.tables or (), 1)}
         if tables:
             keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
-        return layout.Curve(
+        return parts.Curve(
             name,
             keys,
             **{key: getattr(self, key) for key in ("description", "equation")},
@@ -329,9 +330,9 @@ class Thruster(Actuator):
     arm: Literal["port", "starboard"] | None = None
     """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
 
-    def for_model(self) -> layout.Thruster:
+    def for_model(self) -> parts.Thruster:
         """Return the thruster of the model."""
-        return layout.Thruster(**self.in_model, curve=self.curve, arm=self.arm)
+        return parts.Thruster(**self.in_model, curve=self.curve, arm=self.arm)
 
 
 _FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
@@ -345,9 +346,9 @@ class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
 
     position: Position
 
-    def for_model(self) -> layout.Fin:
+    def for_model(self) -> parts.Fin:
         """Return the fin of the model."""
-        return layout.Fin(**self.in_model, has_drag=self.drag is not None)
+        return parts.Fin(**self.in_model, has_drag=self.drag is not None)
 
 
 class Battery(Strict):

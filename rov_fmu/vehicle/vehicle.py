@@ -15,9 +15,10 @@ from typing_extensions import Self
 from rov_fmu.equation.alone import AxisAlone, alone_formulas
 from rov_fmu.equation.catalogue import ARM, YAW, Axis
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis, arm
-from rov_fmu.equation.printed import model_of
-from rov_fmu.equation.step import DelayLine, heading, step
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
+from rov_fmu.equation.python.printed import model_of
+from rov_fmu.equation.python.step import DelayLine, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
@@ -331,7 +332,7 @@ class Vehicle:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
         The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
-        (rov_fmu/equation/step.py).
+        (rov_fmu/equation/python/step.py).
         """
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}

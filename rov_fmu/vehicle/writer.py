@@ -10,7 +10,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Actuator, Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import EVERY_COMMAND, Actuator, Curve
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of

@@ -12,8 +12,8 @@ from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import SourcedVector
-from rov_fmu.equation.step import Change
+from rov_fmu.equation.parts import SourcedVector
+from rov_fmu.equation.python.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine

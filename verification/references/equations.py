@@ -12,7 +12,7 @@ from typing import Any
 from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.equation.layout import Curve, Thruster, ThrustTable
+from rov_fmu.equation.parts import Curve, Thruster, ThrustTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # a float, or a number of mpmath or gmpy2

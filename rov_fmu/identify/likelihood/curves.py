@@ -19,7 +19,8 @@ from scipy.interpolate import CubicSpline
 from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, way_formula
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.equation.expression import ARRAYS, array_functions, compiled
-from rov_fmu.equation.layout import Curve, Layout, ThrustTable
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, ThrustTable
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas
 from rov_fmu.tank.arrays import Array

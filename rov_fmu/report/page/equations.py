@@ -21,10 +21,11 @@ from rov_fmu.equation.expression import (
     written,
 )
 from rov_fmu.equation.forces import COUPLING, forces_of
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis
 from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
 from rov_fmu.equation.thrust import steady_name
-from rov_fmu.equation.typeset import MATHML, TEXT, collected
+from rov_fmu.report.page.typeset import MATHML, TEXT, collected
 from rov_fmu.report.templates import number
 
 

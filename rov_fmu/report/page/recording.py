@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import EXTERNAL
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.arrays import Array

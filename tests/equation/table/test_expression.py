@@ -27,7 +27,7 @@ from rov_fmu.equation.expression import (
     with_positive_zero,
     written,
 )
-from rov_fmu.equation.typeset import MATHML, TEXT
+from rov_fmu.report.page.typeset import MATHML, TEXT
 
 a, b, c, d = map(Name, "abcd")
 

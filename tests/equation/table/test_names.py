@@ -16,7 +16,8 @@ from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.c.simulation import simulate
 from rov_fmu.c.source import sources
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.paths import FMU_SRC
 from rov_fmu.vehicle.checks import check_distinct_names

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
 
-from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
-from .catalogue import AXES
-from .expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
-from .layout import Layout
+from ..attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from ..catalogue import AXES
+from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
+from ..layout import Layout
+from ..terms import Equation, equation_of, mass_matrix, rate_formula
 from .step import interpolated
-from .terms import Equation, equation_of, mass_matrix, rate_formula
 
 _FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
 

@@ -7,7 +7,18 @@ from collections.abc import Callable, Iterable, Iterator
 from itertools import groupby
 from typing import NamedTuple
 
-from .expression import CALL, RANKS, Expression, Language, Number, Operation, Ranks, call, product, total
+from rov_fmu.equation.expression import (
+    CALL,
+    RANKS,
+    Expression,
+    Language,
+    Number,
+    Operation,
+    Ranks,
+    call,
+    product,
+    total,
+)
 
 _READERS: Ranks = {
     **RANKS,
