@@ -55,6 +55,9 @@ def step_jacobian(
 ) -> StepJacobian:
     """Return the states after h > 0 seconds with the inputs held, and their derivatives.
 
+        found = step_jacobian(rov, inputs, state, 0.1, ["a_d_u"])
+        found.states[0, 0], found.coefficients[0, 0]  # d u / d u before the step; d u / d a_d_u, (m/s) / (N.s2/m2)
+
     The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
     names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
     a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.

@@ -87,6 +87,12 @@ def simulate(
 ) -> Trajectories:
     """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
 
+    A hundred vehicles with other masses, at 30 % ahead, over ten seconds:
+
+        values = {"u_l": 0.3, "u_r": 0.3, "m_rov": np.linspace(6.0, 7.0, 100)[:, None]}  # vehicles x 1, kg
+        result = simulate(vehicle, np.linspace(0.0, 10.0, 101), values, ["u"], vehicles=100)
+        result.values[0, :, -1]  # u of each vehicle at 10 s, m/s
+
     `values` contains inputs, states at the first time, and coefficients by name. Each broadcasts to vehicles x times.
     Inputs that are not given have their usual values (`Layout.usual_inputs`): no command, load or current, and the
     usual voltage. States that are not given are 0, and coefficients that are not given are those of the vehicle.

@@ -1,6 +1,5 @@
 """The parts of a vehicle without their numbers: axes, thrust curves and tables, thrusters and fins."""
 
-from bisect import bisect_right
 from dataclasses import dataclass, field
 from math import sin
 from pathlib import Path
@@ -53,11 +52,9 @@ class CurrentTable:
 
     def current(self, command: float) -> float:
         """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
-        n = bisect_right(self.commands, command)
-        if n in (0, len(self.commands)):
-            return self.currents[min(n, len(self.commands) - 1)]
-        low, high = self.commands[n - 1 : n + 1]
-        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
+        from numpy import interp  # few vehicles have such tables
+
+        return float(interp(command, self.commands, self.currents))
 
 
 class Part:

@@ -57,7 +57,6 @@ class _Formulas:
 
     def __init__(self, layout: Layout) -> None:
         equation = equation_of(layout)
-        rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
         self.names = equation.names
         self.model = model_of(layout)
         self.parameters = compiled(equation.parameters)
@@ -66,7 +65,6 @@ class _Formulas:
             vehicle_axis.axis.name: compiled(alone_formulas(layout, vehicle_axis.axis.velocity), equation.measured)
             for vehicle_axis in layout.axes
         }
-        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
@@ -308,9 +306,21 @@ class Vehicle:
             **{name: state[name] for name in self.layout.continued if name in state},
         }
 
+    def _outputs(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the rates of the states and the calculated variables, together with all numbers that they need."""
+        values: dict[str, float] = self._formulas.model.outputs(self._values(inputs, state))
+        return values
+
     def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
-        values = self._formulas.calculate(self._values(inputs, state))
+        """Return the values of `layout.calculated` by name: thrust (N), torque (N.m) and Euler angles (rad).
+
+        The arguments are those of `step`. At 30 % of both rear thrusters:
+
+            rov = load_vehicle(SHIPPED["videoray"])
+            inputs = rov.layout.usual_inputs | {"u_l": 0.3, "u_r": 0.3}
+            rov.calculated(inputs, rov.layout.at_rest)["F_l"]  # the thrust of the left one, N
+        """
+        values = self._outputs(inputs, state)
         for name in self.layout.continued:
             values[name] = heading(values, state.get(name, values[name]))
         return {name: values[name] for name in self.layout.calculated}
@@ -324,15 +334,30 @@ class Vehicle:
     # ---- Motion ----
 
     def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the time derivatives of the states by their names."""
-        values = self._formulas.calculate(self._values(inputs, state))
+        """Return the time derivatives of the states by their names, in m/s2, rad/s2, m/s, rad/s and N/s.
+
+        The arguments are those of `step`. M nu' + C nu + D nu + g = tau is solved for nu'; eta' follows from nu and the
+        current.
+
+            rov.derivatives(rov.layout.usual_inputs | {"u_t": 0.5}, rov.layout.at_rest)["w"]  # m/s2, down
+        """
+        values = self._outputs(inputs, state)
         return {name: values[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
+        - `inputs`: all of `layout.inputs` by name. Commands are fractions from -1 to 1 (or pulse widths, us), loads are
+          in N and N.m, the current in m/s, the voltage in V. With a dead time, the commands act at once.
+        - `state`: all of `layout.state` by name, in m/s, rad/s, m, rad and N. With roll or pitch, the heading psi (rad)
+          may be there too; it tells in which turn the vehicle is.
+        - `h`: the length of the step, s. It need not be short.
+
         The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
-        (rov_fmu/equation/python/step.py).
+        (rov_fmu/equation/python/step.py). Ten seconds at full thrust ahead, from rest:
+
+            inputs = rov.layout.usual_inputs | {"u_l": 1.0, "u_r": 1.0}
+            rov.step(inputs, rov.layout.at_rest, 10.0)["u"]
         """
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
@@ -391,7 +416,13 @@ class Vehicle:
         return self.alone(axis, self.held_inputs(axis, command))
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
-        """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
+        """Return the signed V_ss (m/s or rad/s), and Tau (17) from rest in s, in closed form.
+
+        - `axis`: an axis of the vehicle, such as HEAVE; the others are at rest.
+        - `command`: a fraction from -1 to 1 of all commands that drive it; positive is its positive direction.
+
+            load_vehicle(SHIPPED["videoray"]).response(HEAVE, 0.3)  # (0.1750, 2.209), as in Table 6
+        """
         motion = self.motion_at(axis, command)
         return motion.steady_velocity(), motion.time_constant()
 
@@ -433,7 +464,10 @@ def _contradictions(layout: Layout, coefficients: Mapping[str, float]) -> Iterat
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError, and warns about numbers that are probably wrong.
 
-    `coming` is the path of a report that is about to be written, so it need not exist yet.
+    - `path`: the file. `find_vehicle("bluerov2")` gives the path of one that ships.
+    - `coming`: the path of a report that is about to be written, so it need not exist yet.
+
+        load_vehicle(find_vehicle("videoray"))["m_rov"]  # kg
     """
     path = Path(path)
     content = read_bytes(path, VehicleFileError, most=LARGEST)
