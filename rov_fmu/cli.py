@@ -13,7 +13,8 @@ from functools import partial
 from math import inf, isfinite, nan, nextafter
 from pathlib import Path
 from tempfile import mkdtemp
-from typing import Any
+from time import perf_counter
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -28,12 +29,16 @@ from rov_fmu.io.messages import (
     ProofError,
     StudyError,
     did_you_mean,
+    listed,
     print_message,
     shown,
 )
 from rov_fmu.io.output import check_replaced, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
+
+if TYPE_CHECKING:
+    from rov_fmu.build import Built
 
 _EXIT_CODES = {
     FileError: 2,
@@ -218,9 +223,43 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
-    from rov_fmu.interface.build_command import build_and_print
+    from rov_fmu.build import build, chosen_platforms
+    from rov_fmu.report.progress import compiling
+    from rov_fmu.vehicle.vehicle import load_vehicle
 
-    build_and_print(vehicle, platforms, backend, fmi, **options)
+    started = perf_counter()
+    loaded = load_vehicle(vehicle)
+    chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
+    with compiling(chosen) as (begin, done):
+        built = build(
+            loaded,
+            platforms=chosen,
+            backend=backend,
+            fmi=fmi,
+            inputs=[vehicle],
+            on_content=begin,
+            on_compiled=done,
+            **options,
+        )
+    _print_built(built, perf_counter() - started)
+
+
+def _print_built(built: "Built", seconds: float) -> None:
+    """Print the size of the FMU and of its binaries, the times, what it did when it was run, and what to do next."""
+    from rov_fmu.report.console import console, paragraph, print_end, shell_words
+
+    out = console()
+    if built.lost:
+        paragraph(out, f"Replaced {shell_words(built.path)}, which also had {listed(built.lost)}.")
+    size = f"{built.size / 1000:.0f} kB, built in {seconds:.1f} s, GUID {built.guid}"
+    paragraph(out, f"{shell_words(built.path)}: {size}")
+    if len(built.binaries) > 1:
+        paragraph(out, "The compilers ran in parallel. Each time is that from their start to the end of one:")
+    for name, size_of_binary in built.binaries.items():
+        out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
+    paragraph(out, built.note)
+    following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
+    print_end([built.path, *built.beside], following)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------

@@ -89,22 +89,30 @@ class Operation(Expression):
 ZERO = Number(0.0)
 
 
-def _folded(op: str, a: Expression, b: Expression) -> Expression:
-    match op, a, b:
-        case ("*" | "/", Number(0.0), _) | ("*", _, Number(0.0)):
+def _number(x: Expression) -> float | None:
+    """Return the value of a number, or None for other expressions."""
+    if isinstance(x, Operation) and x.op == "neg":
+        inner = _number(x.args[0])
+        return None if inner is None else -inner
+    return x.value if isinstance(x, Number) else None
+
+
+def _folded(op: str, a: Expression, b: Expression) -> Expression:  # noqa: PLR0911 - a case for each rule
+    match op, _number(a), _number(b):
+        case ("*" | "/", 0.0, _) | ("*", _, 0.0):
             return ZERO
-        case ("+", Number(0.0), x) | ("+" | "-", x, Number(0.0)) | ("*", Number(1.0), x) | ("*" | "/", x, Number(1.0)):
-            return x
-        case (
-            ("-", Number(0.0), x)
-            | ("*", Operation("neg", (Number(1.0),)), x)
-            | ("*", x, Operation("neg", (Number(1.0),)))
-        ):
-            return -x
+        case ("+", 0.0, _) | ("*", 1.0, _):
+            return b
+        case ("+" | "-", _, 0.0) | ("*" | "/", _, 1.0):
+            return a
+        case ("-", 0.0, _) | ("*", -1.0, _):
+            return -b
+        case ("*", _, -1.0):
+            return -a
         case ("+" | "-", _, _) if _is_negative(b):
             return a - -b if op == "+" else a + -b
-        case "*", Number() | Operation("neg", (Number(),)), Operation("*", (first, other)):
-            return a * first * other
+        case ("*", float(), _) if isinstance(b, Operation) and b.op == "*":
+            return a * b.args[0] * b.args[1]
     return Operation(op, (a, b))
 
 
@@ -379,9 +387,11 @@ def tangent(x: Expression, changes: Mapping[str, Expression]) -> Expression:  # 
     def change(part: Expression) -> Expression:
         return tangent(part, changes)
 
+    if x.names.isdisjoint(changes):
+        return ZERO
     match plain(x):
         case Name(identifier):
-            return changes.get(identifier, ZERO)
+            return changes[identifier]
         case Operation("if", (test, then, otherwise)):
             return where(test, change(then), change(otherwise))
         case Operation("+", (a, b)):
