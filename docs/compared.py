@@ -173,7 +173,7 @@ def _top_speeds(six: Vehicle, eight: Vehicle) -> Table:
             speeds = [abs(v.response(axis, command)[0]) for v in (six, eight)]
             found.append((f"{axis.name}, {way}", *(f"{speed:.2f} {axis.unit}" for speed in speeds)))
     thrust = sum(abs(thruster.effect(SURGE)) * OWN_THRUST for thruster in eight.layout.thrusters)
-    full = eight.held(SURGE, 1.0)
+    full = eight.motion_at(SURGE, 1.0)
     own = replace(full, C=full.C * thrust / eight.force(SURGE, 1.0)).steady_velocity()
     found.append((f"surge, {SURGE.positive}, with {OWN_THRUST} N a thruster", "", f"{own:.2f} m/s"))
     return found

@@ -14,7 +14,8 @@ import click
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, SourcedVector, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.vehicle import Vehicle
 from verification.references.pool import Array, swim
@@ -23,7 +24,7 @@ _CURVE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0")
 _AHEAD, _DOWN = (SourcedVector(along, "drawing") for along in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
 _LAYOUT = Layout(
     (VehicleAxis(SURGE), VehicleAxis(HEAVE, ("a_d", "b_d", "F_0")), VehicleAxis(YAW)),
-    (Curve("rear", _CURVE, together=2), Curve("top", _CURVE)),
+    (Curve("rear", _CURVE, n_thrusters=2), Curve("top", _CURVE)),
     (
         Thruster(name="l", curve="rear", direction=_AHEAD, arm="port"),
         Thruster(name="r", curve="rear", direction=_AHEAD, arm="starboard"),

@@ -22,7 +22,6 @@ from click.shell_completion import CompletionItem
 from rov_fmu import __version__
 from rov_fmu.c.compile import INTERFACES, OTHER_NAMES, PLATFORMS, BuildError, OptionError
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.io.file_kinds import PAGE, check_written
 from rov_fmu.io.messages import (
     FileError,
     InputError,
@@ -33,7 +32,7 @@ from rov_fmu.io.messages import (
     print_message,
     shown,
 )
-from rov_fmu.io.output import check_replaced, check_targets, write_whole
+from rov_fmu.io.output import check_replaced, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
@@ -397,30 +396,13 @@ def _fly(
     force: bool,
 ) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.fmu.content import web_module
-    from rov_fmu.io.output import Output, sealed
+    from rov_fmu.interface.fly_command import write_fly_page
     from rov_fmu.report.console import print_end
-    from rov_fmu.report.page.live import Flown, fly_page
-    from rov_fmu.report.page.recording import recording_of
-    from rov_fmu.vehicle.vehicle import load_vehicle
 
     if identified and not recording:
         raise click.UsageError("fly: --identified needs --recording, the log that it is about")
-    paths = [vehicle, against] if against else [vehicle]
-    loaded = [load_vehicle(path) for path in paths]
-    if output:
-        given = [path for path in (recording, identified) if path]
-        check_targets([output], [*paths, *given, *(file for one in loaded for file in one.files)])
-        check_written(output, PAGE)
-        check_replaced([output], force=force)
     with _warnings_printed():
-        flown = recording_of(recording, loaded[0], identified) if recording else None
-    names = [path.name for path in paths]
-    names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
-    shown_ones = [Flown(one, web_module(one.layout), name) for one, name in zip(loaded, names, strict=True)]
-    page = sealed(fly_page(shown_ones, recording=flown), "<!-- {} -->", "fly").encode()
-    path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{loaded[0].identifier}.html")
-    write_whole(Output(path, page), force=force)
+        path = write_fly_page([vehicle, against] if against else [vehicle], recording, identified, output, force=force)
     if output:
         print_end([path], "open it in a browser")
     else:

@@ -10,12 +10,12 @@ from typing import Any, Literal, TypeVar
 
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, AXIS, HEAVE, PITCH, RESTORING, ROLL, cross_name, cross_of
-from rov_fmu.equation.layout import (
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import (
     EVERY_COMMAND,
+    Actuator,
     Curve,
-    Driven,
     Fin,
-    Layout,
     Range,
     SourcedVector,
     Thruster,
@@ -164,7 +164,7 @@ THRUST_EFFECTS = EVERYTHING.with_name("thrust_effects.toml")
 SIX_AXES = EVERYTHING.with_name("six_axes.toml")
 
 
-def sources_of(driven: Driven) -> dict[str, str]:
+def sources_of(driven: Actuator) -> dict[str, str]:
     """The sources of the direction and the position of a thruster or a fin."""
     places = {"direction": driven.direction, "position": driven.position}
     return {key: place.source for key, place in places.items() if place}

@@ -66,7 +66,7 @@ experiments stand inside the FMU.
 
 def manoeuvre(name: str) -> Manoeuvre:
     """Return the manoeuvre of a vehicle: all its axes that stay upright, one after the other and together."""
-    axes = [name for name in load_vehicle(SHIPPED[name]).layout.kinds if AXES[name] not in (ROLL, PITCH)]
+    axes = [name for name in load_vehicle(SHIPPED[name]).layout.by_name if AXES[name] not in (ROLL, PITCH)]
     phases = {2.0 + 4.0 * n: {axis: 0.2} for n, axis in enumerate(axes)}
     end = 2.0 + 4.0 * len(axes)
     return Manoeuvre(name, {}, {0.0: {}, **phases, end: dict.fromkeys(axes, -0.15), end + 6.0: {}})
@@ -101,7 +101,7 @@ def _write_fmu(folder: Path, name: str, version: int, platforms: str | None) -> 
     problems = validate_fmu(str(fmu))
     report = [f"FMPy {fmpy.__version__}, validate_fmu: {len(problems)} problems", *problems]
     (folder / "fmpy-validate.txt").write_text("\n".join(report) + "\n", encoding="utf-8")
-    axes = ", ".join(vehicle.layout.kinds)
+    axes = ", ".join(vehicle.layout.by_name)
     readme = README.format(name=vehicle.name, about=vehicle.description, version=version, axes=axes, step=STEP)
     (folder / "Readme.txt").write_text(readme, encoding="utf-8")
 

@@ -118,7 +118,7 @@ def paper_figures() -> Iterator[PaperFigure]:
         "print the measured forces.",
         (partial(_top_thrust, k=k),),
     )
-    for number, axis in zip((7, 8, 9), vehicle.layout.kinds, strict=True):
+    for number, axis in zip((7, 8, 9), vehicle.layout.by_name, strict=True):
         table = tables[axis]
         kind = "torque" if table.axis.is_rotation else "force"
         yield PaperFigure(

@@ -1,7 +1,16 @@
 /* The step. It consists of pieces. Each piece is a Taylor series (series.c) that ends at the first reversal of a velocity.
  *
- * Names in all files of the motion: at are the variables of the vehicle, n the numbers that follow from the parameters, q the
- * numbers that are held during a piece, y the states of the table, m the motion, s the series. */
+ * In all files of the motion, these letters have one meaning (real.h has the type real, a double or a vector of doubles):
+ *
+ *     letter  type              what it is                                               who writes it
+ *     at      real[]            the variables of the vehicle, at REF_... of model.h      instance.c or engine.c; model_calculate
+ *     n       model_numbers     what follows from the parameters alone                   model_prepare
+ *     q       model_held        what is held during a piece: thrust, constant terms      model_start, model_direct, model_arrive
+ *     y       real[N_SERIES]    the states of the table of terms at the start of a piece  model_start, motion_move
+ *     m       motion            how far a step has come: y, q, and their rounding errors  motion_start, motion_pass
+ *     s       series            the series of a piece: s->c[k] are the coefficients of t^k  motion_begin, series_terms
+ *     h       real or double    the length of a step, s                                  the caller
+ */
 
 #ifndef MOST_PIECES
 #define MOST_PIECES 1000000 /* of a step. A vehicle that swings without linear drag never settles, and each swing takes a few pieces. */

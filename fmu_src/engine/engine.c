@@ -6,19 +6,19 @@
 #include "step.c"
 
 typedef struct {
-    lone own; /* the first member, so a pointer to it is one to the whole */
+    single own; /* the first member, so a pointer to it is one to the whole */
     model_numbers numbers;
     delay_line line;
 } whole;
 
-size_t lone_size(void)
+size_t single_size(void)
 {
     return sizeof(whole);
 }
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
  * differ by whole turns, the one nearest to psi_0 is taken. The given delayed commands act, and nothing waits. */
-void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
+void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 {
     whole *const all = (whole *)v;
     double state[N_STATES];
@@ -45,7 +45,7 @@ void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 }
 
 /* Return true when changes of the commands wait for the dead time, so that the next step may have several parts. */
-bool lone_waits(const lone *v)
+bool single_waits(const single *v)
 {
 #if HAS_DEAD_TIME
     const delay_line *const line = &((const whole *)v)->line;
@@ -57,7 +57,7 @@ bool lone_waits(const lone *v)
 }
 
 /* Step over h seconds from time t. Return false when the motion cannot be computed. */
-bool lone_step(lone *v, double t, double h)
+bool single_step(single *v, double t, double h)
 {
     whole *const all = (whole *)v;
     double next[N_STATES];
@@ -71,14 +71,14 @@ bool lone_step(lone *v, double t, double h)
 }
 
 /* Calculate the variables that follow from the inputs and states. */
-void lone_calculate(lone *v)
+void single_calculate(single *v)
 {
     model_calculate(v->at, &((whole *)v)->numbers, v->heading);
 }
 
 /* Return the length of a piece of a vehicle in a lane, from the coefficients of its series. *reach is 1 when the series may be used up
  * to t = 1. Otherwise it becomes the largest usable t, or 0 when the series overflows. */
-double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed)
+double single_length(const double c[], const double scale[], int order, double *reach, int *reversed)
 {
     series s;
     s.order = order;
@@ -96,22 +96,22 @@ void simulate(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);
     whole all;
-    lone *const v = &all.own;
+    single *const v = &all.own;
     for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
-        lone_begin(v, given, vehicle);
+        single_begin(v, given, vehicle);
         failed[vehicle] = times;
         for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
             for (int i = 0; i < N_INPUTS; i++) {
                 v->at[i] = number(&given[i], vehicle, n);
             }
             if (calculates) {
-                lone_calculate(v);
+                single_calculate(v);
             }
             double *to = result + vehicle * times + n;
             for (ptrdiff_t k = 0; k < records; k++) {
                 to[k * vehicles * times] = v->at[recorded[k]];
             }
-            if (n + 1 < times && !lone_step(v, time[n], length[n])) {
+            if (n + 1 < times && !single_step(v, time[n], length[n])) {
                 failed[vehicle] = n + 1;
                 break;
             }

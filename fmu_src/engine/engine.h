@@ -47,24 +47,24 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
         ptrdiff_t *failed, ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,        \
         const volatile int *stop
 
-/* A vehicle that is stepped alone, and goes on from where it was. Its memory, of lone_size() bytes, belongs to the caller, who may
+/* A single vehicle, stepped by itself, which goes on from where it was. Its memory, of single_size() bytes, belongs to the caller, who may
  * change inputs and states there between steps, and may copy it. engine.c knows more of it than these numbers, which would be
  * vectors in lanes.c: what follows from the coefficients, and the commands that wait for the dead time. */
 typedef struct {
     double at[N_VARIABLES], heading;
-} lone;
+} single;
 
-EXPORT size_t lone_size(void);
-EXPORT void lone_begin(lone *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
-EXPORT bool lone_step(lone *v, double t, double h);
-EXPORT void lone_calculate(lone *v);
-bool lone_waits(const lone *v);
-double lone_length(const double c[], const double scale[], int order, double *reach, int *reversed);
+EXPORT size_t single_size(void);
+EXPORT void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
+EXPORT bool single_step(single *v, double t, double h);
+EXPORT void single_calculate(single *v);
+bool single_waits(const single *v);
+double single_length(const double c[], const double scale[], int order, double *reach, int *reversed);
 
 /* Return one of several vehicles whose memory lies side by side. */
-static inline lone *lone_of(void *vehicles, ptrdiff_t n)
+static inline single *single_of(void *vehicles, ptrdiff_t n)
 {
-    return (lone *)(void *)((char *)vehicles + n * (ptrdiff_t)lone_size());
+    return (single *)(void *)((char *)vehicles + n * (ptrdiff_t)single_size());
 }
 
 EXPORT void simulate(SIMULATION);

@@ -1,6 +1,6 @@
 /* Simulation for Python of many vehicles at once, one in each lane of a vector (real.h). All lanes take a piece of their steps at
  * the same time, each of its own length, and a lane whose step is at its end begins the next one. So a vehicle has no influence on
- * its neighbours. When a vehicle ends, the next one takes its lane. Steps that need more than that are taken alone by engine.c: while
+ * its neighbours. When a vehicle ends, the next one takes its lane. Steps that need more than that are taken singly by engine.c: while
  * commands wait for the dead time, where a velocity may begin to move with a higher power of time, where a number is not finite,
  * and where a step has many pieces, because engine.c ends a step early when all velocities are steady. */
 #include "vectors.h"
@@ -19,7 +19,7 @@ typedef struct {
     ptrdiff_t vehicle; /* or -1 */
     ptrdiff_t n;       /* the index of the time at which the present step begins */
     int pieces;        /* the pieces of this step so far, or 0 before it */
-    lone *alone;       /* the same vehicle for steps that are taken alone, with the commands that wait; where it begins and ends */
+    single *single;     /* the same vehicle for steps that it takes singly, with the commands that wait; where it begins and ends */
 } lane;
 
 typedef struct {
@@ -36,49 +36,49 @@ static void enter_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_
     own->vehicle = vehicle;
     own->n = own->pieces = 0;
     if (going) {
-        own->alone = lone_of(going, vehicle);
+        own->single = single_of(going, vehicle);
     } else {
-        lone_begin(own->alone, given, vehicle);
+        single_begin(own->single, given, vehicle);
     }
     for (int k = 0; k < N_VARIABLES; k++) {
-        LANE(b->at[k], i) = own->alone->at[k];
+        LANE(b->at[k], i) = own->single->at[k];
     }
-    LANE(b->heading, i) = own->alone->heading;
+    LANE(b->heading, i) = own->single->heading;
 }
 
-/* Let the vehicle that is stepped alone be where the lane is. */
-static lone *follow_lane(block *b, int i)
+/* Let the vehicle of its single steps be where the lane is. */
+static single *follow_lane(block *b, int i)
 {
-    lone *const alone = b->lanes[i].alone;
+    single *const one = b->lanes[i].single;
     for (int k = 0; k < FIRST_CALCULATED; k++) {
-        alone->at[k] = LANE(b->at[k], i);
+        one->at[k] = LANE(b->at[k], i);
     }
-    alone->heading = LANE(b->heading, i);
-    return alone;
+    one->heading = LANE(b->heading, i);
+    return one;
 }
 
-/* Step the vehicle of a lane alone. Return false when its motion cannot be computed. */
-static bool step_alone(block *b, int i, double t, double h)
+/* Step the vehicle of a lane singly. Return false when its motion cannot be computed. */
+static bool step_single(block *b, int i, double t, double h)
 {
-    lone *const alone = follow_lane(b, i);
-    if (!lone_step(alone, t, h)) {
+    single *const one = follow_lane(b, i);
+    if (!single_step(one, t, h)) {
         return false;
     }
     for (int k = FIRST_STATE; k < FIRST_COEFFICIENT; k++) {
-        LANE(b->at[k], i) = alone->at[k];
+        LANE(b->at[k], i) = one->at[k];
     }
-    LANE(b->heading, i) = alone->heading;
+    LANE(b->heading, i) = one->heading;
     return true;
 }
 
 /* Return true when commands of a lane wait for the dead time. */
 static bool waits_in_lane(block *b, int i)
 {
-    lone *const alone = b->lanes[i].alone;
+    single *const one = b->lanes[i].single;
     for (int k = 0; HAS_DEAD_TIME && k < N_COMMANDS; k++) {
-        alone->at[k] = LANE(b->at[k], i);
+        one->at[k] = LANE(b->at[k], i);
     }
-    return HAS_DEAD_TIME && lone_waits(alone);
+    return HAS_DEAD_TIME && single_waits(one);
 }
 
 /* Begin steps of length h in some of the lanes whose steps have `started`. */
@@ -112,9 +112,9 @@ static mask end_steps(block *b, mask ends)
     return ends;
 }
 
-/* Take a piece in all lanes whose steps have `started`. Return true for those whose steps end with it. *alone becomes true for those
- * whose steps must be taken alone. */
-static mask take_piece(block *b, mask started, mask *alone)
+/* Take a piece in all lanes whose steps have `started`. Return true for those whose steps end with it. *left becomes true for those
+ * whose steps must be taken singly. */
+static mask take_piece(block *b, mask started, mask *left)
 {
     motion *const m = &b->m;
     real change[N_SERIES], length = 1.0, reach = 1.0;
@@ -139,7 +139,7 @@ static mask take_piece(block *b, mask started, mask *alone)
                 scale[k] = LANE(m->scale[k], i);
             }
             LANE(reach, i) = LANE(whole, i) ? 1.0 : 0.0;
-            LANE(length, i) = lone_length(c, scale, s.order, &LANE(reach, i), &reversed[i]);
+            LANE(length, i) = single_length(c, scale, s.order, &LANE(reach, i), &reversed[i]);
             LANE(under_way, i) = LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
         }
     }
@@ -150,7 +150,7 @@ static mask take_piece(block *b, mask started, mask *alone)
         }
     }
     const mask done = end_steps(b, ends);
-    *alone |= (started & ~under_way) | (ends & ~done);
+    *left |= (started & ~under_way) | (ends & ~done);
     return done;
 }
 
@@ -161,17 +161,17 @@ int simulate_in_lanes(SIMULATION, void *going)
     ptrdiff_t waiting = first;
     int busy;
     block b;
-    void *const memory = going ? NULL : calloc(LANES, lone_size());
+    void *const memory = going ? NULL : calloc(LANES, single_size());
     if (!going && !memory) {
         return 0;
     }
     memset(&b, 0, sizeof b);
     for (int i = 0; i < LANES; i++) {
         b.lanes[i].vehicle = -1;
-        b.lanes[i].alone = going ? NULL : lone_of(memory, i);
+        b.lanes[i].single = going ? NULL : single_of(memory, i);
     }
     do {
-        mask started = NO, begins = NO, alone = NO, ends = NO;
+        mask started = NO, begins = NO, left = NO, ends = NO;
         real h = 0.0;
         const ptrdiff_t before = waiting;
         busy = 0;
@@ -193,8 +193,8 @@ int simulate_in_lanes(SIMULATION, void *going)
                 }
                 if (own->n + 1 < times) {
                     LANE(h, i) = length[own->n];
-                    LANE(alone, i) = waits_in_lane(&b, i) ? YES : NO;
-                    LANE(begins, i) = ~LANE(alone, i);
+                    LANE(left, i) = waits_in_lane(&b, i) ? YES : NO;
+                    LANE(begins, i) = ~LANE(left, i);
                 }
             }
             LANE(started, i) = own->pieces > 0 ? YES : LANE(begins, i);
@@ -222,7 +222,7 @@ int simulate_in_lanes(SIMULATION, void *going)
             }
         }
         if (ANY(started)) {
-            ends = take_piece(&b, started, &alone);
+            ends = take_piece(&b, started, &left);
         }
         for (int i = 0; i < LANES; i++) {
             lane *const own = &b.lanes[i];
@@ -230,11 +230,11 @@ int simulate_in_lanes(SIMULATION, void *going)
                 continue;
             }
             own->pieces++;
-            if (LANE(alone, i) && !step_alone(&b, i, time[own->n], length[own->n])) {
+            if (LANE(left, i) && !step_single(&b, i, time[own->n], length[own->n])) {
                 failed[own->vehicle] = own->n + 1;
                 own->vehicle = -1;
             }
-            if (LANE(alone, i) | LANE(ends, i)) {
+            if (LANE(left, i) | LANE(ends, i)) {
                 own->n++;
                 own->pieces = 0;
             }

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.bridges.sdf import written
 from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, effects_of
-from rov_fmu.equation.layout import Curve
+from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
 

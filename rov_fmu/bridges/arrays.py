@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.equation.expression import ARRAYS, Expression, Name, array_functions, compiled
-from rov_fmu.equation.layout import Layout, ThrustTable
-from rov_fmu.equation.step import cubic
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import ThrustTable
+from rov_fmu.equation.python.step import cubic
 from rov_fmu.equation.terms import Equation, equation_of
 from rov_fmu.io.messages import InputError, did_you_mean
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -110,7 +110,7 @@ def _thrust(layout: Layout, library: _Library) -> _Compiled:
     """Compile the formulas from the coefficients and the inputs to the forces."""
     equation, interval = equation_of(layout), library.functions["interval"]
     tables = {name: _table_force(table, interval) for name, table in equation.tables.items()}
-    delayed = {delayed_name(name): Name(name) for name in layout.commands} if layout.has_dead_time else {}
+    delayed = {later: Name(name) for name, later in layout.acting.items()}
     return compiled({**delayed, **equation.thrust}, {**library.functions, **tables}, ARRAYS)
 
 

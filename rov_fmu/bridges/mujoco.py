@@ -1,7 +1,7 @@
 """Write a vehicle as a folder for MuJoCo, which is a Python package: the model (MJCF) and what adds the water to it.
 
-The package needs only MuJoCo and NumPy. It contains `mujoco_plugin.py` and `equation/step.py` as they are, and the
-equation of the vehicle, which `equation/printed.py` prints.
+The package needs only MuJoCo and NumPy. It contains `mujoco_plugin.py` and `step.py` as they are, and the
+equation of the vehicle, which `equation/python/printed.py` prints.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,10 +13,10 @@ import numpy as np
 
 from rov_fmu.bridges import sdf
 from rov_fmu.bridges.mcap import hull_size
-from rov_fmu.equation import step
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.layout import Thruster
-from rov_fmu.equation.printed import printed_accelerations
+from rov_fmu.equation.parts import Thruster
+from rov_fmu.equation.python import step
+from rov_fmu.equation.python.printed import printed_accelerations
 from rov_fmu.io.messages import listed
 from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -88,8 +88,8 @@ def mujoco_files(
         "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
         "__init__.py": _PACKAGE,
         "__main__.py": _MAIN.format(package=package),
-        "plugin.py": _PLUGIN.read_text(encoding="utf-8").replace("from rov_fmu.equation.step", "from .step"),
-        "step.py": Path(step.__file__).read_text(encoding="utf-8"),
+        "plugin.py": _PLUGIN.read_text(encoding="utf-8").replace("from rov_fmu.equation.python.step", "from .step"),
+        **{name: Path(step.__file__).with_name(name).read_text(encoding="utf-8") for name in ("step.py", "dop853.py")},
         "equation.py": equation_module(vehicle),
     }
     rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
@@ -108,7 +108,7 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
 
     files = mujoco_files(vehicle, "rov", {}, {})
     equation = ModuleType("equation")
-    exec(compile(equation_module(vehicle, "rov_fmu.equation.step"), "<equation>", "exec"), equation.__dict__)
+    exec(compile(equation_module(vehicle, "rov_fmu.equation.python.step"), "<equation>", "exec"), equation.__dict__)
     model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
     return Rov(equation, model, None, "", **coefficients)
 
@@ -121,7 +121,7 @@ def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
         "COEFFICIENTS": {name: vehicle[name] for name in layout.coefficients},
         "COMMANDS": {name: layout.usual_inputs[name] for name in layout.commands},
         "INPUTS": {name: x for name, x in layout.usual_inputs.items() if name not in layout.commands},
-        "DELAYED": dict(zip(layout.commands, layout.delayed, strict=False)),
+        "DELAYED": layout.acting,
         "LAGGING": [*layout.lagging],
         "FORCES": [f"F_{thruster.name}" for thruster in layout.thrusters],
         "EXAMPLE": layout.example(layout.axes[0].axis),
@@ -142,7 +142,7 @@ def _notes(vehicle: Vehicle) -> list[str]:
     """Return what is different in MuJoCo, without full stops."""
     layout = vehicle.layout
     notes = ["Steps of `implicit` or `Euler` are taken; `RK4` is not", "The water has no surface"]
-    if lacking := [name for name in AXES if name not in layout.kinds]:
+    if lacking := [name for name in AXES if name not in layout.by_name]:
         notes.append(
             f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "
             "times its mass"

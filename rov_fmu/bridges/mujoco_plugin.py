@@ -24,7 +24,7 @@ if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.k
 import mujoco
 import numpy as np
 
-from rov_fmu.equation.step import DelayLine
+from rov_fmu.equation.python.step import DelayLine
 
 _FLIP = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """The signs of the components in MuJoCo's frames, relative to those in the equation's."""

@@ -33,7 +33,7 @@ from rov_fmu.equation.forces import (
     WEIGHT,
     effects_of,
 )
-from rov_fmu.equation.layout import FAINT, Thruster, VehicleAxis
+from rov_fmu.equation.parts import FAINT, Thruster, VehicleAxis
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -407,7 +407,7 @@ def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit
                 yield "the constant load F_0_w is in the buoyancy"
             else:
                 yield f"left out: the constant load {part.coefficient('F_0')}"
-    if missing := [name for name in AXES if name not in layout.kinds]:
+    if missing := [name for name in AXES if name not in layout.by_name]:
         yield f"the vehicle file has no {', '.join(missing)}: damping holds it there, in rotation with a large inertia"
     if not layout.has_attitude:
         yield "thrusters stand where their force has no moment in roll and pitch"

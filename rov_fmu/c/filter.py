@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import FILTER_FILE, FILTER_LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import places_of
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.equation.layout import Layout
@@ -175,7 +174,7 @@ class Filter:
         self._libraries: dict[Path, tuple[Callable[..., None], list[int]]] = {}
         self.states, axes, sensors, self.variables, self.inputs, *_ = self._library(FILTER_FILE)[1]
         assert (axes, sensors) == (len(layout.axes), MOST_SENSORS)
-        self._places = places_of(layout)
+        self._places = layout.places
         self._records: dict[tuple[Record, tuple[bool, ...]], tuple[_Record, list[object]]] = {}
         self._where = np.array(_where(layout, self._places), np.intc)
         self.vehicle_states = [*layout.state]
@@ -366,5 +365,5 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
         *of(_CURRENT, layout.inputs),
         *of(DRIFTS, layout.state),
         *of([QUATERNION[0], "psi"], layout.state),
-        *of([layout.kinds[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
+        *of([layout.by_name[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
     ]

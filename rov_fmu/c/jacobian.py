@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.io.messages import InputError, did_you_mean, listed
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -56,6 +55,9 @@ def step_jacobian(
 ) -> StepJacobian:
     """Return the states after h > 0 seconds with the inputs held, and their derivatives.
 
+        found = step_jacobian(rov, inputs, state, 0.1, ["a_d_u"])
+        found.states[0, 0], found.coefficients[0, 0]  # d u / d u before the step; d u / d a_d_u, (m/s) / (N.s2/m2)
+
     The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
     names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
     a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
@@ -81,7 +83,7 @@ def step_jacobian(
     def after(rows: Array) -> Array:
         """Return the states after a step with the numbers `free` in each row (states x rows)."""
         given = dict(zip(free, rows.T[:, :, np.newaxis], strict=True))
-        given |= {delayed_name(name): given[name] for name in layout.commands if layout.has_dead_time}
+        given |= {later: given[name] for name, later in layout.acting.items()}
         return simulate(vehicle, [0.0, h], given, vehicles=len(rows), workers=1).values[:, :, 1]
 
     present = after(at[np.newaxis])

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from rov_fmu.c.compile import LANES_FILE
 from rov_fmu.c.library import load_library
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.step import MOST_WAITING
+from rov_fmu.equation.python.step import MOST_WAITING
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -45,12 +45,6 @@ class Trajectories:
     """For each vehicle, the index of the first time that cannot be computed, or the number of times."""
 
 
-def places_of(layout: Layout) -> dict[str, int]:
-    """Return the index of each variable in the arrays of the C code, with the rates der(x)."""
-    places = layout.places
-    return places | {f"der({name})": places[name] + len(layout.state) for name in layout.state}
-
-
 def tables_of(
     vehicle: Vehicle, values: Mapping[str, Any], shape: tuple[int, int]
 ) -> tuple[NDArray[np.void], list[Array]]:
@@ -59,7 +53,7 @@ def tables_of(
     `values` broadcast to vehicles x times, the shape. Others are the usual ones, as `simulate` says.
     """
     layout = vehicle.layout
-    places = places_of(layout)
+    places = layout.places
     numbers = np.zeros(len(places))
     tables = np.zeros(len(places), TABLE)
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
@@ -93,6 +87,12 @@ def simulate(
 ) -> Trajectories:
     """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
 
+    A hundred vehicles with other masses, at 30 % ahead, over ten seconds:
+
+        values = {"u_l": 0.3, "u_r": 0.3, "m_rov": np.linspace(6.0, 7.0, 100)[:, None]}  # vehicles x 1, kg
+        result = simulate(vehicle, np.linspace(0.0, 10.0, 101), values, ["u"], vehicles=100)
+        result.values[0, :, -1]  # u of each vehicle at 10 s, m/s
+
     `values` contains inputs, states at the first time, and coefficients by name. Each broadcasts to vehicles x times.
     Inputs that are not given have their usual values (`Layout.usual_inputs`): no command, load or current, and the
     usual voltage. States that are not given are 0, and coefficients that are not given are those of the vehicle.
@@ -113,7 +113,7 @@ def simulate(
     times = np.require(time, np.float64, ["C", "A"])
     lengths = np.diff(times)
     tables, _alive = tables_of(vehicle, values, (vehicles, len(times)))
-    places = places_of(vehicle.layout)
+    places = vehicle.layout.places
     recorded = np.array([places[name] for name in record], np.intc)
     result = np.empty((len(record), vehicles, len(times)))
     failed = np.empty(vehicles, np.intp)

@@ -10,9 +10,9 @@ from rov_fmu.equation.alone import response_formulas
 from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.expression import (
     PYTHON,
+    ZERO,
     Expression,
     Name,
-    Number,
     change_of,
     tangent,
     tangents,
@@ -77,7 +77,7 @@ class EquationSource:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
         local = {name: formula for name, formula in starts.items() if name not in states}
-        first = {name: starts.get(name, Number(0.0)) for name in states}
+        first = {name: starts.get(name, ZERO) for name in states}
         return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
 
     def lagging_curves(self) -> list[tuple[str, list[str]]]:
@@ -217,9 +217,9 @@ class EquationSource:
         return sum(1 << other for other in {self.component_of[name] for name in self._inputs(group)})
 
     def needed_with(self, group: Sequence[str]) -> int:
-        """Return one bit for each state by which a component is multiplied in other rows.
+        """Return the bit mask of the states that multiply a component in other rows; all ones mean "never skip".
 
-        While all these states are 0, the component acts on nothing. All bits are set when it may always act.
+        A component may be skipped while every such state is 0, as the heading of a vehicle that stands still.
         """
         always, partners = 2**64 - 1, 0
         needed = {*self.equation.monitored, *(self.equation.orientation if self.layout.has_attitude else ())}
@@ -274,8 +274,7 @@ class EquationSource:
         calculated = [name for name in self.layout.calculated if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
-            change = tangent(self.equation.rates[name], changes.get)
-            results[f"d[REF_{name} + N_STATES]"] = change or Number(0.0)
+            results[f"d[REF_{name} + N_STATES]"] = tangent(self.equation.rates[name], changes)
         return _assigned(steps, results, _with_changes(given))
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE
 from rov_fmu.c.library import load_library
-from rov_fmu.c.simulation import on_cores, places_of, pointer, reasons, tables_of
+from rov_fmu.c.simulation import on_cores, pointer, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -28,18 +28,18 @@ class _Memory:
     def __init__(self, vehicle: Vehicle, count: int, file: Path) -> None:
         self.vehicle, self._file = vehicle, file
         library = load_library(vehicle, file)
-        library.lone_size.restype = ctypes.c_size_t
-        self._memory = np.zeros((count, library.lone_size() // 8))
+        library.single_size.restype = ctypes.c_size_t
+        self._memory = np.zeros((count, library.single_size() // 8))
         self._connect()
 
     def _connect(self) -> None:
         """Find the functions of the library, and the variables of each vehicle at the beginning of its memory."""
         layout, library = self.vehicle.layout, load_library(self.vehicle, self._file)
-        library.lone_step.restype = ctypes.c_bool
+        library.single_step.restype = ctypes.c_bool
         inputs, states = len(layout.inputs), len(layout.state)
         begin, width = self._memory.ctypes.data, self._memory.strides[0]
         self._c = library, [ctypes.c_void_p(begin + n * width) for n in range(len(self._memory))]
-        self._variables = self._memory[:, : len(places_of(layout))]
+        self._variables = self._memory[:, : len(layout.places)]
         self.inputs = self._memory[:, :inputs]
         """The inputs (vehicles x inputs), which are held until they are set."""
         self.states = self._memory[:, inputs : inputs + states]
@@ -58,7 +58,7 @@ class _Memory:
         library, addresses = self._c
         tables, _alive = tables_of(self.vehicle, values, (len(which), 1))
         for n, vehicle in enumerate(which):
-            library.lone_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
+            library.single_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
 
 
 class Stepper(_Memory):
@@ -70,7 +70,7 @@ class Stepper(_Memory):
         Others have their usual values. `record` names the variables that each step returns. The arguments are not
         checked. Raises BuildError when the engine cannot be compiled.
         """
-        places = places_of(vehicle.layout)
+        places = vehicle.layout.places
         self._recorded = np.array([places[name] for name in record], int)
         self.time = 0.0
         """The time, s."""
@@ -85,7 +85,7 @@ class Stepper(_Memory):
         """
         library, (address,) = self._c
         self.inputs[0, : len(inputs)] = inputs
-        done = library.lone_step(address, ctypes.c_double(self.time), ctypes.c_double(h))
+        done = library.single_step(address, ctypes.c_double(self.time), ctypes.c_double(h))
         results = self.recorded()
         if not done or not all(map(isfinite, results)):
             reason = reasons(self.vehicle.layout, h)
@@ -96,7 +96,7 @@ class Stepper(_Memory):
     def recorded(self) -> list[float]:
         """Return the recorded variables now."""
         library, (address,) = self._c
-        library.lone_calculate(address)
+        library.single_calculate(address)
         results: list[float] = self._variables[0].take(self._recorded).tolist()
         return results
 

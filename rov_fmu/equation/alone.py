@@ -23,10 +23,8 @@ from .expression import (
     compiled,
     directed,
     equal,
-    minus,
     product,
     replaced,
-    scaled,
     total,
     where,
 )
@@ -71,7 +69,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
     if not layout.by_velocity[velocity].axis.is_rotation:
         constant.append((entry(3, 3),))
-    loads = [scaled(force.sign, product(*force.coefficient)) for force in forces if force.factors in constant]
+    loads = [force.sign * product(*force.coefficient) for force in forces if force.factors in constant]
     formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
     steady = {force: Name(name) for own in equation.lags.values() for force, name in own.items()}
     torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
@@ -86,8 +84,8 @@ def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:
         if power not in POWERS:
             raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
         ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
-        parts[POWERS[power]].append(minus(ahead))
-        parts[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else minus(astern))
+        parts[POWERS[power]].append(-ahead)
+        parts[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else -astern)
     return {key: total(own) for key, own in parts.items()}
 
 

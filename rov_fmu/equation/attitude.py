@@ -4,7 +4,7 @@ The state of the vehicle is a quaternion (eta, epsilon_1, epsilon_2, epsilon_3),
 contains the rotation matrix R from the body frame to the earth frame instead: R' = R S(omega) is a sum of products.
 """
 
-from .expression import Expression, Name, call, directed, scaled, total, where
+from .expression import Expression, Name, call, directed, total, where
 
 Formulas = dict[str, Expression]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
@@ -67,7 +67,8 @@ def start_formulas() -> Formulas:
 def start_angle_formulas() -> Formulas:
     """Return formulas from the Euler angles at the start to the rotation matrix and to theta.
 
-    The formulas by way of the quaternion give the same numbers, but their names do not tell which angle matters.
+    Used only to find dependencies: written in the Euler angles, R_31 shows that it does not depend on psi_0. Through
+    the quaternion it would seem to depend on all three.
     """
     (cp, ct, cs), (sp, st, ss) = ([call(function, Name(angle)) for angle in INITIAL] for function in ("cos", "sin"))
     return {
@@ -95,8 +96,8 @@ def quaternion_rates(velocities: frozenset[str]) -> Formulas:
     }
     rates = {}
     for name, terms in products.items():
-        parts = [scaled(sign, Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
-        rates[name] = 0.5 * total(parts) if parts else total(())
+        parts = [sign * (Name(factor) * Name(rate)) for sign, factor, rate in terms if rate in velocities]
+        rates[name] = 0.5 * total(parts)
     return rates
 
 

@@ -166,6 +166,11 @@ def cross_declaration(key: str, *velocities: str) -> "Declaration":
     )
 
 
+def rate_name(state: str) -> str:
+    """Return the name of the time derivative of a state."""
+    return f"der({state})"
+
+
 def delayed_name(command: str) -> str:
     """Return the name of a command that acts after the dead time."""
     return f"delayed_{command}"

@@ -8,7 +8,8 @@ remain in a derivative give the kind: without any name, the factor is constant.
 from collections.abc import Mapping
 
 from .attitude import QUATERNION, start_angle_formulas, start_formulas
-from .expression import Expression, change_of, tangent
+from .catalogue import rate_name
+from .expression import ZERO, Expression, change_of, tangent
 from .layout import Layout
 from .terms import equation_of
 
@@ -30,8 +31,7 @@ def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
         kind_of_slope = {known: 0}  # the derivative of the known itself is 1
         for name, formula in formulas.items():
             changing = {other: change_of(other) for other in formula.names if other in kind_of_slope}
-            slope = tangent(formula, changing.get) if changing else None
-            if slope is not None:
+            if (slope := tangent(formula, changing)) != ZERO:
                 inner = kinds | {change.identifier: kind_of_slope[other] for other, change in changing.items()}
                 kind_of_slope[name] = slopes[name][known] = max(inner[word] for word in slope.names)
     return {name: {known: KINDS[kind] for known, kind in slopes[name].items()} for name in _calculated(layout)}
@@ -54,13 +54,13 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
 
 
 def _calculated(layout: Layout) -> tuple[str, ...]:
-    return (*(f"der({name})" for name in layout.state), *layout.calculated)
+    return (*map(rate_name, layout.state), *layout.calculated)
 
 
 def _formulas(layout: Layout) -> dict[str, Expression]:
     """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
-    return equation.program | {f"der({name})": equation.rates[name] for name in layout.state} | dict(equation.outputs)
+    return equation.program | {rate_name(name): equation.rates[name] for name in layout.state} | dict(equation.outputs)
 
 
 def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:

@@ -1,4 +1,4 @@
-"""Expressions as values: built with operators, printed as C, Python, text or MathML, differentiated, and evaluated.
+"""Expressions as values: built with operators, printed as C or Python, evaluated, and differentiated.
 
 An expression is a number, a name, or an operation on expressions. Formulas are written as one writes them in Python:
 
@@ -10,27 +10,31 @@ Printing changes neither the order nor the association of operations, so C and P
 """
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property, reduce
-from itertools import groupby
-from operator import mul
+from operator import add, mul
 from types import MappingProxyType
-from typing import Any, NamedTuple, TypeAlias
+from typing import Any, TypeAlias
 
 Real: TypeAlias = "Expression | float"
 
 
-def _operator(op: str) -> "Callable[[Expression, Real], Operation]":
-    return lambda self, other: Operation(op, (self, of(other)))
+def _operator(op: str) -> "Callable[[Expression, Real], Expression]":
+    return lambda self, other: _folded(op, self, of(other))
 
 
-def _from_right(op: str) -> "Callable[[Expression, Real], Operation]":
-    return lambda self, other: Operation(op, (of(other), self))
+def _from_right(op: str) -> "Callable[[Expression, Real], Expression]":
+    return lambda self, other: _folded(op, of(other), self)
 
 
 class Expression:
-    """A number, a name or an operation. Two expressions are equal if they are built alike."""
+    """A number, a name or an operation. Two expressions are equal if they are built alike.
+
+    Operators leave out what 0, 1 and -1 do not change: 0 + x and 1 * x are x, 0 * x is 0, and -1 * x is -x. A sign
+    stands before the first factor of a product, and x + -a * b becomes x - a * b. None of this changes a bit of a
+    value, except for the sign of a zero. A number becomes the first factor of a product, 2 * (a * b) = (2 * a) * b.
+    """
 
     __add__, __radd__ = _operator("+"), _from_right("+")
     __sub__, __rsub__ = _operator("-"), _from_right("-")
@@ -38,8 +42,8 @@ class Expression:
     __truediv__, __rtruediv__ = _operator("/"), _from_right("/")
     __lt__, __gt__, __ge__ = _operator("<"), _operator(">"), _operator(">=")
 
-    def __neg__(self) -> "Operation":
-        return Operation("neg", (self,))
+    def __neg__(self) -> "Expression":
+        return _negative(self)
 
     @cached_property
     def names(self) -> frozenset[str]:
@@ -80,6 +84,53 @@ class Operation(Expression):
     @cached_property
     def names(self) -> frozenset[str]:
         return frozenset().union(*(arg.names for arg in self.args))
+
+
+ZERO = Number(0.0)
+
+
+def _number(x: Expression) -> float | None:
+    """Return the value of a number, or None for other expressions."""
+    if isinstance(x, Operation) and x.op == "neg":
+        inner = _number(x.args[0])
+        return None if inner is None else -inner
+    return x.value if isinstance(x, Number) else None
+
+
+def _folded(op: str, a: Expression, b: Expression) -> Expression:  # noqa: PLR0911 - a case for each rule
+    match op, _number(a), _number(b):
+        case ("*" | "/", 0.0, _) | ("*", _, 0.0):
+            return ZERO
+        case ("+", 0.0, _) | ("*", 1.0, _):
+            return b
+        case ("+" | "-", _, 0.0) | ("*" | "/", _, 1.0):
+            return a
+        case ("-", 0.0, _) | ("*", -1.0, _):
+            return -b
+        case ("*", _, -1.0):
+            return -a
+        case ("+" | "-", _, _) if _is_negative(b):
+            return a - -b if op == "+" else a + -b
+        case ("*", float(), _) if isinstance(b, Operation) and b.op == "*":
+            return a * b.args[0] * b.args[1]
+    return Operation(op, (a, b))
+
+
+def _negative(x: Expression) -> Expression:
+    match x:
+        case Number(0.0):
+            return x
+        case Operation("neg", (inner,)):
+            return inner
+        case Operation("*" | "/" as op, (first, other)):
+            return Operation(op, (-first, other))
+    return Operation("neg", (x,))
+
+
+def _is_negative(x: Expression) -> bool:
+    while isinstance(x, Operation) and x.op in ("*", "/"):
+        x = x.args[0]
+    return isinstance(x, Operation) and x.op == "neg"
 
 
 class Names:
@@ -131,9 +182,15 @@ def call(function: str, *arguments: Real) -> Operation:
     return Operation(function, tuple(map(of, arguments)))
 
 
-def where(test: Expression, then: Real, otherwise: Real) -> Operation:
+def where(test: Expression, then: Real, otherwise: Real) -> Expression:
     """Return a choice. Its derivative is that of the branch that is taken."""
-    return Operation("if", (test, of(then), of(otherwise)))
+    return _chosen("if", test, then, otherwise)
+
+
+def _chosen(op: str, by: Expression, one: Real, other: Real) -> Expression:
+    """Return a choice, or what both branches have in common."""
+    branches = of(one), of(other)
+    return branches[0] if branches[0] == branches[1] else Operation(op, (by, *branches))
 
 
 def equal(a: Real, b: Real) -> Operation:
@@ -148,53 +205,27 @@ def saturated(x: Expression) -> Operation:
 
 def directed(subject: Expression, forward: Real, reverse: Real) -> Expression:
     """Return the value for a subject that is not negative, or the other one for a negative subject."""
-    one, other = of(forward), of(reverse)
-    return one if one == other else Operation("directed", (subject, one, other))
+    return _chosen("directed", subject, forward, reverse)
 
 
 def beyond_dead_band(beyond: Expression, dead_band: Expression, force: Expression) -> Operation:
-    """Return a force where the command is beyond a dead band, whose width may be 0, and 0 within it."""
+    """Return 0 for |c| < c_0, and otherwise the force. `beyond` is |c| - c_0. The width c_0 may be 0."""
     return Operation("dead band", (beyond, dead_band, force))
 
 
 def product(*factors: Real) -> Expression:
     """Return a product, from left to right. No factors give 1."""
-    first, *others = map(of, factors or (1.0,))
-    return reduce(mul, others, first)
+    return reduce(mul, map(of, factors), Number(1.0))
 
 
 def total(parts: Iterable[Expression]) -> Expression:
-    """Return a sum, from left to right. A part that begins with a minus is subtracted. No parts give 0."""
-    first, *others = [*parts] or [Number(0.0)]
-    return reduce(lambda sum_, part: sum_ - minus(part) if _is_negative(part) else sum_ + part, others, first)
+    """Return a sum, from left to right. No parts give 0."""
+    return reduce(add, parts, Number(0.0))
 
 
-def minus(x: Expression) -> Expression:
-    """Return a product with the other sign before its first factor: minus(a * b) is (-a) * b."""
-    match x:
-        case Operation("*" | "/" as op, (first, other)):
-            return Operation(op, (minus(first), other))
-        case Operation("neg", (inner,)):
-            return inner
-    return -x
-
-
-def _is_negative(x: Expression) -> bool:
-    while isinstance(x, Operation) and x.op in ("*", "/"):
-        x = x.args[0]
-    return isinstance(x, Operation) and x.op == "neg"
-
-
-def scaled(weight: float, x: Expression) -> Expression:
-    """Return a product with a weight before its first factor, or only with its sign if the weight is 1 or -1."""
-    if weight < 0.0:
-        return minus(scaled(-weight, x))
-    if weight == 1.0:
-        return x
-    match x:
-        case Operation("*", (first, other)):
-            return scaled(weight, first) * other
-    return weight * x
+def with_positive_zero(x: Expression) -> Operation:
+    """Return x + 0, which makes 0.0 of -0.0. The operator + would leave it out."""
+    return Operation("+", (x, Number(0.0)))
 
 
 def replaced(x: Expression, formulas: Mapping[str, Expression]) -> Expression:
@@ -225,8 +256,8 @@ def plain(x: Expression) -> Expression:
 FUNCTIONS = ("sin", "cos", "abs", "sqrt", "hypot", "pow", "log", "atan2", "atanh")
 """The functions of expressions besides the thrust tables."""
 Ranks: TypeAlias = Mapping[str, tuple[int, tuple[int, ...]]]
-_CALL = 9
-_RANKS: Ranks = {
+CALL = 9
+RANKS: Ranks = {
     **dict.fromkeys(("<", ">", ">=", "=="), (3, (4, 4))),
     **dict.fromkeys("+-", (4, (4, 5))),
     **dict.fromkeys("*/", (5, (5, 6))),
@@ -241,10 +272,10 @@ class Language:
 
     forms: Mapping[str, str]
     """The texts of operations, with {} or {0}, {1} ... for their operands."""
-    ranks: Ranks = field(default_factory=lambda: {**_RANKS, **_CHOICES})
+    ranks: Ranks = field(default_factory=lambda: {**RANKS, **_CHOICES})
     """How strongly operations bind, and how strongly an operand must bind to stand without brackets.
 
-    An operation that is not among them is a call, which binds with _CALL and whose operands need no brackets."""
+    An operation that is not among them is a call, which binds with CALL and whose operands need no brackets."""
     number: Callable[[float], str] = repr
     bracket: str = "({})"
     is_code: bool = True
@@ -256,52 +287,8 @@ C = Language(
     number=lambda value: "INFINITY" if value == math.inf else repr(value),
 )
 PYTHON = Language({"neg": "-{}", "if": "{1} if {0} else {2}"})
-ARRAYS = Language({"neg": "-{}", "if": "where({}, {}, {})", "and": "both({}, {})", "or": "either({}, {})"}, _RANKS)
+ARRAYS = Language({"neg": "-{}", "if": "where({}, {}, {})", "and": "both({}, {})", "or": "either({}, {})"}, RANKS)
 """Python for arrays and symbols, which have no single truth value."""
-_READERS: Ranks = {
-    **_RANKS,
-    "neg": (5, (5,)),
-    "dead band": (0, (0, 0, 0)),
-    **dict.fromkeys(("sin", "cos", "log"), (_CALL, (6,))),
-    **dict.fromkeys(("square", "cube", "rate"), (_CALL, (_CALL,))),
-    "pow": (_CALL, (_CALL, _CALL)),
-}
-TEXT = Language(
-    {
-        **{"+": "{} + {}", "-": "{} − {}", "*": "{} {}", "/": "{} / {}", "neg": "−{}"},
-        **{"square": "{}²", "cube": "{}³", "pow": "{}^{}", "abs": "|{}|", "sqrt": "√({})", "atan2": "atan2({}, {})"},
-        **{name: f"{name} {{}}" for name in ("sin", "cos", "log")},
-        **{"sgn": "sgn({})", "rate": "{}'", "directed": "{}±", "dead band": "{2} where {0} > 0, else 0"},
-    },
-    _READERS,
-    "{:.4g}".format,
-    is_code=False,
-)
-"""Plain text for readers, of what `collected` returns. A coefficient that depends on a direction has a ±."""
-_BRACKET = '<mrow><mo stretchy="false">(</mo>{}<mo stretchy="false">)</mo></mrow>'
-_CELL = '<mtd style="text-align: left">'
-MATHML = Language(
-    {
-        **{"+": "{}<mo>+</mo>{}", "-": "{}<mo>−</mo>{}", "neg": '<mo form="prefix">−</mo>{}'},
-        "*": '{}<mspace width=".1em"/>{}',
-        "/": "<mfrac><mrow>{}</mrow><mrow>{}</mrow></mfrac>",
-        **{"square": "<msup>{}<mn>2</mn></msup>", "cube": "<msup>{}<mn>3</mn></msup>", "pow": "<msup>{}{}</msup>"},
-        "abs": '<mrow><mo stretchy="false">|</mo>{}<mo stretchy="false">|</mo></mrow>',
-        **{"sqrt": "<msqrt>{}</msqrt>", "atan2": f"<mi>atan2</mi>{_BRACKET.format('{}<mo>,</mo>{}')}"},
-        **{
-            name: f'<mspace width=".07em"/><mi>{name}</mi><mspace width=".17em"/>{{}}' for name in ("sin", "cos", "log")
-        },
-        **{"sgn": f"<mi>sgn</mi>{_BRACKET}", "rate": "<mover>{}<mo>˙</mo></mover>", "directed": "{}±"},
-        "dead band": "<mrow><mo>{{</mo><mtable>"
-        f"<mtr>{_CELL}{{2}}</mtd>{_CELL}<mtext>for\xa0</mtext>{{0}}<mo>&gt;</mo><mn>0</mn></mtd></mtr>"
-        f"<mtr>{_CELL}<mn>0</mn></mtd>{_CELL}<mtext>otherwise</mtext></mtd></mtr></mtable></mrow>",
-    },
-    {**_READERS, "/": (8, (0, 0)), "dead band": (_CALL, (0, 0, 0))},
-    "<mn>{:.4g}</mn>".format,
-    _BRACKET,
-    is_code=False,
-)
-"""The same as MathML, in which the bar of a fraction and the brace of a choice replace brackets."""
 
 
 def to_c(x: Expression, name_in_c: Callable[[str], str] = str) -> str:
@@ -326,7 +313,7 @@ def written(
     shown = x if isinstance(x, Operation) and x.op in language.forms else plain(x)
     assert isinstance(shown, Operation)
     form = _form(shown, language)
-    rank, operands = language.ranks.get(shown.op, (_CALL, (0,) * len(shown.args)))
+    rank, operands = language.ranks.get(shown.op, (CALL, (0,) * len(shown.args)))
     parts = [written(arg, language, name_of, need) for arg, need in zip(shown.args, operands, strict=True)]
     text = form.format(*parts)
     return text if rank >= least else language.bracket.format(text)
@@ -337,99 +324,6 @@ def _form(x: Operation, language: Language) -> str:
         raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
     usual = f"{{}} {x.op} {{}}" if x.op in language.ranks else f"{x.op}({', '.join('{}' for _ in x.args)})"
     return language.forms.get(x.op, usual)
-
-
-# ---- Sums of products for readers ------------------------------------------------------------------------------------
-
-
-class _Product(NamedTuple):
-    """A sign, the factors above the fraction bar, and those below it. A factor is not a product itself."""
-
-    sign: int = 1
-    above: tuple[Expression, ...] = ()
-    below: tuple[Expression, ...] = ()
-
-    def times(self, other: "_Product") -> "_Product":
-        """Return the product of both, with numbers first."""
-        above = sorted((*self.above, *other.above), key=lambda factor: not isinstance(factor, Number))
-        return _Product(self.sign * other.sign, tuple(above), (*self.below, *other.below))
-
-    def formula(self, factors: Callable[[Iterable[Expression]], Iterable[Expression]] = iter) -> Expression:
-        """Return the product as an expression. `factors` changes its factors."""
-        above, below = product(*factors(self.above)), product(*factors(self.below))
-        fraction = above / below if self.below else above
-        return -fraction if self.sign < 0 else fraction
-
-
-def collected(x: Expression) -> Expression:
-    """Return a formula as one writes it: a sum of products, in the order in which it is built.
-
-    Numbers come first, equal factors form a power, and a common first factor stands before a bracket: a x - a y becomes
-    a (x - y). Numbers count as equal if their first twelve digits are. The value changes by rounding only.
-    """
-    return total(one.formula(_powers) for one in _products(x))
-
-
-def _powers(factors: Iterable[Expression]) -> Iterator[Expression]:
-    """Yield factors, with what is within them collected. A factor that repeats becomes a square or a cube."""
-    for factor, equal_ones in groupby(factors):
-        inner, count = factor, len([*equal_ones])
-        if isinstance(factor, Operation):
-            within = tuple(map(collected, factor.args))
-            inner = collected(factor) if _is_sum(factor) else Operation(factor.op, within)
-        yield from [inner] if count == 1 else [call({2: "square", 3: "cube"}[count], inner)]
-
-
-def _products(x: Expression) -> list[_Product]:
-    """Return the products of which a formula is the sum, with each common first factor before a bracket."""
-    alike: dict[object, list[_Product]] = {}
-    for place, one in enumerate(_terms(x)):
-        head = one.above[0] if len(one.above) > 1 else None
-        key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
-        alike.setdefault(key, []).append(one)
-    products = []
-    for first, *others in alike.values():
-        rest = total(_Product(one.sign * first.sign, one.above[1:], one.below).formula() for one in (first, *others))
-        products.append(_Product(first.sign, first.above[:1]).times(_product(rest)) if others else first)
-    return products
-
-
-def _terms(x: Expression) -> list[_Product]:
-    match x:
-        case Number(0.0):
-            return []
-        case Operation("+" | "-" as op, (left, right)):
-            sign = _Product(1 if op == "+" else -1)
-            return _terms(left) + [sign.times(one) for one in _terms(right)]
-    whole = _product(x)
-    if len(whole.above) == 1 and not whole.below and _is_sum(whole.above[0]):
-        return [_Product(whole.sign).times(one) for one in _terms(whole.above[0])]
-    return [whole]
-
-
-def _is_sum(x: Expression) -> bool:
-    return isinstance(x, Operation) and x.op in ("+", "-")
-
-
-def _product(x: Expression) -> _Product:  # noqa: PLR0911 - a case for each operation
-    """Return a formula as one product, in which a sum of several products is a factor."""
-    match x:
-        case Number(1.0):
-            return _Product()
-        case Operation("neg", (inner,)):
-            return _Product(-1).times(_product(inner))
-        case Operation("*", (left, right)):
-            return _product(left).times(_product(right))
-        case Operation("/", (left, right)):
-            below = _product(right)
-            return _product(left).times(_Product(below.sign, below.below, below.above))
-        case Operation("+" | "-"):
-            terms = _products(x)
-            if len(terms) == 1:
-                return terms[0]
-            if all(one.sign < 0 for one in terms):
-                return _Product(-1, (total(one._replace(sign=1).formula() for one in terms),))
-    return _Product(1, (x,))
 
 
 # ---- Evaluation ------------------------------------------------------------------------------------------------------
@@ -484,45 +378,51 @@ def change_of(name: str) -> Name:
     return Name(f"change_of_{name}", "change", (name,))
 
 
-Change: TypeAlias = "Expression | None"
-"""The change of an expression, or None if it does not change."""
-
-
-def tangent(x: Expression, changes: Callable[[str], Change]) -> Change:
+def tangent(x: Expression, changes: Mapping[str, Expression]) -> Expression:  # noqa: PLR0911 - a case for each operation
     """Return the change of an expression: the sum of its partial derivatives times the changes of its names.
 
-    `changes` gives the change of a name by its identifier.
+    `changes` has the changes of the names that change. The base of a power is not negative.
     """
-    x = plain(x)
-    if isinstance(x, Name):
-        return changes(x.identifier)
-    if not isinstance(x, Operation):
-        return None
-    args = x.args[1:] if x.op == "if" else x.args
-    d = [tangent(arg, changes) for arg in args]
-    changing = [change for change in d if change]
-    if not changing:
-        return None
-    return _of_function(x, args[0], changing[0]) if len(args) == 1 else _of_two(x, args, d)
+
+    def change(part: Expression) -> Expression:
+        return tangent(part, changes)
+
+    if x.names.isdisjoint(changes):
+        return ZERO
+    match plain(x):
+        case Name(identifier):
+            return changes[identifier]
+        case Operation("if", (test, then, otherwise)):
+            return where(test, change(then), change(otherwise))
+        case Operation("+", (a, b)):
+            return change(a) + change(b)
+        case Operation("-", (a, b)):
+            return change(a) - change(b)
+        case Operation("*", (a, b)):
+            return change(a) * b + a * change(b)
+        case Operation("/", (a, b)):
+            return (change(a) - x * change(b)) / b
+        case Operation("atan2", (a, b)):
+            return (change(a) * b - change(b) * a) / (a * a + b * b)
+        case Operation("pow", (a, b)):
+            logarithm = where(a > 0.0, call("log", a), 0.0)
+            return b * call("pow", a, b - 1.0) * change(a) + x * logarithm * change(b)
+        case Operation(op, (a,)):
+            return _change_of_function(op, a, x, change(a))
+    return ZERO
 
 
-def _of_two(x: Operation, args: Sequence[Expression], changes: Sequence[Change]) -> Change:
-    """Return the change of an operation with two arguments, by the changes of these."""
-    (a, b), (left, right) = changes, args
-    match x.op:
-        case "if":
-            return where(x.args[0], a or 0.0, b or 0.0)
-        case "+" | "-":
-            return _added(a, x.op, b)
-        case "*":
-            return _added(_times(a, right), "+", b and left * b)
-        case "/":
-            return _over(_added(a, "-", b and x * b), right)
-        case "atan2":
-            return _over(_added(_times(a, right), "-", _times(b, left)), left * left + right * right)
-    assert x.op == "pow"  # the base is not negative
-    logarithm = where(left > 0.0, call("log", left), 0.0)
-    return _added(a and right * call("pow", left, right - 1.0) * a, "+", b and x * logarithm * b)
+def _change_of_function(op: str, a: Expression, x: Expression, change: Expression) -> Expression:
+    """Return the change of x, a function of a, by the change of a."""
+    changes = {
+        "neg": -change,
+        "abs": where(a < 0.0, -change, change),
+        "sqrt": change / (2.0 * x),
+        "log": change / a,
+        "sin": call("cos", a) * change,
+        "cos": -call("sin", a) * change,
+    }
+    return changes.get(op, call(slope_name(op), a) * change)
 
 
 def tangents(
@@ -536,34 +436,7 @@ def tangents(
     steps: dict[str, Expression] = {}
     for name, formula in formulas.items():
         steps[name] = formula
-        if change := tangent(formula, changes.get):
+        if (change := tangent(formula, changes)) != ZERO:
             changes[name] = change_of(name)
             steps[change_of(name).identifier] = change
     return steps, changes
-
-
-def _of_function(x: Operation, argument: Expression, change: Expression) -> Expression:
-    """Return the change of a function of one argument, or of its negative, by the change of the argument."""
-    slopes: dict[str, Callable[[], Expression]] = {
-        "neg": lambda: -change,
-        "abs": lambda: where(argument < 0.0, -change, change),
-        "sqrt": lambda: change / (2.0 * x),
-        "log": lambda: change / argument,
-        "sin": lambda: call("cos", argument) * change,
-        "cos": lambda: -call("sin", argument) * change,
-    }
-    return slopes[x.op]() if x.op in slopes else call(slope_name(x.op), argument) * change
-
-
-def _times(change: Change, factor: Expression) -> Change:
-    return change and change * factor
-
-
-def _over(change: Change, divisor: Expression) -> Change:
-    return change and change / divisor
-
-
-def _added(a: Change, op: str, b: Change) -> Change:
-    if a is None or b is None:
-        return a if b is None else b if op == "+" else -b
-    return Operation(op, (a, b))

@@ -11,8 +11,9 @@ from itertools import chain
 
 from .attitude import entry
 from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
-from .expression import Expression, Name, Names, call, directed, product, scaled, total
-from .layout import FAINT, Curve, Layout, Thruster, effect_along
+from .expression import Expression, Name, Names, call, directed, product, total
+from .layout import Layout
+from .parts import FAINT, Curve, Thruster, effect_along
 
 
 @dataclass(frozen=True)
@@ -24,7 +25,7 @@ class Effect:
     words: str
     """What people read: "the fins"."""
     missed: str = ""
-    """The word for it where a model lacks it; empty if nobody expects it."""
+    """What the model card calls it in "There is no lag, delay ..."; empty if nobody expects it."""
 
 
 THRUST = Effect("thrust", "the thrust")
@@ -71,12 +72,12 @@ class Force:
         states: list[Expression] = [*map(Name, self.factors)]
         if self.turns:
             states[0] = call("abs", states[0])
-        return scaled(self.sign, product(*coefficient, *states))
+        return self.sign * product(*coefficient, *states)
 
     def along(self, inverse: Expression, *, reverse: bool = False) -> Expression:
         """Return the coefficient of an acceleration: `inverse` is the acceleration per load."""
         factors = (self.reverse or self.coefficient) if reverse else self.coefficient
-        return scaled(-self.sign if reverse and self.turns else self.sign, product(inverse, *factors))
+        return (-self.sign if reverse and self.turns else self.sign) * product(inverse, *factors)
 
 
 def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
@@ -128,10 +129,10 @@ def thrusts(
     `force_of` gives another force of a thruster in place of its thrust, by its name and its curve.
     """
     parts = []
-    for t in layout.drivers(axis):
+    for t in layout.thrusters_along(axis):
         own = layout.curve_of[t.name]
         if curve in (None, own):
-            parts.append(scaled(t.effect(axis), _with_arm(t, axis, force_of(t.name, own), names)))
+            parts.append(t.effect(axis) * _with_arm(t, axis, force_of(t.name, own), names))
     return parts
 
 
@@ -185,7 +186,7 @@ def _advance(layout: Layout, names: Names) -> Iterator[Force]:
                 effect = t.effect(vehicle_axis.axis) * t.effect(other.axis)
                 if "d" in layout.curve_of[t.name].keys and abs(effect) > FAINT:
                     loss = _with_arm(t, vehicle_axis.axis, names("loss", t.name), names)
-                    parts.append(scaled(effect, _with_arm(t, other.axis, loss, names)))
+                    parts.append(effect * _with_arm(t, other.axis, loss, names))
             if parts:
                 lost = Name(vehicle_axis.axis.coefficient("alpha")), total(parts)
                 yield Force(ADVANCE, vehicle_axis.axis.velocity, -1, lost, (other.axis.velocity,))
@@ -202,6 +203,6 @@ def _steering(layout: Layout, names: Names) -> Iterator[Force]:
             if fin.has_drag:
                 effect = effect_along(vehicle_axis.axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
-        acting = total(scaled(*part) for part in parts if abs(part[0]) > FAINT)
+        acting = total(effect * lift for effect, lift in parts if abs(effect) > FAINT)
         if acting.names:
             yield Force(STEERING, vehicle_axis.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)

@@ -4,13 +4,10 @@ A layout does not contain the values of the coefficients. `catalogue.py` declare
 variables.
 """
 
-from bisect import bisect_right
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from math import inf, sin
-from pathlib import Path
-from typing import Literal, NamedTuple, TypeVar
+from math import inf
 
 from rov_fmu.io.messages import listed
 
@@ -26,7 +23,6 @@ from .catalogue import (
     CURRENT,
     CURRENT_DOWN,
     CURVE,
-    FIN,
     HEADING,
     HEAVE,
     LEAST_BETA,
@@ -34,7 +30,6 @@ from .catalogue import (
     PITCH,
     POSITION,
     RESTORING,
-    REVERSE,
     ROLL,
     SURGE,
     SWAY,
@@ -42,257 +37,26 @@ from .catalogue import (
     YAW,
     Axis,
     Declaration,
-    axis_words,
-    cited,
-    coefficient_name,
     command_declaration,
     cross_declaration,
     cross_name,
     delayed_declaration,
     delayed_name,
     load_declaration,
+    rate_name,
     velocity_declaration,
     voltage_declaration,
 )
-from .expression import unused
-from .step import interpolated
-
-
-@dataclass(frozen=True)
-class ThrustTable:
-    """Measured forces of one thruster, with a monotone cubic between the commands."""
-
-    name: str
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    forces: tuple[float, ...]
-    """The force at each command, N."""
-    slopes: tuple[float, ...]
-    """The derivative of the force with respect to the command, at each command, N."""
-    voltage: float = 0.0
-    """The voltage at which the table was measured, V; 0 if the curve has only this table."""
-    path: Path | None = field(default=None, compare=False)
-    """The file with the table."""
-
-    @property
-    def function(self) -> str:
-        """The name of the function that formulas call."""
-        return f"thrust_{self.name}"
-
-    def force(self, command: float) -> float:
-        """Return the force at a command between -1 and 1.
-
-        It is the cubic that has the forces and the slopes at the ends of the interval of the command.
-        """
-        return float(interpolated(command, (self.commands, self.forces, self.slopes)))
-
-
-@dataclass(frozen=True)
-class CurrentTable:
-    """The electric current of one thruster over its command, measured at one voltage."""
-
-    path: Path
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    currents: tuple[float, ...]
-    """The current at each command, A."""
-    voltage: float = 0.0
-    """The voltage at which the currents were measured, V."""
-
-    def current(self, command: float) -> float:
-        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
-        n = bisect_right(self.commands, command)
-        if n in (0, len(self.commands)):
-            return self.currents[min(n, len(self.commands) - 1)]
-        low, high = self.commands[n - 1 : n + 1]
-        return self.currents[n - 1] + (command - low) / (high - low) * (self.currents[n] - self.currents[n - 1])
-
-
-class Part:
-    """A part of a layout with optional coefficients: a thrust curve or an axis."""
-
-    keys: tuple[str, ...]
-    others: tuple[tuple[str, str], ...]
-
-    @property
-    def owner(self) -> str:
-        """The end of the names of its coefficients."""
-        raise NotImplementedError
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
-        return self.name_of(key if key in self.keys else key.removesuffix(REVERSE))
-
-    def name_of(self, key: str) -> str:
-        """Return the name that the coefficient with a key has, or would have if it were added."""
-        return dict(self.others).get(key) or coefficient_name(key, self.owner)
-
-
-@dataclass(frozen=True)
-class Curve(Part):
-    """A thrust curve.
-
-    For c > 0, the force of `together` thrusters is F(c) = a_t (c - c_0)^2 + b_t (c - c_0). For c < 0 the curve is
-    mirrored, unless it has coefficients for reverse. Tables replace both.
-    """
-
-    name: str
-    keys: tuple[str, ...] = ("a_t", "b_t")
-    """The keys of CURVE that the vehicle has."""
-    together: int = 1
-    description: str = ""
-    equation: str = ""
-    """Where the curve is published: the number of an equation of the paper, or another source."""
-    tables: tuple[ThrustTable, ...] = ()
-    """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
-    electric_current: CurrentTable | None = field(default=None, compare=False)
-    """The current of one thruster. All curves of a vehicle have it, or none."""
-    others: tuple[tuple[str, str], ...] = ()
-    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
-
-    @property
-    def owner(self) -> str:
-        """The name of the curve."""
-        return self.name
-
-    @property
-    def has_lag(self) -> bool:
-        """True when the force follows the command with a lag."""
-        return "T" in self.keys
-
-
-Vector = tuple[float, float, float]
-FAINT = 1e-9
-"""Smaller effects, in N per N or m, are rounding errors of a direction."""
-
-
-def effect_along(axis: Axis, force: Vector, position: Vector) -> float:
-    """Return the part of a force along an axis, or its moment about the axis."""
-    (X, Y, Z), (x, y, z) = force, position
-    if axis.is_rotation:
-        return (y * Z - z * Y, z * X - x * Z, x * Y - y * X)[axis.place]
-    return force[axis.place]
-
-
-class SourcedVector(NamedTuple):
-    """A direction or a position in the body frame, and where it comes from."""
-
-    value: Vector
-    """Forward, starboard, down: a unit vector, or a position from the origin (m)."""
-    source: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Driven:
-    """A thruster or a fin: a part that commands drive, without its numbers."""
-
-    name: str
-    """The name in the FMU: the command is `u_<name>`, and the force of a thruster `F_<name>`."""
-    description: str = ""
-    """For example "left thruster" or "rudder"."""
-    direction: SourcedVector
-    """The direction of the force at a positive command, or of a fin's lift ahead."""
-    position: SourcedVector | None = None
-
-    @property
-    def place(self) -> Vector:
-        """The position (m), or the centre of mass where there is none."""
-        return self.position.value if self.position else (0.0, 0.0, 0.0)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Thruster(Driven):
-    """A thruster: its curve, its direction and its place."""
-
-    curve: str
-    """The name of the thrust curve."""
-    arm: Literal["port", "starboard"] | None = None
-    """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
-
-    @property
-    def side(self) -> float:
-        """1 on the port side, where a force ahead turns the bow to starboard; -1 on the other side; 0 without arm."""
-        return {None: 0.0, "port": 1.0, "starboard": -1.0}[self.arm]
-
-    def effect(self, axis: Axis) -> float:
-        """Return the force along an axis, or the torque about it, of a thrust of 1 N.
-
-        The torque by an arm is in units of R sin γ.
-        """
-        if self.position is None and axis.is_rotation:
-            return self.side if axis is YAW else 0.0
-        return effect_along(axis, self.direction.value, self.place)
-
-
-@dataclass(frozen=True, kw_only=True)
-class BodyForce(Thruster):
-    """The force along one axis of the body, or the moment about it, where logs have a wrench and not thrusters."""
-
-    axis: Axis
-
-    def effect(self, axis: Axis) -> float:
-        """Return 1 for its own axis, and 0 for the others."""
-        return float(axis is self.axis)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Fin(Driven):
-    """A control surface. Its lift is proportional to its angle."""
-
-    has_drag: bool = False
-
-    def effect(self, axis: Axis) -> float:
-        """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
-        effect = effect_along(axis, self.direction.value, self.place)
-        return effect if abs(effect) > FAINT else 0.0
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key."""
-        return f"{key}_{self.name}"
-
-
-@dataclass(frozen=True)
-class VehicleAxis(Part):
-    """An axis of a vehicle."""
-
-    axis: Axis
-    keys: tuple[str, ...] = ("a_d", "b_d")
-    """The keys of AXIS that the vehicle has. It always has α and β."""
-    others: tuple[tuple[str, str], ...] = ()
-    """The keys and the names of the coefficients whose usual names are taken. The layout gives these names."""
-
-    @property
-    def owner(self) -> str:
-        """The velocity along the axis."""
-        return self.axis.velocity
-
-
-_Part = TypeVar("_Part", Curve, VehicleAxis)
-
-
-class Range(NamedTuple):
-    """The range of a quantity over which a vehicle was identified."""
-
-    name: str
-    """The variable, or EVERY_COMMAND."""
-    low: float
-    high: float
-
-
-EVERY_COMMAND = "command"
-"""The quantity whose range limits the size of the commands of all thrusters."""
-
-
-class Owner(NamedTuple):
-    """A table of the vehicle file with coefficients."""
-
-    place: tuple[str, ...]
-    """The tables around it, and its own name."""
-    names: Mapping[str, str]
-    """The names of its coefficients, by key."""
-    kinds: Mapping[str, Declaration]
-    words: Mapping[str, str]
-    """What fills the fields in the texts of `kinds`."""
+from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thruster, VehicleAxis
+from .words import (
+    CoefficientTable,
+    command_words,
+    table_of_axis,
+    table_of_curve,
+    table_of_fin,
+    thrust_declaration,
+    torque_declaration,
+)
 
 
 @dataclass(frozen=True)
@@ -325,29 +89,6 @@ class Layout:
     """The source of `voltage`."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
-    has_fixed_names: bool = field(default=False, compare=False)
-    """True when the coefficients keep their names if parts or coefficients are added or removed."""
-
-    def __post_init__(self) -> None:
-        """Name the coefficients. The curves main and main_reverse would both have a coefficient d_main_reverse.
-
-        A name that is taken gets a number, so the names of parts are free.
-        """
-        if self.has_fixed_names:
-            return
-        taken = {*(f"F_{thruster.name}" for thruster in self.thrusters), *(COMMANDS if self.has_dead_time else ())}
-
-        def named(part: _Part) -> _Part:
-            others = []
-            for key in part.keys:
-                usual = coefficient_name(key, part.owner)
-                name = unused(usual, taken)
-                taken.add(name)
-                others += [(key, name)] if name != usual else []
-            return replace(part, others=tuple(others)) if others or part.others else part
-
-        object.__setattr__(self, "axes", tuple(map(named, self.axes)))
-        object.__setattr__(self, "curves", tuple(map(named, self.curves)))
 
     def with_keys(self, has: Callable[[Part, str], bool]) -> "Layout":
         """Return the layout whose curves and axes have just the coefficients for which `has(part, key)` is true."""
@@ -360,19 +101,6 @@ class Layout:
             axes=tuple(replace(vehicle_axis, keys=keys(vehicle_axis, AXIS)) for vehicle_axis in self.axes),
             curves=tuple(replace(curve, keys=keys(curve, CURVE)) for curve in self.curves),
         )
-
-    def with_fixed_names(self) -> "Layout":
-        """Return the layout whose coefficients keep their names, whatever is added or removed.
-
-        They are the names beside every coefficient that the vehicle could have.
-        """
-        every = replace(self.with_keys(lambda *_: True), has_dead_time=True, has_fixed_names=False)
-
-        def named(parts: tuple[_Part, ...], among: tuple[_Part, ...]) -> tuple[_Part, ...]:
-            return tuple(replace(part, others=one.others) for part, one in zip(parts, among, strict=True))
-
-        axes, curves = named(self.axes, every.axes), named(self.curves, every.curves)
-        return replace(self, axes=axes, curves=curves, has_fixed_names=True)
 
     @classmethod
     def of_wrench(cls, axes: "Iterable[VehicleAxis]") -> "Layout":
@@ -397,7 +125,7 @@ class Layout:
     # -- lookup --
 
     @cached_property
-    def kinds(self) -> dict[str, VehicleAxis]:
+    def by_name(self) -> dict[str, VehicleAxis]:
         """The axes by name."""
         return {vehicle_axis.axis.name: vehicle_axis for vehicle_axis in self.axes}
 
@@ -418,7 +146,7 @@ class Layout:
 
     def has(self, *axes: Axis) -> bool:
         """Return True when the vehicle has one of these axes."""
-        return any(axis.name in self.kinds for axis in axes)
+        return any(axis.name in self.by_name for axis in axes)
 
     @cached_property
     def has_arm(self) -> bool:
@@ -437,11 +165,12 @@ class Layout:
 
     @cached_property
     def continued(self) -> tuple[str, ...]:
-        """The variables that a step continues besides the states: with an attitude, the heading, which counts turns."""
+        """Variables that are carried from step to step although they are no states. With roll or pitch this is psi: a
+        quaternion does not know how many turns the vehicle has made."""
         return ("psi",) if self.has_attitude else ()
 
     @cached_property
-    def driven(self) -> "tuple[Thruster | Fin, ...]":
+    def actuators(self) -> "tuple[Thruster | Fin, ...]":
         """Everything that commands drive: the thrusters and the fins."""
         return (*self.thrusters, *self.fins)
 
@@ -449,13 +178,13 @@ class Layout:
     def gains(self) -> dict[str, dict[str, float]]:
         """For each thruster and each fin, the gains of the inputs that drive it."""
         if not self.mix:
-            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.driven}
+            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.actuators}
         return {
             driven.name: {f"u_{name}": gains[driven.name] for name, gains in self.mix.items() if gains.get(driven.name)}
-            for driven in self.driven
+            for driven in self.actuators
         }
 
-    def drivers(self, axis: Axis) -> list[Thruster]:
+    def thrusters_along(self, axis: Axis) -> list[Thruster]:
         """Return the thrusters that act on an axis."""
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
@@ -465,24 +194,24 @@ class Layout:
         When the thrusters are symmetric, these commands leave the other axes at rest.
         """
         effects: dict[str, float] = {}
-        for thruster in self.drivers(axis):
+        for thruster in self.thrusters_along(axis):
             for name, gain in self.gains[thruster.name].items():
                 effects[name] = effects.get(name, 0.0) + gain * thruster.effect(axis)
         return {name: 1.0 if effect > 0.0 else -1.0 for name, effect in effects.items() if abs(effect) > FAINT}
 
-    def driving(self, axis: Axis, fraction: float) -> dict[str, float]:
+    def commands_along(self, axis: Axis, fraction: float) -> dict[str, float]:
         """Return the commands that drive an axis in its positive direction with a fraction of the full command."""
         return {name: self.command_of(fraction * sign) for name, sign in self.signs(axis).items()}
 
     def example(self, axis: Axis) -> dict[str, float]:
         """Return inputs that drive an axis in its positive direction: 30 % of the command, or 5 N or N.m from outside
         where nothing drives it."""
-        return self.driving(axis, 0.3) or {axis.external: 5.0}
+        return self.commands_along(axis, 0.3) or {axis.external: 5.0}
 
     # -- declarations --
 
     @cached_property
-    def owners(self) -> tuple[Owner, ...]:
+    def coefficient_tables(self) -> tuple[CoefficientTable, ...]:
         """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
         inertias = {vehicle_axis.axis.inertia for vehicle_axis in self.axes}
         of_vehicle = (
@@ -492,32 +221,25 @@ class Layout:
             ("commands", COMMANDS if self.has_dead_time else (), COMMANDS),
         )
         return (
-            *(Owner((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
-            *map(_of_curve, self.curves),
-            *map(_of_fin, self.fins),
-            *self._owners_of_axes,
+            *(CoefficientTable((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
+            *map(table_of_curve, self.curves),
+            *map(table_of_fin, self.fins),
+            *(table_of_axis(vehicle_axis, kinds) for kinds in (AXIS, TUNING) for vehicle_axis in self.axes),
         )
-
-    @property
-    def _owners_of_axes(self) -> Iterator[Owner]:
-        for kinds in (AXIS, TUNING):
-            for vehicle_axis in self.axes:
-                names = {
-                    key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys
-                }
-                yield Owner(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
         """The tables and the key of each coefficient in the vehicle file, by its name in the FMU."""
-        places = {name: (*owner.place, key) for owner in self.owners for key, name in owner.names.items()}
+        places = {name: (*table.place, key) for table in self.coefficient_tables for key, name in table.names.items()}
         return places | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
 
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
         """The coefficients, in the order of the FMU's variables."""
         declared = {
-            name: owner.kinds[key].filled(**owner.words) for owner in self.owners for key, name in owner.names.items()
+            name: table.declarations[key].filled(**table.words)
+            for table in self.coefficient_tables
+            for key, name in table.names.items()
         }
         declared |= {cross_name(*row): cross_declaration(*row) for row in self.cross}
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
@@ -543,7 +265,7 @@ class Layout:
         words = {
             name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
             for name, gains in self.mix.items()
-        } or {driven.name: _command(driven) for driven in self.driven}
+        } or {driven.name: command_words(driven) for driven in self.actuators}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
@@ -562,11 +284,14 @@ class Layout:
         return max(-1.0, min(1.0, command))
 
     @cached_property
+    def acting(self) -> dict[str, str]:
+        """The variable with the command that acts, by the name of the command, if commands act after a dead time."""
+        return {name: delayed_name(name) for name in self.commands} if self.has_dead_time else {}
+
+    @cached_property
     def delayed(self) -> dict[str, Declaration]:
         """The commands that act after the dead time, if the vehicle has one."""
-        if not self.has_dead_time:
-            return {}
-        return {delayed_name(name): delayed_declaration(name, command) for name, command in self.commands.items()}
+        return {later: delayed_declaration(name, self.commands[name]) for name, later in self.acting.items()}
 
     @cached_property
     def inputs(self) -> dict[str, Declaration]:
@@ -622,7 +347,7 @@ class Layout:
     def _forces(self, *, lag: bool) -> dict[str, Declaration]:
         """Return the forces of the thrusters that follow the commands with a lag, or those of the others."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
-        return {f"F_{t.name}": _thrust(t, curve) for t, curve in curves if curve.has_lag == lag}
+        return {f"F_{t.name}": thrust_declaration(t, curve) for t, curve in curves if curve.has_lag == lag}
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
@@ -636,11 +361,7 @@ class Layout:
         They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
         of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
-        torques = {}
-        for curve in self.turning_curves:
-            of = f"of the {curve.description}" if curve.description else curve.name
-            words = f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard"
-            torques[f"tau_{curve.name}"] = Declaration("N.m", words)
+        torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
         return self._forces(lag=False) | torques | self.angles | self.outside
 
     @cached_property
@@ -664,56 +385,19 @@ class Layout:
         return ANGLES_AT_START if self.has_attitude else {}
 
     @cached_property
+    def variables(self) -> tuple[str, ...]:
+        """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
+        rates = map(rate_name, self.state)
+        known = (*self.calculated, *self.delayed, *self.coefficients, *self.initial)
+        return (*self.inputs, *self.state, *rates, *known)
+
+    @cached_property
     def places(self) -> dict[str, int]:
-        """The index of each variable in the arrays of the C code. That of der(x) is the index of x plus len(state)."""
-        variables = [*self.inputs, *self.state]
-        others = [*self.calculated, *self.delayed, *self.coefficients, *self.initial]
-        places = {name: place for place, name in enumerate(variables)}
-        return places | {name: place for place, name in enumerate(others, len(variables) + len(self.state))}
+        """The place of each variable in this order. It is the index in the arrays of the C code."""
+        return {name: place for place, name in enumerate(self.variables)}
 
     @cached_property
     def turning_curves(self) -> tuple[Curve, ...]:
         """The curves whose thrusters turn the vehicle."""
-        driving = {t.curve for t in self.drivers(YAW)} if self.has(YAW) else set()
+        driving = {t.curve for t in self.thrusters_along(YAW)} if self.has(YAW) else set()
         return tuple(curve for curve in self.curves if curve.name in driving)
-
-
-def _of_curve(curve: Curve) -> Owner:
-    words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-    names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
-    return Owner(("curves", curve.name), names, CURVE, words)
-
-
-def _of_fin(fin: Fin) -> Owner:
-    names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-    return Owner(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
-
-
-def _pushes(direction: tuple[float, float, float]) -> str:
-    """Return the direction of a positive force in words."""
-    words = [
-        axis.positive if part > 0.0 else axis.negative
-        for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
-        if abs(part) > FAINT
-    ]
-    return listed(words)
-
-
-def _command(driven: Thruster | Fin) -> str:
-    kind = "fin" if isinstance(driven, Fin) else "thruster"
-    words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
-    return f"{words}, positive {_pushes(driven.direction.value)}"
-
-
-def _thrust(thruster: Thruster, curve: Curve) -> Declaration:
-    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
-    share = {1: "", 2: ", half of the pair's"}.get(curve.together, f", 1/{curve.together} of their curve")
-    rest = ", in water at rest" if "d" in curve.keys else ""
-    return Declaration(
-        "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"
-    )
-
-
-def arm(R: float, gamma: float) -> float:
-    """Return R sin γ, the torque per difference of thrust (m), (4)."""
-    return R * sin(gamma)

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from .expression import Expression, Name, Names, minus, product, scaled, total
+from .expression import Expression, Name, Names, product, total
 
 _KIRCHHOFF = {
     "u": ((1, "v", "r"), (-1, "w", "q")),
@@ -48,13 +48,13 @@ class MassMatrix:
             blocks = [block for block in blocks if block not in joined_blocks] + [set(pair).union(*joined_blocks)]
         return tuple(tuple(name for name in self.gains if name in block) for block in blocks)
 
-    def _is_alone(self, axis: str) -> bool:
+    def _is_uncoupled(self, axis: str) -> bool:
         return not any(axis in block for block in self.blocks)
 
     def inverse(self, axis: str) -> dict[str, Name]:
-        """Return a row of the inverse.
+        """Return the entries of a row of M^-1 by their names.
 
-        For each axis that acts on this one, it has the name of the acceleration per load along that axis.
+        A force F_j along axis j accelerates this axis by (M^-1)_ij F_j.
         """
         for block in self.blocks:
             if axis in block:
@@ -83,7 +83,7 @@ class MassMatrix:
             for m in reversed(range(n)):
                 column = block[m]
                 formulas[self._name("undo", row, column).identifier] = total(
-                    minus(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
+                    -(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
                     for k in block[m + 1 : n + 1]
                     if (k, column) in factor
                 )
@@ -105,14 +105,14 @@ class MassMatrix:
             for m, column in enumerate(block[:n]):
                 parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
                 parts += [
-                    minus(factor[row, k] * factor[column, k] * pivot[k])
+                    -(factor[row, k] * factor[column, k] * pivot[k])
                     for k in block[:m]
                     if {(row, k), (column, k)} <= factor.keys()
                 ]
                 if parts:
                     factor[row, column] = self._name("factor", row, column)
                     formulas[factor[row, column].identifier] = total(parts) / pivot[column]
-            squares = [minus(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
+            squares = [-(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
             formulas[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
         return formulas, factor
 
@@ -121,14 +121,14 @@ class MassMatrix:
         by_pair: dict[tuple[str, str], list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self.products(other).items():
-                parts = (scaled(sign, self._term(inverse, entry)) for sign, entry in entries)
+                parts = (sign * self._term(inverse, entry) for sign, entry in entries)
                 by_pair.setdefault(pair, []).extend(parts)
         return {pair: total(parts) for pair, parts in sorted(by_pair.items(), key=lambda item: _places(item[0]))}
 
     def _term(self, inverse: Name, entry: tuple[str, str]) -> Expression:
         a, b = entry
-        is_alone = a == b and self._is_alone(a)
-        return inverse / self.names("gain", a) if is_alone else inverse * self._name("mass", a, b)
+        is_uncoupled = a == b and self._is_uncoupled(a)
+        return inverse / self.names("gain", a) if is_uncoupled else inverse * self._name("mass", a, b)
 
     def products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
         """Return the right side of Kirchhoff's equations for an axis.

@@ -1,25 +1,38 @@
 """The equation of motion of a vehicle as a table of terms.
 
-Between reversals, and while the inputs are held, the motion is a quadratic system of ordinary differential equations,
+In Fossen's notation, with the velocities nu = (u, v, w, p, q, r) through the water and the pose eta,
+
+    M nu' + C(nu) nu + D(nu) nu + g(eta) = tau,    eta' = J(eta) nu + current.
+
+    M            mass with added mass and tuning       mass_matrix here, MassMatrix.parameters (mass.py)
+    C(nu) nu     Coriolis and Munk terms               MassMatrix.coriolis (mass.py)
+    D(nu) nu     linear and quadratic damping, lift    _drag (forces.py)
+    g(eta)       weight and buoyancy                   _restoring, or the net weight in _loads (forces.py)
+    tau          thrust, its loss with speed, fins,    _loads, _advance, _steering (forces.py),
+                 loads from outside                    from the commands: thrust_formulas (thrust.py)
+    J(eta) nu    kinematics                            _Table.pose here, rotation_terms (attitude.py)
+
+Multiplied by M^-1, and with the cosine and sine of the heading (or the rotation matrix) as states, this is a quadratic
+system of ordinary differential equations, as long as no velocity reverses and the inputs are held:
 
     y_i' = k_i + sum of L_ij y_j + sum of Q_ijk y_j y_k.
 
 `equation_of` derives this table from the layout of a vehicle: the states y, the terms in the rate of each state, and a
-formula for each coefficient. `step.py` computes a step from it in Python, and the C code is generated from it. A new
-effect is a new force (forces.py).
+formula for each coefficient. `python/step.py` computes a step from it in Python, and the C code is generated from it. A
+new effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
-from itertools import combinations
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import Expression, Name, Names, call, directed, of, product, scaled, total, where
+from .expression import Expression, Name, Names, call, directed, of, product, total, where
 from .forces import COUPLING, Effect, Force, forces_of, thrusts
-from .layout import EVERY_COMMAND, Curve, Layout, Range, ThrustTable
+from .layout import Layout
 from .mass import MassMatrix
+from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
 from .thrust import steady_name, thrust_formulas
 
 
@@ -36,10 +49,7 @@ class Term:
     @property
     def formula(self) -> Expression:
         """The term as a formula."""
-        states = map(Name, self.factors)
-        if self.factors and self.coefficient in (ONE, -ONE):
-            return scaled(1.0 if self.coefficient == ONE else -1.0, product(*states))
-        return product(self.coefficient, *states)
+        return product(self.coefficient, *map(Name, self.factors))
 
 
 ONE = of(1.0)
@@ -76,9 +86,8 @@ class Equation:
     rows: Mapping[str, tuple[Term, ...]]
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, Expression]
-    """Formulas from the states of the vehicle to the states of the table at the start of a step, and `square_length`,
-    which some of them use. States without a formula start at 0. These are the integrals, which no term contains, and
-    the arrived fractions of the lags. A state that a term contains must have a formula."""
+    """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
+    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
     lags: Mapping[str, Mapping[str, str]]
     """For the arrived fraction of each lag: the forces that lag, each with the steady thrust that it approaches.
 
@@ -127,7 +136,7 @@ class Equation:
     def used(self) -> frozenset[str]:
         """The states that a term contains, and the orientation. The other states are integrals of these.
 
-        In `rows`, the used states come first, because the C code knows only their number.
+        In `rows`, the used states come first, so that C needs one number, N_USED, to tell states from integrals.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
 
@@ -229,10 +238,8 @@ def equation_of(layout: Layout) -> Equation:
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
     rows |= table.lags() | attitude | table.pose()
-    rows, products = quadratic(rows, table.names)
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
-    starts |= products
     if "cos_psi" in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     starts |= rotation
@@ -316,13 +323,13 @@ class _Table:
             raise ValueError("a force with another power of the same states needs an effect of its own")
         constant = total(gain * total(loads[other]) for other, gain in inverse.items())
         coriolis = self._mass.coriolis(v) if self.layout.coupled else {}
-        is_alone = len(coriolis) == 1
+        has_one_product = len(coriolis) == 1
         return (
             Term(self._named(constant, "constant", v)),
             *self._arriving(v, inverse),
             *(self._term(v, forces, inverse) for forces in alike.values()),
             *(
-                Term(self._named(formula, "coupling", v, *([] if is_alone else ["".join(pair)])), pair, COUPLING)
+                Term(self._named(formula, "coupling", v, *([] if has_one_product else ["".join(pair)])), pair, COUPLING)
                 for pair, formula in coriolis.items()
             ),
         )
@@ -397,37 +404,6 @@ class _Table:
 Rows = dict[str, tuple[Term, ...]]
 
 
-def quadratic(rows: Rows, names: Names) -> tuple[Rows, dict[str, Expression]]:
-    """Return rows without products of three states, and the products that became states of their own.
-
-    With s = w w, a cubic drag is c s w, and s' = 2 w w' again has products of at most two states: w w is s.
-    """
-    products: dict[tuple[str, ...], str] = {}
-    new_rows: Rows = {}
-    waiting = dict(rows)
-
-    def shortened(factors: tuple[str, ...]) -> tuple[str, ...]:
-        if len(factors) < 3:
-            return factors
-        pairs = [*combinations(sorted(name for name in factors if name in rows), 2)]
-        pair = next((pair for pair in pairs if pair in products), pairs[0])
-        if pair not in products:
-            products[pair] = names("product", *pair).identifier
-            moving = zip(pair, reversed(pair), strict=True)
-            waiting[products[pair]] = tuple(
-                replace(term, factors=(*term.factors, other)) for name, other in moving for term in rows[name]
-            )
-        rest = [*factors]
-        for name in pair:
-            rest.remove(name)
-        return shortened((products[pair], *rest))
-
-    while waiting:
-        name = next(iter(waiting))
-        new_rows[name] = tuple(replace(term, factors=shortened(term.factors)) for term in waiting.pop(name))
-    return new_rows, {name: product(*map(Name, pair)) for pair, name in products.items()}
-
-
 def mass_matrix(layout: Layout, names: Names) -> MassMatrix:
     """Return the mass matrix with the tuning of (18)."""
     gains: dict[str, Expression] = {}
@@ -454,7 +430,7 @@ def _inertia_of_two_axes(layout: Layout) -> dict[tuple[str, str], list[Expressio
     for pair, (sign, coordinate) in _OF_CENTRE.items():
         present = [axis for axis in pair if axis in layout.by_velocity]
         if coordinate in layout.restoring and (len(present) == 2 or (present and moves)):
-            parts.setdefault(pair, []).append(scaled(sign, Name("m_rov") * Name(coordinate)))
+            parts.setdefault(pair, []).append(sign * (Name("m_rov") * Name(coordinate)))
     return parts
 
 
@@ -483,9 +459,7 @@ def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Exp
         for axis in "xyz":
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
             formulas[names("righting", axis).identifier] = total(
-                scaled(sign, Name(force) * Name(centre))
-                for sign, force, centre in moments
-                if centre in layout.restoring
+                sign * (Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring
             )
     return formulas
 

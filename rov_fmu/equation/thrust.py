@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from .catalogue import REVERSE, delayed_name
+from .catalogue import REVERSE
 from .expression import (
     Expression,
     Name,
@@ -11,15 +11,15 @@ from .expression import (
     call,
     directed,
     equal,
-    minus,
     of,
     product,
     saturated,
-    scaled,
     total,
     where,
+    with_positive_zero,
 )
-from .layout import Curve, Layout
+from .layout import Layout
+from .parts import Curve
 
 Formulas = dict[str, Expression]
 _VOLTAGE = Name("voltage")
@@ -36,7 +36,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
     for name, gains in layout.gains.items():
         parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
-            acting = Name(delayed_name(command) if layout.has_dead_time else command)
+            acting = Name(layout.acting.get(command, command))
             if layout.pulse:
                 fraction = names("fraction", command)
                 formulas[fraction.identifier] = _fraction(acting, layout.pulse)
@@ -49,7 +49,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
             formulas[command_of] = parts[0][1]
         else:
             mixed = names("mixed", name)
-            formulas[mixed.identifier] = total(scaled(*part) for part in parts)
+            formulas[mixed.identifier] = total(gain * part for gain, part in parts)
             formulas[command_of] = saturated(mixed)
         if name in layout.curve_of:
             formulas |= _steady_thrust(name, layout.curve_of[name], names)
@@ -89,23 +89,17 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
 
 def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
     """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
-    command, share = names("command", name), _share(curve)
+    command, share = names("command", name), 1.0 / curve.n_thrusters
     formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        loss = product(by_direction(command, curve, "d"), call("abs", command), *share)
+        loss = product(by_direction(command, curve, "d"), call("abs", command), share)
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
-        force = product(force, *share)
-    # + 0 makes 0.0 of -0.0
-    return formulas | {steady_name(name, curve, names).identifier: force + 0.0}
-
-
-def _share(curve: Curve) -> tuple[float, ...]:
-    """Return the factor for one of the thrusters that a curve describes together, if there are several."""
-    return (1.0 / curve.together,) if curve.together != 1 else ()
+        force = product(force, share)
+    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:
@@ -114,10 +108,7 @@ def by_direction(command: Name, curve: Curve, key: str) -> Expression:
 
 
 def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return the formula of the force of the tables, and the formula of the force times the scale.
-
-    Between two voltages, the force is interpolated linearly.
-    """
+    """Return formulas of F = k_t F_table(c), with F_table interpolated linearly in the voltage."""
     battery, (first, *_) = names("battery"), curve.tables
     forces = [call(table.function, names("command", name)) for table in curve.tables]
     force: Expression = forces[-1]
@@ -138,8 +129,8 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
     a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
     has_dead_band = "c_0" in curve.keys
-    force = directed(command, size, minus(size))
+    force = directed(command, size, -size)
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(a_t * beyond + b_t, beyond, *_share(curve)),
+        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force

@@ -10,7 +10,8 @@ from textwrap import fill
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.forces import EXPECTED, effects_of
-from rov_fmu.equation.layout import EVERY_COMMAND, Layout, Range
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE
@@ -28,7 +29,7 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     data = [f"Source of the coefficients: {vehicle.source}."]
     trust = ["Nothing was checked on unseen data: the vehicle file does not say how it was identified."]
     holds = ["It has no thrusters: its inputs are forces from outside."]
-    if vehicle.layout.driven:
+    if vehicle.layout.actuators:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
     holds += [
         f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)
@@ -122,7 +123,7 @@ def _left_out(layout: Layout) -> Iterator[str]:
     yield from _left_out_of_motion(layout)
     yield from _left_out_of_forces(layout)
     yield "A tether: it acts only if its force is connected as a load."
-    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.kinds else ''}"
+    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
     level = "" if layout.has_attitude else ", horizontal"
     yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
 
@@ -130,8 +131,8 @@ def _left_out(layout: Layout) -> Iterator[str]:
 def _left_out_of_motion(layout: Layout) -> Iterator[str]:
     if not layout.coupled and len(layout.axes) > 1 and not layout.cross:
         yield "Coupling between the axes."
-    if missing := [name for name in _AXES if name not in layout.kinds]:
-        drifts = {"surge", "yaw"} <= layout.kinds.keys() and "sway" in missing
+    if missing := [name for name in _AXES if name not in layout.by_name]:
+        drifts = {"surge", "yaw"} <= layout.by_name.keys() and "sway" in missing
         yield f"{', '.join(missing).capitalize()}.{' The vehicle does not drift outward in a turn.' if drifts else ''}"
     if same := _mirrored(layout):
         yield f"What differs between the two directions of {same}."
@@ -148,7 +149,7 @@ def _left_out_of_forces(layout: Layout) -> Iterator[str]:
     }
     static = listed(words for words, is_there in own_terms.items() if not is_there)
     yield f"Separate terms for {static}; β < 1 stands for a slow start."
-    if "heave" in layout.kinds and not layout.restoring:
+    if "heave" in layout.by_name and not layout.restoring:
         load = "Beyond the constant load F_0_w, buoyancy" if "F_0_w" in layout.coefficients else "Buoyancy"
         yield f"{load} is neutral."
 

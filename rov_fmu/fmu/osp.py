@@ -72,7 +72,7 @@ def osp_model_description(layout: Layout) -> bytes:
     groups = []
     names = [name for name, _ in _groups(layout)]
     for name, candidates in _groups(layout):
-        if members := {variable: axis for variable, axis in candidates.items() if variable in unit_of}:
+        if members := {variable: candidates[variable] for variable in unit_of if variable in candidates}:
             (unit,) = {unit_of[variable] for variable in members}
             # the name of a curve or a thruster may make a name that another group has
             unique = name if names.count(name) == 1 else "_".join((name, *members))

@@ -8,13 +8,13 @@ from pathlib import Path
 import pythonfmu
 
 from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
-from rov_fmu.equation.catalogue import delayed_name
-from rov_fmu.equation.printed import printed
+from rov_fmu.equation.python import step
+from rov_fmu.equation.python.printed import printed
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SLAVE = Path(__file__).with_name("slave.py")
-_STEP = Path(__file__).parents[1] / "equation" / "step.py"
+_STEP = Path(step.__file__).parent
 
 
 def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping[str, str]:
@@ -26,14 +26,14 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
     declaration = {
         "identifier": vehicle.identifier,
         "log_categories": LOG_CATEGORIES,
-        "commands": {name: delayed_name(name) for name in layout.commands} if layout.has_dead_time else {},
+        "commands": layout.acting,
         "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }
     return {
-        f"{vehicle.identifier}_slave.py": _text(_SLAVE).replace("rov_fmu.equation", package),
+        f"{vehicle.identifier}_slave.py": _text(_SLAVE).replace("rov_fmu.equation.python", package),
         "variables.json": json.dumps(declaration, ensure_ascii=False, indent=1) + "\n",
-        f"{package}/step.py": _text(_STEP),
+        **{f"{package}/{name}": _text(_STEP / name) for name in ("step.py", "dop853.py")},
         f"{package}/equation.py": printed(layout, f"{package}.step"),
     }
 

@@ -1,7 +1,7 @@
-"""The FMU in pure Python: connect a vehicle's equation and rov_fmu/equation/step.py to PythonFMU's Fmi2Slave.
+"""The FMU in pure Python: connect a vehicle's equation and rov_fmu/equation/python/step.py to PythonFMU's Fmi2Slave.
 
 In the FMU this file is the slave module. In its folder lie variables.json (the declaration), step.py, and the equation
-of the vehicle, which rov_fmu/equation/printed.py prints. PythonFMU 0.7 cannot return fmi2Discard. An exception must not
+of the vehicle, which equation/python/printed.py prints. PythonFMU 0.7 cannot return fmi2Discard. An exception must not
 reach it, because PythonFMU then releases its objects twice, and a later call ends the importer. When a value is
 refused, a message with the status is logged, the old value is kept, and the call returns fmi2OK.
 """
@@ -16,7 +16,7 @@ from typing import Any
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.equation import step
+from rov_fmu.equation.python import step
 
 _TOO_LATE = "must not be set after the initialization"
 

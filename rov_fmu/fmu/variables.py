@@ -1,9 +1,9 @@
 """Declare every variable of the FMU once.
 
 modelDescription.xml, the table VARIABLES in interface.h, the documentation and the registration with PythonFMU are
-derived from `variables`. The numbers REF_<name> in model.h come from `Layout.places`, which has the same order: inputs,
-states, derivatives, calculated variables, commands that act after the dead time, coefficients, attitude at the start.
-The value reference of a variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
+derived from `variables`. The order is that of `Layout.variables`: inputs, states, derivatives, calculated variables,
+commands that act after the dead time, coefficients, attitude at the start. The value reference of a variable is its
+place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections import Counter
@@ -13,7 +13,7 @@ from math import isfinite
 from typing import Any
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration
+from rov_fmu.equation.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration, rate_name
 from rov_fmu.equation.dependencies import dependencies_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
@@ -144,17 +144,16 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
 def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
     layout = vehicle.layout
-    result: list[Variable] = []
+    result: dict[str, Variable] = {}
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
         low, high = (x if isfinite(x) else None for x in (declaration.minimum, declaration.maximum))
         given = {"display_unit": declaration.display_unit, "minimum": low, "maximum": high, **rest}
-        place, about = len(result), (declaration.description, declaration.unit)
-        result.append(Variable(name, place, *about, causality, variability, **given))
+        about = declaration.description, declaration.unit
+        result[name] = Variable(name, layout.places[name], *about, causality, variability, **given)
 
-    held = layout.commands if layout.has_dead_time else ()
     for name, declaration in layout.inputs.items():
-        variability = "discrete" if name in held else "continuous"
+        variability = "discrete" if name in layout.acting else "continuous"
         add(name, declaration, "input", variability, start=declaration.start, nominal=declaration.nominal)
     for name, declaration in layout.state.items():
         add(
@@ -169,8 +168,8 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
     for name in layout.state:
-        rest = {"derivative_of": name, "dependencies": dependencies[f"der({name})"]}
-        add(f"der({name})", derivatives[name], "local", "continuous", initial="calculated", **rest)
+        rest = {"derivative_of": name, "dependencies": dependencies[rate_name(name)]}
+        add(rate_name(name), derivatives[name], "local", "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
         add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
     for name, declaration in layout.delayed.items():
@@ -179,9 +178,7 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         variability = "tunable" if declaration.tunable else "fixed"
         start = 0.0 if name in layout.initial else vehicle[name]
         add(name, declaration, "parameter", variability, initial="exact", start=start)
-    places = {v.name: v.value_reference for v in result if v.derivative_of is None}
-    assert places == layout.places, "the C code has another order of the variables"
-    return tuple(result)
+    return tuple(result[name] for name in layout.variables)
 
 
 LOG_CATEGORIES = {

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
@@ -68,7 +69,7 @@ class Tests:
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
         layout = self.given.vehicle.layout
-        names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.kinds}
+        names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.by_name}
         for (other, subject), some in self.folder.rows.items():
             if other == kind and subject in names:
                 yield subject, some
@@ -226,7 +227,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     vehicle = _extended(given.vehicle, measured, tests, shown)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
-    driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
+    driving = {t.curve for axis in fitted for t in vehicle.layout.thrusters_along(axis)}
     given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
     driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
@@ -422,7 +423,7 @@ def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[Sampl
 
 def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
-    for one in (one for one in logs if axis.name in one.layout.kinds):
+    for one in (one for one in logs if axis.name in one.layout.by_name):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
         yield from filter(None, np.abs(one.thrust(vehicle.coefficients, axis, some)).tolist())
 
@@ -436,7 +437,7 @@ def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> flo
             slower = -changes(time, np.abs(speeds)) / changes(time, time)
             largest = max(largest, float(np.max(slower, initial=0.0)))
     is_whole = axis.coefficient("m_a") in vehicle.coefficients
-    return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.kinds[axis.name]) * largest
+    return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.by_name[axis.name]) * largest
 
 
 def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
@@ -436,7 +436,7 @@ def with_lag(identification: Identification) -> list[str]:
     vehicle, told = identification.vehicle, []
     for result in identification.axes:
         axis, half = result.axis, answer_at(result, 0.5)
-        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.drivers(axis)}
+        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.thrusters_along(axis)}
         T = max(({*lags} & vehicle.coefficients.keys()), key=lambda name: vehicle[name], default="")
         if half and T:
             row = TableRow("", axis, "Tau", half.command, half.rise[0], 1.0)
@@ -543,12 +543,12 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
     yield from _not_identified(result.known, axis.name, instead, axis=axis.name)
     beta = next((known for known in result.known if known.name == axis.coefficient("beta")), None)
     if beta and beta.interval:
-        has_added = "m_a" in identification.vehicle.layout.kinds[axis.name].keys
+        has_added = "m_a" in identification.vehicle.layout.by_name[axis.name].keys
         low, high = BETA_WITH_ADDED_MASS if has_added else BETA
         if beta.interval[1] < low or beta.interval[0] > high:
             inertia = f"{axis.inertia} with the added one" if has_added else axis.inertia
             names = {"factor": significant(1.0 / beta.value, 2), "inertia": inertia, "mass": axis.inertia}
-            curves = {thruster.curve for thruster in identification.vehicle.layout.drivers(axis)}
+            curves = {thruster.curve for thruster in identification.vehicle.layout.thrusters_along(axis)}
             files = [*dict.fromkeys(p.file for p in identification.forces if p.subject in curves)]
             names["forces"] = f" (in {listed(files)})" if files else ""
             yield Finding("implausible inertia", axis.name, names=names)

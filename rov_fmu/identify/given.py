@@ -169,7 +169,7 @@ def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
 def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     """Keep these axes, the thrusters and fins that act on them, and the curves and inputs of these."""
     layout = _with_axes(layout, axes)
-    thrusters = tuple(t for t in layout.thrusters if any(t in layout.drivers(axis) for axis in axes))
+    thrusters = tuple(t for t in layout.thrusters if any(t in layout.thrusters_along(axis) for axis in axes))
     fins = tuple(fin for fin in layout.fins if any(fin.effect(axis) for axis in axes))
     names = {thruster.name for thruster in thrusters} | {fin.name for fin in fins}
     mix = {
@@ -197,7 +197,7 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
 def _left_out(description: Description, tested: TestContents, layout: Layout) -> Iterator[Finding]:
     """Yield a finding for each part that is described or tested but not in the layout."""
     for name in description.axes:
-        if name not in layout.kinds:
+        if name not in layout.by_name:
             drag = ", ".join(AXES[name].coefficient(key) for key in ("a_d", "b_d"))
             yield Finding("axis left out", axis=name, names={"drag": drag})
     if layout.fins:

@@ -12,7 +12,7 @@ import numpy as np
 
 from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.layout import Curve
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.assess import logarithms
 from rov_fmu.identify.beginning import QUANTITIES, Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
@@ -289,12 +289,10 @@ def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: s
             of: Curve | Axis = (
                 next(c for c in vehicle.layout.curves if c.name == subject)
                 if kind == "thrust"
-                else vehicle.layout.kinds[subject].axis
+                else vehicle.layout.by_name[subject].axis
             )
             one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
-            unit = (
-                "N" if kind == "thrust" else "s" if kind == "time_constant" else vehicle.layout.kinds[subject].axis.unit
-            )
+            unit = {"thrust": "N", "time_constant": "s"}.get(kind) or vehicle.layout.by_name[subject].axis.unit
             out = values.get((quantity, subject, row.command), np.nan)
             counts = tests.counts(kind, subject, row.command)
             numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out

@@ -13,7 +13,8 @@ import numpy as np
 
 from rov_fmu import __version__
 from rov_fmu.equation.catalogue import REVERSE
-from rov_fmu.equation.layout import Curve, Layout, Part, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Part, VehicleAxis
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.given import GivenVehicle
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
@@ -49,7 +50,6 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     """
     given, file = tests.given, fit.file.posterior
     layout = _layout(tests, fit)
-    own = replace(layout, has_fixed_names=False)  # the names that the vehicle has when its file is read
     values = {name: float(value) for name, value in file.table.coefficients(file.z).items()}
     rov = Vehicle(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
@@ -109,9 +109,8 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
-    ).with_(own)
-    renamed = dict(zip(layout.coefficients, own.coefficients, strict=True))
-    return vehicle, {renamed[name]: replace(one, name=renamed[name]) for name, one in coefficients.items()}
+    )
+    return vehicle, coefficients
 
 
 def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
-from rov_fmu.equation.layout import Part
+from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
@@ -135,12 +135,12 @@ def _axis(
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
-    drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
+    drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     limits = tests.given.description.tables.limits
     shown = replace(fit.posterior, z=fit.file.posterior.z)
-    known = _those_of(coefficients, vehicle.layout.kinds[axis.name], "beta")
+    known = _those_of(coefficients, vehicle.layout.by_name[axis.name], "beta")
     evidence = Evidence(
         predictions=own,
         answers=answers,
@@ -169,7 +169,7 @@ def _axis(
 
 def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
     """Return True if a thruster drives both axes: what it lacks in one of them it lacks in both."""
-    return one is other or any(t in vehicle.layout.drivers(other) for t in vehicle.layout.drivers(one))
+    return one is other or any(t in vehicle.layout.thrusters_along(other) for t in vehicle.layout.thrusters_along(one))
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
@@ -188,7 +188,7 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:
     """Return False if the thrust along an axis is the largest force of the logs, and none of them has any."""
-    drivers = {thruster.name for thruster in vehicle.layout.drivers(axis)}
+    drivers = {thruster.name for thruster in vehicle.layout.thrusters_along(axis)}
     largest = (most for log in tests.folder.logs if log.commands for most in log.commands.largest.items())
     return not vehicle.layout.has_wrench or any(most for name, most in largest if name in drivers)
 

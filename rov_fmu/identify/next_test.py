@@ -34,7 +34,7 @@ def next_test(
     The intervals of the answers are those that people see. They may be wider than the posterior says, for example
     because the thrust changes slowly; a test does not narrow this part.
     """
-    number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.kinds), None)
+    number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.by_name), None)
 
     def motions(z: Array, commands: Sequence[float]) -> Motions:
         vehicle, shapes = posterior.table.model(z)
@@ -108,7 +108,7 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     inputs = np.zeros((len(edges), len(layout.inputs)))
     names = [*layout.inputs]
     for n, command in enumerate((0.0, strength, 0.0, -strength, 0.0)):
-        for name, value in (layout.usual_inputs | layout.driving(axis, command)).items():
+        for name, value in (layout.usual_inputs | layout.commands_along(axis, command)).items():
             if name in layout.commands or name == "voltage":
                 inputs[n, names.index(name)] = value
     time = np.arange(0.0, edges[-1] + 2.0, 1.0 / _RATE)

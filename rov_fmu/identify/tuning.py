@@ -90,7 +90,7 @@ def tune(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
 
 def _closed_form(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehicle:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
-    if vehicle.held(axis, 1.0).B != vehicle.held(axis, 0.0).B:
+    if vehicle.motion_at(axis, 1.0).B != vehicle.motion_at(axis, 0.0).B:
         raise TuningError(
             f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
             "account: remove d"
@@ -118,8 +118,8 @@ def _with(vehicle: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
 
 def _holding(vehicle: Vehicle, axis: Axis, V: float) -> float:
     """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
-    plain, form = vehicle.with_(**{axis.coefficient("beta"): 1.0}), vehicle.layout.kinds[axis.name]
-    return -plain.effective_inertia(form) * plain.held(axis, 0.0).acceleration(V)
+    plain, form = vehicle.with_(**{axis.coefficient("beta"): 1.0}), vehicle.layout.by_name[axis.name]
+    return -plain.effective_inertia(form) * plain.motion_at(axis, 0.0).acceleration(V)
 
 
 def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
@@ -128,7 +128,7 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
     if not 0.0 < abs(c) <= 1.0:
         return f"a command of {c:g} must be within -1 ... 1 and not 0, a fraction of the full command: 30 % is 0.3"
     if not (force := vehicle.force(axis, c)):
-        dead = all("c_0" in vehicle.layout.curve_of[t.name].keys for t in vehicle.layout.drivers(axis))
+        dead = all("c_0" in vehicle.layout.curve_of[t.name].keys for t in vehicle.layout.thrusters_along(axis))
         return f"a command of {c:g} gives no {axis.push}{', it is within the dead band' if dead else ''}"
     if point.quantity == "Tau":
         return None if _LEAST <= value < inf else f"Tau = {value:g} s must be at least {_LEAST:g} s"
@@ -136,9 +136,9 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
         return f"V_ss = {value:g} {axis.unit} must have a size of at least {_LEAST:g} {axis.unit}"
     if _holding(vehicle, axis, value) * force > 0.0:
         return None
-    form, allowed = vehicle.layout.kinds[axis.name], "positive" if force > 0.0 else "negative"
+    form, allowed = vehicle.layout.by_name[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
-        drift = vehicle.held(axis, 0.0).steady_velocity()
+        drift = vehicle.motion_at(axis, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
     thrust = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
     return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"
@@ -146,7 +146,7 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
 
 def implausible(tuning: Tuning) -> Iterator[Finding]:
     """Yield a finding about each tuned coefficient that is implausible."""
-    axis, has_added = tuning.axis, "m_a" in tuning.vehicle.layout.kinds[tuning.axis.name].keys
+    axis, has_added = tuning.axis, "m_a" in tuning.vehicle.layout.by_name[tuning.axis.name].keys
     for kind, (low, high) in {"alpha": ALPHA, "beta": BETA_WITH_ADDED_MASS if has_added else BETA}.items():
         value = tuning.vehicle[name := axis.coefficient(kind)]
         if name in tuning.intervals and not low <= value <= high:

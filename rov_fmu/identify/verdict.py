@@ -272,5 +272,5 @@ def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> floa
     """Return the largest effective inertia by the interval of β, relative to the inertia in air; inf if unknown."""
     if beta is None or beta.interval is None:
         return inf
-    effective = vehicle.effective_inertia(vehicle.layout.kinds[axis.name])
+    effective = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
     return effective * beta.value / beta.interval[0] / vehicle[axis.inertia]

@@ -140,7 +140,7 @@ def checked_inputs(
     for name in names:
         if name == TIME:
             continue
-        check_name("inputs", name, layout.inputs, layout.kinds)
+        check_name("inputs", name, layout.inputs, layout.by_name)
         value = inputs[name]
         key = f"inputs[{name!r}]"
         if callable(value):
@@ -180,7 +180,7 @@ def with_axes(layout: Layout, values: Mapping[str, Array]) -> dict[str, Array]:
     """
     inputs = {name: value for name, value in values.items() if name in layout.inputs}
     fractions: dict[str, Array] = {}
-    for name in (axis for axis in layout.kinds if axis in values):
+    for name in (axis for axis in layout.by_name if axis in values):
         if not (signs := layout.signs(AXES[name])):
             raise InputError(f"inputs[{name!r}]: no thruster drives this axis")
         for command, sign in signs.items():

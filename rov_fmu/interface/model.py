@@ -241,7 +241,7 @@ class VehicleModel(Vehicle):
 
         Raises InputError if the vehicle has no such axis.
         """
-        kinds = {name: kind.axis for name, kind in self.layout.kinds.items()}
+        kinds = {name: kind.axis for name, kind in self.layout.by_name.items()}
         if isinstance(axis, str) and axis not in kinds:
             raise InputError(f"axis = {shown(axis)}: the vehicle has no such axis{only(axis, [*kinds])}")
         return super().response(kinds[axis] if isinstance(axis, str) else axis, command)

@@ -99,7 +99,7 @@ class Settings:
 def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
     """Return the values of the options --set: inputs, initial values and coefficients. Raises InputError."""
     variables = {**layout.inputs, **layout.state, **layout.initial, **layout.coefficients}
-    names = [*layout.kinds, *variables]
+    names = [*layout.by_name, *variables]
     values: dict[str, float] = {}
     for text in settings:
         given, _, value = (part.strip() for part in text.partition("="))
@@ -116,9 +116,9 @@ def read_settings(settings: Sequence[str], layout: Layout) -> Settings:
         except ValueError:
             values[name] = nan
         if not isfinite(values[name]):
-            percent = _percent(value) if name in layout.kinds or variables[name].unit == "1" else ""
+            percent = _percent(value) if name in layout.by_name or variables[name].unit == "1" else ""
             raise InputError(f"--set {text}: {shown(value)} must be a finite number{percent}")
-    kinds = (layout.inputs | layout.kinds, layout.state | layout.initial, layout.coefficients)
+    kinds = (layout.inputs | layout.by_name, layout.state | layout.initial, layout.coefficients)
     return Settings(*({name: value for name, value in values.items() if name in own} for own in kinds))
 
 

@@ -11,7 +11,8 @@ import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
 from rov_fmu.equation.catalogue import HEAVE, ROLL
-from rov_fmu.equation.layout import FAINT, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import FAINT
 from rov_fmu.interface.arguments import checked_start, checked_values, with_axes
 from rov_fmu.interface.model import load
 from rov_fmu.interface.simulate_command import read_settings

@@ -35,7 +35,7 @@ def tune_vehicle(
         raise InputError("tune: use either --points, or --command, --v-ss and --tau")
     vehicle = load_vehicle(path)
     if not vehicle.layout.has(axis):
-        raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.kinds)}")
+        raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.by_name)}")
     if not vehicle.layout.signs(axis):
         raise InputError(f"tune: {path}: --axis {axis.name}: no thruster drives this axis, so it cannot be tuned")
     if output:

@@ -115,9 +115,11 @@ def print_tuning(tuning: Tuning) -> None:
     print_table(result)
     layout = tuning.vehicle.layout
     for command in dict.fromkeys(p.command for p in tuning.points):
-        inputs = ", ".join(f"{name} = {value:g}" for name, value in layout.driving(tuning.axis, command).items())
+        inputs = ", ".join(f"{name} = {value:g}" for name, value in layout.commands_along(tuning.axis, command).items())
         paragraph(out, f"A command of {command:.0%} of {tuning.axis.name}: {inputs}")
-    for curve in {thruster.curve: layout.curve_of[thruster.name] for thruster in layout.drivers(tuning.axis)}.values():
+    for curve in {
+        thruster.curve: layout.curve_of[thruster.name] for thruster in layout.thrusters_along(tuning.axis)
+    }.values():
         if curve.has_lag:
             T = tuning.vehicle[curve.coefficient("T")]
             out.print(f"Tau is that of steady thrust; the lag of curve {curve.name}, T = {T:g} s, comes on top")

@@ -116,5 +116,5 @@ def _by(p: Point, other: Vehicle) -> float | None:
     if p.quantity == "force":
         curve = layout.curves_by_name.get(p.subject)
         return other.curve_force(curve, p.command) if curve else None
-    form = layout.kinds.get(p.subject)
+    form = layout.by_name.get(p.subject)
     return other.response(form.axis, p.command)[p.quantity == "Tau"] if form else None

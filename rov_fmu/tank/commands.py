@@ -23,7 +23,7 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
-from rov_fmu.equation.layout import BodyForce
+from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import listed, shown

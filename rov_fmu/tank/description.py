@@ -26,7 +26,8 @@ from rov_fmu.equation.catalogue import (
     YAW,
     Declaration,
 )
-from rov_fmu.equation.layout import Layout, Part, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Part, VehicleAxis
 from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
@@ -42,7 +43,7 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
-from rov_fmu.vehicle.checks import check_names_and_keys, check_quantities, check_tables_of_thrust
+from rov_fmu.vehicle.checks import check_distinct_names, check_names_and_keys, check_quantities, check_tables_of_thrust
 from rov_fmu.vehicle.description import Head, Validity
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
@@ -399,7 +400,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         path=path,
         tables=file,
         layout=layout,
-        axes=tuple(name for name in AXES if name in start.kinds or name in own_layout.kinds),
+        axes=tuple(name for name in AXES if name in start.by_name or name in own_layout.by_name),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
         base_quantities=_quantities(base.with_(layout)) if base else {},
@@ -437,16 +438,13 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
 
 
 def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) -> Layout:
-    """Add every axis that the thrusters drive, and the keys of the file's own axis tables.
-
-    Effects come and go while a vehicle is identified, so its coefficients have fixed names.
-    """
+    """Add every axis that the thrusters drive, and the keys of the file's own axis tables."""
     forms = []
     for name, axis in AXES.items():
-        if layout.signs(axis) or name in layout.kinds or name in axis_keys:
-            form = layout.kinds.get(name, VehicleAxis(axis))
+        if layout.signs(axis) or name in layout.by_name or name in axis_keys:
+            form = layout.by_name.get(name, VehicleAxis(axis))
             forms.append(VehicleAxis(axis, (*form.keys, *axis_keys.get(name, ()))))
-    return replace(layout, axes=tuple(forms)).with_fixed_names()
+    return replace(layout, axes=tuple(forms))
 
 
 # ---- Mistakes that depend on the vehicle's hardware ------------------------------------------------------------------
@@ -455,6 +453,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) ->
 def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
+    yield from check_distinct_names(layout.with_keys(lambda *_: True))  # effects come and go during the identification
     yield from _unknown_effects(layout, description.base_name)
     if thrusters := description.thrusters:  # one table is used as it is
         untold = tuple(replace(curve, tables=curve.tables[1:]) for curve in thrusters.curves)
@@ -462,7 +461,7 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)
-    windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.kinds]
+    windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.by_name]
     for name in file.windows:
         if name not in windows:
             yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")

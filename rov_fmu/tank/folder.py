@@ -215,7 +215,7 @@ class Folder:
         kind, subject = parts_of_name(path.stem.lower(), curves)
         if kind != "log" and path.name.isprintable() and has_log(path, kind, self.names.columns):
             kind, subject = "log", subject if subject in AXES else ""
-        axes = self.layout.kinds if self.layout else AXES
+        axes = self.layout.by_name if self.layout else AXES
         known = [*((curves or []) if kind == "thrust" else axes)]
         if not (kind and path.name.isprintable() and (subject or known)):
             raise self._unknown_kind(path)
@@ -225,7 +225,7 @@ class Folder:
     def _unknown_kind(self, path: Path) -> DataFileError:
         """Return the error about a file that is neither a log nor a table."""
         curves = [curve.name for curve in self.layout.curves] if self.layout else []
-        subjects = [*curves, *(self.logged.kinds if self.logged else AXES)]
+        subjects = [*curves, *(self.logged.by_name if self.logged else AXES)]
         hint = did_you_mean(path.stem.lower().partition("_")[0], KINDS, also={"time": "time_constant"})
         # A text of another suffix may be no test at all, and its owner is only warned.
         failure = DataFileError if has_usual_suffix(path) else UnreadableFileError

@@ -26,7 +26,8 @@ from rov_fmu.equation.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line
 from rov_fmu.vehicle import schema
@@ -62,7 +63,22 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
+        yield from check_distinct_names(layout)
         yield from _check_named_coefficients(parts, layout, lost)
+
+
+def check_distinct_names(layout: Layout) -> Iterator[str]:
+    """Yield a line about the first coefficient whose name in the FMU is that of a thrust or of another coefficient.
+
+    Thrust astern of the curve `main`, a_t_main_reverse, has the name of thrust ahead of the curve `main_reverse`.
+    """
+    places = {f"F_{thruster.name}": f"thruster.{thruster.name}" for thruster in layout.thrusters}
+    for table in layout.coefficient_tables:
+        for key, name in table.names.items():
+            place = ".".join((*table.place, key))
+            if (first := places.setdefault(name, place)) != place:
+                yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
+                return
 
 
 def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, get_args
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.field_types import Name, Text, not_blank, printable
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped

@@ -10,7 +10,8 @@ from typing import Any
 
 from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Layout, Thruster
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Thruster
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.messages import listed
 from rov_fmu.io.toml_file import join_names, key_line
@@ -64,7 +65,7 @@ def check_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
     """
     axes = [vehicle_axis.axis for vehicle_axis in layout.axes]
     for thruster in layout.thrusters:
-        if not any(thruster in layout.drivers(axis) for axis in axes):
+        if not any(thruster in layout.thrusters_along(axis) for axis in axes):
             reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
             yield key_line(f"thruster.{thruster.name}", reason)
     for axis, reason in undriven_axes(layout, driven):
@@ -76,14 +77,14 @@ def undriven_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[tupl
 
     Sway comes last: two thrusters with a toe-in turn the vehicle, and their push to the side is a by-product.
     """
-    if not layout.driven:
+    if not layout.actuators:
         return
     axes = sorted((vehicle_axis.axis for vehicle_axis in layout.axes), key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
     for axis in (axis for axis in axes if axis not in _RIGHTED or axis.name in driven):
-        if not layout.drivers(axis) and any(fin.effect(axis) for fin in layout.fins):
+        if not layout.thrusters_along(axis) and any(fin.effect(axis) for fin in layout.fins):
             continue
-        if not layout.drivers(axis):
+        if not layout.thrusters_along(axis):
             yield axis, _undriven(axis)
             continue
         rest, coupled = _rest(_unit([thruster.effect(axis) for thruster in layout.thrusters]), independent)
@@ -114,7 +115,7 @@ def _undriven(axis: Axis) -> str:
 
 def check_inputs(layout: Layout) -> Iterator[str]:
     """Check that each input drives an axis; if all do, check that each axis has an input."""
-    driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.drivers(axis)}
+    driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.thrusters_along(axis)}
     steering = {name for fin in layout.fins for name in layout.gains[fin.name]}
     used = steering.union(*driven.values())
     idle = [name for name in layout.mix if f"u_{name}" not in used]

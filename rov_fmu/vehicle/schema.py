@@ -16,7 +16,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 from pydantic_core import ErrorDetails
 
-from rov_fmu.equation import layout
+from rov_fmu.equation import parts
 from rov_fmu.equation.catalogue import (
     ARM,
     AXES,
@@ -32,7 +32,8 @@ from rov_fmu.equation.catalogue import (
     cross_of,
     declarations_of,
 )
-from rov_fmu.equation.layout import CurrentTable, Layout, SourcedVector, ThrustTable, Vector, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import CurrentTable, SourcedVector, ThrustTable, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.field_types import Finite, Name, Symbol, Text, not_blank
 from rov_fmu.io.paths import inside_or_shipped
@@ -209,17 +210,18 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
 
     electric_current: ElectricCurrent | None = None
 
-    def for_model(self, name: str) -> layout.Curve:
+    def for_model(self, name: str) -> parts.Curve:
         """Return the curve of the model."""
         keys, current = _coefficient_keys(self, CURVE), self.electric_current
         tables = {0: (0.0, self.table)} if self.table else {}
         tables = tables or {n: (row.voltage, row.table) for n, row in enumerate(self.tables or (), 1)}
         if tables:
             keys = ("k_t", *(key for key in keys if key not in ("k_t", *REPLACED_BY_TABLE)))
-        return layout.Curve(
+        return parts.Curve(
             name,
             keys,
-            **{key: getattr(self, key) for key in ("together", "description", "equation")},
+            **{key: getattr(self, key) for key in ("description", "equation")},
+            n_thrusters=self.together,
             tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
             electric_current=replace(current.table, voltage=current.voltage) if current else None,
         )
@@ -302,7 +304,7 @@ class Position(Strict):
     """Where the value comes from."""
 
 
-class Driven(Strict):
+class Actuator(Strict):
     """A thruster or a fin."""
 
     name: Symbol
@@ -320,7 +322,7 @@ class Driven(Strict):
         return {"name": self.name, "description": self.description, "direction": along, "position": at}
 
 
-class Thruster(Driven):
+class Thruster(Actuator):
     """A thruster: its curve, its direction and its place."""
 
     curve: str
@@ -328,15 +330,15 @@ class Thruster(Driven):
     arm: Literal["port", "starboard"] | None = None
     """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
 
-    def for_model(self) -> layout.Thruster:
+    def for_model(self) -> parts.Thruster:
         """Return the thruster of the model."""
-        return layout.Thruster(**self.in_model, curve=self.curve, arm=self.arm)
+        return parts.Thruster(**self.in_model, curve=self.curve, arm=self.arm)
 
 
 _FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
 
 
-class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
+class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 
@@ -344,9 +346,9 @@ class Fin(_coefficients("Fin", _FIN, base=Driven)):  # type: ignore[misc]
 
     position: Position
 
-    def for_model(self) -> layout.Fin:
+    def for_model(self) -> parts.Fin:
         """Return the fin of the model."""
-        return layout.Fin(**self.in_model, has_drag=self.drag is not None)
+        return parts.Fin(**self.in_model, has_drag=self.drag is not None)
 
 
 class Battery(Strict):

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from statistics import fmean
 
-from rov_fmu.equation.layout import CurrentTable, ThrustTable
+from rov_fmu.equation.parts import CurrentTable, ThrustTable
 from rov_fmu.io.csv_table import BEYOND, COMMANDS, FORCE_UNITS, Column, DataFileError, read_columns
 
 _COMMAND = Column({"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=COMMANDS)

@@ -13,11 +13,12 @@ from typing import TYPE_CHECKING, TypeVar
 from typing_extensions import Self
 
 from rov_fmu.equation.alone import AxisAlone, alone_formulas
-from rov_fmu.equation.catalogue import ARM, YAW, Axis, delayed_name
+from rov_fmu.equation.catalogue import ARM, YAW, Axis
 from rov_fmu.equation.expression import compiled
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis, arm
-from rov_fmu.equation.printed import model_of
-from rov_fmu.equation.step import DelayLine, heading, step
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
+from rov_fmu.equation.python.printed import model_of
+from rov_fmu.equation.python.step import DelayLine, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
@@ -56,7 +57,6 @@ class _Formulas:
 
     def __init__(self, layout: Layout) -> None:
         equation = equation_of(layout)
-        rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
         self.names = equation.names
         self.model = model_of(layout)
         self.parameters = compiled(equation.parameters)
@@ -65,7 +65,6 @@ class _Formulas:
             vehicle_axis.axis.name: compiled(alone_formulas(layout, vehicle_axis.axis.velocity), equation.measured)
             for vehicle_axis in layout.axes
         }
-        self.calculate = compiled({**equation.program, **rates, **equation.outputs}, equation.measured)
 
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
@@ -156,12 +155,11 @@ class Vehicle:
         Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
         intervals. `vehicle.layout.coefficients` has the names, units and bounds.
 
-        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too. A
-        coefficient may have another name there: its place in the vehicle file tells which one it is.
+        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too.
 
         Raises InputError if the vehicle has no such coefficient, or cannot have the value.
         """
-        vehicle = self._in_layout(layout) if layout else self
+        vehicle = self._with_layout(layout) if layout else self
         values = {name: _number(name, value) for name, value in coefficients.items()}
         check_coefficients(vehicle.layout, values)
         changed = {**vehicle.coefficients, **values}
@@ -175,29 +173,25 @@ class Vehicle:
             estimates=some_estimates(vehicle.estimates, vehicle.coefficients.keys() - values.keys()),
         )
 
-    def _in_layout(self, layout: Layout) -> Self:
+    def _with_layout(self, layout: Layout) -> Self:
         """Return the vehicle with another layout, and with those of its coefficients that this layout has, too."""
-        there = {keys: name for name, keys in layout.keys_in_file.items()}
-        names = {name: there[keys] for name, keys in self.layout.keys_in_file.items() if keys in there}
+        names = layout.coefficients.keys()
 
-        def renamed(values: Mapping[str, _Value]) -> dict[str, _Value]:
-            return {names[name]: value for name, value in values.items() if name in names}
+        def kept(values: Mapping[str, _Value]) -> dict[str, _Value]:
+            return {name: value for name, value in values.items() if name in names}
 
         return replace(
             self,
             layout=layout,
-            coefficients=renamed(self.coefficients),
-            sources=renamed(self.sources),
-            intervals=renamed(self.intervals),
-            estimates={
-                name: row.model_copy(update={"correlation": renamed(row.correlation)})
-                for name, row in renamed(self.estimates).items()
-            },
+            coefficients=kept(self.coefficients),
+            sources=kept(self.sources),
+            intervals=kept(self.intervals),
+            estimates=some_estimates(self.estimates, names),
         )
 
     def __repr__(self) -> str:
         """Return the name of the vehicle, its axes, its inputs, and the coefficients that were set by hand."""
-        axes, inputs = ", ".join(self.layout.kinds), ", ".join(self.layout.commands)
+        axes, inputs = ", ".join(self.layout.by_name), ", ".join(self.layout.commands)
         title = f"{type(self).__name__} {self.identifier}: {self.name}"
         return f"<{title}; axes {axes}; inputs {inputs}{self._by_hand('; ')}>"
 
@@ -262,7 +256,7 @@ class Vehicle:
         if not words:
             places = [keys for name, keys in self.layout.keys_in_file.items() if name in self.intervals]
             words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
-        found = {axis: words.get(axis, "not identified") for axis in self.layout.kinds}
+        found = {axis: words.get(axis, "not identified") for axis in self.layout.by_name}
         return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
 
     def picture(self, name: str) -> Path | None:
@@ -304,9 +298,7 @@ class Vehicle:
 
     def _acting(self, inputs: Values) -> dict[str, float]:
         """Return the commands that act after the dead time: those that are given, or else the present ones."""
-        if not self.layout.has_dead_time:
-            return {}
-        return {delayed_name(name): inputs.get(delayed_name(name), inputs[name]) for name in self.layout.commands}
+        return {later: inputs.get(later, inputs[name]) for name, later in self.layout.acting.items()}
 
     def _values(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
@@ -318,9 +310,21 @@ class Vehicle:
             **{name: state[name] for name in self.layout.continued if name in state},
         }
 
+    def _outputs(self, inputs: Values, state: Values) -> dict[str, float]:
+        """Return the rates of the states and the calculated variables, together with all numbers that they need."""
+        values: dict[str, float] = self._formulas.model.outputs(self._values(inputs, state))
+        return values
+
     def calculated(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the values of `layout.calculated` by name: thrust, torque and Euler angles."""
-        values = self._formulas.calculate(self._values(inputs, state))
+        """Return the values of `layout.calculated` by name: thrust (N), torque (N.m) and Euler angles (rad).
+
+        The arguments are those of `step`. At 30 % of both rear thrusters:
+
+            rov = load_vehicle(SHIPPED["videoray"])
+            inputs = rov.layout.usual_inputs | {"u_l": 0.3, "u_r": 0.3}
+            rov.calculated(inputs, rov.layout.at_rest)["F_l"]  # the thrust of the left one, N
+        """
+        values = self._outputs(inputs, state)
         for name in self.layout.continued:
             values[name] = heading(values, state.get(name, values[name]))
         return {name: values[name] for name in self.layout.calculated}
@@ -334,26 +338,37 @@ class Vehicle:
     # ---- Motion ----
 
     def derivatives(self, inputs: Values, state: Values) -> dict[str, float]:
-        """Return the time derivatives of the states by their names."""
-        values = self._formulas.calculate(self._values(inputs, state))
+        """Return the time derivatives of the states by their names, in m/s2, rad/s2, m/s, rad/s and N/s.
+
+        The arguments are those of `step`. M nu' + C nu + D nu + g = tau is solved for nu'; eta' follows from nu and the
+        current.
+
+            rov.derivatives(rov.layout.usual_inputs | {"u_t": 0.5}, rov.layout.at_rest)["w"]  # m/s2, down
+        """
+        values = self._outputs(inputs, state)
         return {name: values[f"der_{name}"] for name in self.layout.state}
 
     def step(self, inputs: Values, state: Values, h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, and the heading of a vehicle with an attitude.
 
+        - `inputs`: all of `layout.inputs` by name. Commands are fractions from -1 to 1 (or pulse widths, us), loads are
+          in N and N.m, the current in m/s, the voltage in V. With a dead time, the commands act at once.
+        - `state`: all of `layout.state` by name, in m/s, rad/s, m, rad and N. With roll or pitch, the heading psi (rad)
+          may be there too; it tells in which turn the vehicle is.
+        - `h`: the length of the step, s. It need not be short.
+
         The result is exact up to rounding. It is not finite when the motion overflows or takes too many substeps
-        (rov_fmu/equation/step.py).
+        (rov_fmu/equation/python/step.py). Ten seconds at full thrust ahead, from rest:
+
+            inputs = rov.layout.usual_inputs | {"u_l": 1.0, "u_r": 1.0}
+            rov.step(inputs, rov.layout.at_rest, 10.0)["u"]
         """
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
 
     def delay_line(self) -> DelayLine:
         """Return the commands that act before the first one, and nothing that waits for the dead time."""
-        commands = self.layout.commands if self.layout.has_dead_time else {}
-        return DelayLine(
-            {name: declaration.start for name, declaration in commands.items()},
-            {name: delayed_name(name) for name in commands},
-        )
+        return DelayLine(self.layout.usual_inputs, self.layout.acting)
 
     # ---- One axis alone ----
 
@@ -375,7 +390,7 @@ class Vehicle:
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
-        return self.layout.usual_inputs | self.layout.driving(axis, command)
+        return self.layout.usual_inputs | self.layout.commands_along(axis, command)
 
     def force(self, axis: Axis, command: float) -> float:
         """Return the steady thrust (N) or torque (N.m) along an axis before the tuning α: (9), (10), (4)."""
@@ -383,7 +398,7 @@ class Vehicle:
 
     def along(self, axis: Axis, F: Values) -> float:
         """Return the thrust (N) or torque (N.m) along an axis of thrusters with some forces, N."""
-        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.drivers(axis))
+        return sum(self.effect(t, axis) * F[t.name] for t in self.layout.thrusters_along(axis))
 
     def side_effects(self, axis: Axis, command: float) -> Iterator[tuple[Axis, float]]:
         """Yield the other axes that a command of an axis pushes, with the force (N) or torque (N.m) along them.
@@ -392,7 +407,7 @@ class Vehicle:
         """
         F = self.commanded(self.held_inputs(axis, command))
         for other in (form.axis for form in self.layout.axes if form.axis is not axis):
-            pushes = [self.effect(t, other) * F[t.name] for t in self.layout.drivers(other)]
+            pushes = [self.effect(t, other) * F[t.name] for t in self.layout.thrusters_along(other)]
             if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
                 yield other, sum(pushes)
 
@@ -400,13 +415,19 @@ class Vehicle:
         """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
 
-    def held(self, axis: Axis, command: float) -> AxisAlone:
+    def motion_at(self, axis: Axis, command: float) -> AxisAlone:
         """Return the motion of an axis alone, (18), under a held command, once the thrust is steady."""
         return self.alone(axis, self.held_inputs(axis, command))
 
     def response(self, axis: Axis, command: float) -> tuple[float, float]:
-        """Return the signed V_ss, and Tau (17) from rest in s, in closed form."""
-        motion = self.held(axis, command)
+        """Return the signed V_ss (m/s or rad/s), and Tau (17) from rest in s, in closed form.
+
+        - `axis`: an axis of the vehicle, such as HEAVE; the others are at rest.
+        - `command`: a fraction from -1 to 1 of all commands that drive it; positive is its positive direction.
+
+            load_vehicle(SHIPPED["videoray"]).response(HEAVE, 0.3)  # (0.1750, 2.209), as in Table 6
+        """
+        motion = self.motion_at(axis, command)
         return motion.steady_velocity(), motion.time_constant()
 
 
@@ -447,7 +468,10 @@ def _contradictions(layout: Layout, coefficients: Mapping[str, float]) -> Iterat
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     """Read a vehicle file. Raises VehicleFileError, and warns about numbers that are probably wrong.
 
-    `coming` is the path of a report that is about to be written, so it need not exist yet.
+    - `path`: the file. `find_vehicle("bluerov2")` gives the path of one that ships.
+    - `coming`: the path of a report that is about to be written, so it need not exist yet.
+
+        load_vehicle(find_vehicle("videoray"))["m_rov"]  # kg
     """
     path = Path(path)
     return read_vehicle(path, read_bytes(path, VehicleFileError, most=LARGEST), coming=coming)

@@ -10,7 +10,8 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Curve, Driven, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import EVERY_COMMAND, Actuator, Curve
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
@@ -61,7 +62,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
             for t in layout.thrusters
         ],
         "fin": [{"name": fin.name, "description": fin.description, **_vectors(fin)} for fin in layout.fins],
-        "axes": {name: {} for name in layout.kinds},
+        "axes": {name: {} for name in layout.by_name},
         "cross": {},
         "inputs": layout.mix,
         "alternatives": {name: one.model_dump() for name, one in vehicle.alternatives.items()},
@@ -107,14 +108,14 @@ def _curve(curve: Curve) -> dict[str, Any]:
     return {
         "description": curve.description,
         "equation": curve.equation,
-        "together": curve.together if curve.together != 1 else None,
+        "together": curve.n_thrusters if curve.n_thrusters != 1 else None,
         "table": tables[0]["table"] if len(tables) == 1 else None,
         "tables": tables if len(tables) > 1 else None,
         "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
     }
 
 
-def _vectors(driven: Driven) -> dict[str, Any]:
+def _vectors(driven: Actuator) -> dict[str, Any]:
     """Return the tables of the direction and the position of a thruster or a fin."""
     at = driven.position
     position = at and {"value": at.value, "unit": "m", "source": at.source}

@@ -117,7 +117,7 @@ def test_every_kind_of_vehicle_gives_a_valid_file_or_one_line(name: str) -> None
         return
     text = gazebo_model(vehicle, in_world=True).text
     check_model(root_of(text))
-    if "heave" not in vehicle.layout.kinds:
+    if "heave" not in vehicle.layout.by_name:
         gazebo = Gazebo(text)
         assert 1000.0 * gazebo.volume == pytest.approx(vehicle["m_rov"]), "it stays in its depth"
 
@@ -207,7 +207,7 @@ def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(
     rov = LOADED[name]
     gazebo = Gazebo(gazebo_model(rov, in_world=True).text)
     for form in rov.layout.axes:
-        if not rov.layout.drivers(form.axis):
+        if not rov.layout.thrusters_along(form.axis):
             continue
         V_ss, Tau = rov.response(form.axis, command)
         newtons = newtons_of(gazebo, rov, rov.commanded(rov.held_inputs(form.axis, command)))

@@ -47,7 +47,7 @@ def test_the_complete_rov_toml_makes_a_vehicle(tmp_path: Path) -> None:
     found = identify(read(tmp_path, example, tables))
     assert [result.axis.name for result in found.axes] == ["surge", "heave", "yaw"]
     assert found.vehicle["m_rov"] == 8.2
-    assert found.vehicle.layout.drivers(found.axes[2].axis)
+    assert found.vehicle.layout.thrusters_along(found.axes[2].axis)
 
 
 def test_the_inertia_of_the_example_is_right() -> None:

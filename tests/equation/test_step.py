@@ -5,8 +5,8 @@ from math import cos, isfinite, sin
 import pytest
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation import step as module
 from rov_fmu.equation.catalogue import SWAY
+from rov_fmu.equation.python import step as module
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine, in_python, worst

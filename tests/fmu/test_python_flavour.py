@@ -20,7 +20,7 @@ from fmpy.validation import validate_fmu
 
 from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.step import Change
+from rov_fmu.equation.python.step import Change
 from rov_fmu.fmu.content import python_content
 from rov_fmu.fmu.python_flavour import python_sources
 from rov_fmu.fmu.slave import Rov

@@ -8,7 +8,7 @@ import fmpy
 import pytest
 from lxml import etree
 
-from rov_fmu.equation.layout import Range
+from rov_fmu.equation.parts import Range
 from rov_fmu.fmu.content import Content, native_content, python_content
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import variables

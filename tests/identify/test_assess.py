@@ -26,7 +26,7 @@ def of_drag(deviation: float, gain: float) -> Posterior:
 def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() -> None:
     """V_ss and Tau follow 0.7 of a slow change of thrust; the file has other curves than the fit, and none is exact."""
     uncertain, file = of_drag(0.04, 0.05), VIDEORAY.with_(b_d_u=1.1 * VIDEORAY["b_d_u"])
-    axis = VIDEORAY.layout.kinds["surge"]
+    axis = VIDEORAY.layout.by_name["surge"]
 
     def numbers(rov: Vehicle, command: float) -> np.ndarray:
         V, Tau = rov.response(SURGE, command)

@@ -11,7 +11,8 @@ from scipy.stats import t
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.fmu.card import card
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
 from rov_fmu.report.console_results import print_tuning

@@ -168,7 +168,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace("[axes.yaw]", "")  # its column may stay
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
     (tmp_path / "rov.toml").write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
-    assert [*load_tests(tmp_path).given.vehicle.layout.kinds] == ["heave"]
+    assert [*load_tests(tmp_path).given.vehicle.layout.by_name] == ["heave"]
 
 
 def test_a_log_in_another_language_lacks_only_what_units_do_not_tell(tmp_path: Path, inspect: Inspect) -> None:

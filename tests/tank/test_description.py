@@ -45,7 +45,7 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", run(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
-    assert tests.given.vehicle.layout.kinds["heave"].keys == ("m_a", "a_d", "b_d")
+    assert tests.given.vehicle.layout.by_name["heave"].keys == ("m_a", "a_d", "b_d")
     assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.given.known}
     found = identify(tests).vehicle
     for name in ("a_d_w", "b_d_w", "beta_w"):
@@ -81,8 +81,8 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
         limits = LIMITS.format(-1, 1, 0.2, 0.21, 0, 1e4, 1e4)
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}{limits}', responses(k, SWAY))
-        assert [*tests.given.vehicle.layout.kinds] == ["surge", "sway", "heave", "yaw"]
-        assert tests.given.vehicle.layout.kinds["sway"].keys == keys
+        assert [*tests.given.vehicle.layout.by_name] == ["surge", "sway", "heave", "yaw"]
+        assert tests.given.vehicle.layout.by_name["sway"].keys == keys
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
     assert folder / "old.toml" in inputs
@@ -146,7 +146,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     header = ",".join([*names, "surge distance [m]", "depth [m]"])
     tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
     tests = read(tmp_path, f"{rov}[axes.heave]\n", tables)
-    assert [*tests.given.vehicle.layout.kinds] == tests.tested.logs == ["surge"]
+    assert [*tests.given.vehicle.layout.by_name] == tests.tested.logs == ["surge"]
     assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.findings
     assert any(
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line

@@ -114,6 +114,12 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         HEAVE_ALONE,
         "/rov.toml: curves.t200: a_t_t200 is given, but b_t_t200 is not",
     ),
+    (
+        DOWN.replace("t200", "x") + DOWN[DOWN.index("[curves") :].replace("t200", "x_reverse").replace('"v"', '"w"'),
+        {},
+        "/rov.toml: curves.x_reverse.a_t: has the name a_t_x_reverse in the FMU, which curves.x.a_t_reverse has too"
+        " | : no thrust_x*.csv | : no thrust_x_reverse*.csv",
+    ),
     (DOWN + f"[body]\n{MASS}", WITH_THRUST, "/rov.toml: known.m_rov: is given in [body] too"),
     (DOWN.replace(MASS, ""), WITH_THRUST, "/rov.toml: body.m_rov: this key is missing, and the vehicle has he"),
     (
@@ -296,7 +302,7 @@ def test_any_rov_toml_leads_to_a_vehicle_or_clear_lines(rov: str, examples: int,
             return
         layout = given.vehicle.layout
         assert [*check_layout(layout)] == []
-        assert {"surge", "yaw"} <= layout.kinds.keys()
+        assert {"surge", "yaw"} <= layout.by_name.keys()
         assert given.vehicle.coefficients.keys() == layout.coefficients.keys() >= given.known.keys()
         assert all(isfinite(value) for value in given.vehicle.coefficients.values())
         assert all(thruster.direction.source for thruster in layout.thrusters)

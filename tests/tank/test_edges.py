@@ -5,7 +5,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.equation.catalogue import AXES, HEAVE
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.csv_table import DataFileError, read_columns
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import Names, columns_of, columns_of_log, known_columns

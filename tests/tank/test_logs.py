@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import SENTENCES, sentences

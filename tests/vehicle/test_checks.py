@@ -101,6 +101,24 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         + "\n".join(f"thruster.{n}.curve … there is no such curve, only '', {'x' * 193}..." for n in "12345lr"),
     ),
     "a curve of no thruster": ({"curves.spare": _CURVE}, "curves.spare: no thruster has this curve"),
+    "two coefficients of one name": (
+        {
+            **{"curves.boost": GONE, "curves.frame_reverse": _CURVE},
+            **{f"thruster.{name}.curve": "frame_reverse" for name in "lr"},
+        },
+        "curves.frame_reverse.a_t: has the name a_t_frame_reverse in the FMU, which curves.frame.a_t_reverse has",
+    ),
+    "a lag with the name of the dead time": (
+        {
+            **{"commands": {"T_d": quantity(0.1, "s")}, "curves.boost": GONE},
+            **{"curves.d": {**_CURVE, "T": quantity(0.1, "s")}, "thruster.l.curve": "d", "thruster.r.curve": "d"},
+        },
+        "curves.d.T: has the name T_d in the FMU, which commands.T_d has too: rename one of them",
+    ),
+    "a thrust with the name of a load": (
+        {**_ALONE, "thruster.1.name": "0_w"},
+        "axes.heave.F_0: has the name F_0_w in the FMU, which thruster.0_w has too: rename one of them",
+    ),
     **{
         f"identifier {name}, which Windows reserves": (
             {"vehicle.identifier": name},

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Declaration
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.report.published import Cell
 from rov_fmu.vehicle.geometry import check_mass
 from rov_fmu.vehicle.quantity import derivative_hint, within

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE
-from rov_fmu.equation.layout import CurrentTable
+from rov_fmu.equation.parts import CurrentTable
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust

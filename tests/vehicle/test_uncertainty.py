@@ -13,7 +13,6 @@ from scipy.stats import kstest, norm, qmc, spearmanr
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.equation.layout import Curve
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.vehicle.schema import Estimated
@@ -23,7 +22,6 @@ from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
 from tests.identify.scenarios.catalogue import USUAL
 from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
-from tests.vehicles import VIDEORAY
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
 
@@ -106,19 +104,6 @@ def test_tuning_removes_the_estimate_and_keeps_the_others(refit: Vehicle, tmp_pa
     assert all(row.correlation.keys() <= flat.estimates.keys() for row in flat.estimates.values())
     write_tuned(FROZEN_REFIT, path, {name: 1.01 * refit[name] + 0.1 for name in refit.estimates}, "a test")
     assert "estimates" not in path.read_text(encoding="utf-8")
-
-
-def test_coefficients_stay_with_their_curve_where_names_collide() -> None:
-    """Thrust astern of the curve `main` has the name of the curve `main_reverse`, which then gets a number."""
-    names, keys = {"rear": "main", "top": "main_reverse"}, ("a_t", "b_t")
-    thrusters = tuple(replace(t, curve=names[t.curve]) for t in VIDEORAY.layout.thrusters)
-    curves = Curve("main", (*keys, "a_t_reverse", "b_t_reverse")), Curve("main_reverse", keys)
-    both = replace(VIDEORAY.layout, thrusters=thrusters, curves=curves)
-    plain = replace(both, curves=(Curve("main", keys), curves[1]))
-    vehicle = Vehicle(both, {name: float(n) for n, name in enumerate(both.coefficients)})
-    found = vehicle.with_(plain)
-    assert (vehicle["a_t_main_reverse_2"], found["a_t_main_reverse"]) == (8.0, 8.0)
-    assert found.with_(both).coefficients.items() <= vehicle.coefficients.items()
 
 
 BAD: dict[str, tuple[Callable[[str], str], str]] = {

@@ -23,8 +23,8 @@ WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT,
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
     assert vehicle.coefficients == TABLE_9
     layout, ahead = vehicle.layout, (1.0, 0.0, 0.0)
-    assert [*layout.kinds] == ["surge", "heave", "yaw"]
-    assert {curve.name: (curve.keys, curve.together) for curve in layout.curves} == {
+    assert [*layout.by_name] == ["surge", "heave", "yaw"]
+    assert {curve.name: (curve.keys, curve.n_thrusters) for curve in layout.curves} == {
         "rear": (("a_t", "b_t"), 2),
         "top": (("a_t", "b_t"), 1),
     }
@@ -50,7 +50,7 @@ def test_a_turn_pushes_ahead_where_thrust_astern_is_weaker(vehicle: Vehicle) -> 
     assert [*weaker(0.999).side_effects(YAW, 0.5), *vehicle.side_effects(SURGE, 0.5)] == []
     assert (
         replace(vehicle, coefficients={**vehicle.coefficients, "beta_w": 0.0}).effective_inertia(
-            vehicle.layout.kinds["heave"]
+            vehicle.layout.by_name["heave"]
         )
         == inf
     )

@@ -7,7 +7,7 @@ from random import Random
 
 import pytest
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle

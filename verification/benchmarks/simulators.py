@@ -34,7 +34,7 @@ _FLUID = """<mujoco>
 
 def section(vehicle: Vehicle, repetitions: int) -> Section:
     """Return the times of a step of 1 ms on one core, the errors after 10 s, and MuJoCo's own fluid."""
-    command = vehicle.layout.driving(SURGE, 0.3)
+    command = vehicle.layout.commands_along(SURGE, 0.3)
     rov = load(vehicle)
     rov.model.opt.timestep = H
     for name, value in command.items():
@@ -117,7 +117,7 @@ def _own_fluid(vehicle: Vehicle, model: Any) -> tuple[float, float]:
     data = mujoco.MjData(model)
     data.xfrc_applied[1, 0] = _PUSH
     mujoco.mj_forward(model, data)
-    quick = data.qacc[0] * vehicle.effective_inertia(vehicle.layout.kinds["surge"]) / _PUSH
+    quick = data.qacc[0] * vehicle.effective_inertia(vehicle.layout.by_name["surge"]) / _PUSH
     data.xfrc_applied[1, 0] = vehicle.force(SURGE, 0.3) * vehicle["alpha_u"]
     for _ in range(round(20.0 / H)):
         mujoco.mj_step(model, data)

@@ -12,7 +12,7 @@ from typing import Any
 from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.equation.layout import Curve, Thruster, ThrustTable
+from rov_fmu.equation.parts import Curve, Thruster, ThrustTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # a float, or a number of mpmath or gmpy2
@@ -146,7 +146,7 @@ def thrust(rov: Vehicle, curve: Curve, command: Number, voltage: Number = mp.zer
             break
     else:
         force = measured[0] if voltage < curve.tables[0].voltage else measured[-1]
-    return mp.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.together
+    return mp.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.n_thrusters
 
 
 def _interpolated(table: ThrustTable, command: Number) -> Number:
@@ -171,7 +171,7 @@ def _quadratic(rov: Vehicle, curve: Curve, command: Number) -> Number:
     beyond = abs(command) - (number("c_0") if "c_0" in keys else 0)
     if beyond <= 0:
         return mp.zero
-    size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.together
+    size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.n_thrusters
     return -size if reverse else size
 
 

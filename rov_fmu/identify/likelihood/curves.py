@@ -19,7 +19,8 @@ from scipy.interpolate import CubicSpline
 from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, stopping_formula
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.equation.expression import ARRAYS, array_functions, compiled
-from rov_fmu.equation.layout import Curve, Layout, ThrustTable
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, ThrustTable
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas
 from rov_fmu.tank.arrays import Array
@@ -114,13 +115,13 @@ class Shapes:
         values: dict[str, Any] = {**vehicle.coefficients, **vehicle.layout.usual_inputs}
         values["u_one"] = _column(self.commands(curve.name, commands), vehicle)
         *_, force = _thrust_of(curve)(values).values()
-        return np.asarray(curve.together * force)
+        return np.asarray(curve.n_thrusters * force)
 
     def motions(self, vehicle: Vehicle, axis: Axis, commands: Array) -> "Motions":
         """Return the equation of an axis alone under each of m held commands, once the thrust is steady."""
         layout = vehicle.layout
         inputs: dict[str, Any] = dict(layout.usual_inputs)
-        driving = [layout.driving(axis, command) for command in commands.tolist()]
+        driving = [layout.commands_along(axis, command) for command in commands.tolist()]
         for name in driving[0]:
             acting = np.array([of_command[name] for of_command in driving])
             if curve := layout.curve_of.get(name.removeprefix("u_")):

@@ -27,7 +27,8 @@ import numpy as np
 from rov_fmu.c.filter import DivergedError, Filter, Run
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -65,7 +66,7 @@ class TableRow:
         """Return True if a parameter changes the value by the model."""
         parts = {self.subject.name}
         if not isinstance(self.subject, Curve):
-            parts |= {"", *(thruster.curve for thruster in layout.drivers(self.subject))}
+            parts |= {"", *(thruster.curve for thruster in layout.thrusters_along(self.subject))}
         return parameter.of_motion and parameter.of in parts
 
 
@@ -85,7 +86,7 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
             continue
         motions = shapes.motions(vehicle, subject, commands)
         V_ss, Tau = motions.response()
-        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.drivers(subject)}
+        curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(subject)}
         lags = [vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag]
         lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
         if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
@@ -248,7 +249,7 @@ class Objective:
         one = self.logs[number]
         if parameter.log is not None:
             return parameter.of == one.log.file
-        axes, curves = one.layout.kinds, {curve.name for curve in one.layout.curves}
+        axes, curves = one.layout.by_name, {curve.name for curve in one.layout.curves}
         if parameter.kind == "row noise" or parameter.low == parameter.high:
             return False
         if parameter.kind in ("white noise", "coloured noise", "correlation time"):

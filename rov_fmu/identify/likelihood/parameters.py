@@ -15,7 +15,8 @@ import numpy as np
 
 from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.equation.catalogue import CURVE, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
-from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.result import PLACED
@@ -301,7 +302,7 @@ class Table:
             coloured = self.get(z, "coloured noise", quantity) * sigma
             noise.append(Slow(coloured, self.get(z, "correlation time", quantity, default=1.0)))
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
-        is_inside = HEAVE.name in layout.kinds
+        is_inside = HEAVE.name in layout.by_name
         return Parameters(
             coefficients=found,
             forces=tuple(Slow(units[a.name] * self.get(z, "slow force", a.name), SLOW["slow force"]) for a in axes),
@@ -468,7 +469,7 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
         free = {*known.layout.coefficients} - known.exact
         if axis in known.fitted and axis.coefficient(f"a_d{REVERSE}") in free:
             yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
-        if (load := known.layout.kinds[name].coefficient("F_0")) in free and known.full[name]:
+        if (load := known.layout.by_name[name].coefficient("F_0")) in free and known.full[name]:
             null = -c[load] / known.full[name]
             yield Parameter("load", name, deviation=prior("load"), null=null)
 

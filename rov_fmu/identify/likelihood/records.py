@@ -150,7 +150,7 @@ def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
     begin, end = float(log.commands.rows[0]), log.commands.end
     for channel in log.channels:
         axis = channel.quantity.axis
-        if channel.unused or axis is None or axis.name not in layout.kinds or (log.axis and axis is not log.axis):
+        if channel.unused or axis is None or axis.name not in layout.by_name or (log.axis and axis is not log.axis):
             continue
         inside = channel.there & (channel.time >= begin) & (channel.time <= end)
         yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel)[inside])
@@ -180,7 +180,7 @@ def _without_thrust(log: Log, layout: Layout, axis: Axis, slows_down: bool) -> s
     each direction. For the thrusters of one curve, the sum of one of these terms must change. In a log of one command,
     a constant thrust is enough, because the vehicle starts from rest.
     """
-    commands, drivers = log.commands, layout.drivers(axis)
+    commands, drivers = log.commands, layout.thrusters_along(axis)
     assert commands
     if log.follows_axis and commands.value.any():
         return ""
@@ -258,7 +258,7 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
     if log.follows_axis:
         assert log.axis
         for row, command in enumerate(values[:, 0]):
-            for name, value_of in layout.driving(log.axis, command).items():
+            for name, value_of in layout.commands_along(log.axis, command).items():
                 inputs[row, names.index(name)] = value_of
     else:
         for column, thruster in zip(values.T, commands.thrusters, strict=True):

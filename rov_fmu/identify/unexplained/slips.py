@@ -122,7 +122,7 @@ def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -
     for axis in known.fitted:
         place = objective.table.place("inertia", axis.name)
         if place is not None and not axis.is_rotation:
-            inertia = vehicle.effective_inertia(vehicle.layout.kinds[axis.name])
+            inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
             yield axis, float(np.log(inertia / vehicle[axis.inertia])), float(errors[place])
 
 

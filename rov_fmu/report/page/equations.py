@@ -10,24 +10,22 @@ from markupsafe import escape
 
 from rov_fmu.equation.catalogue import REVERSE, YAW, delayed_name
 from rov_fmu.equation.expression import (
-    MATHML,
-    TEXT,
     Expression,
     Name,
     Number,
     Operation,
     call,
-    collected,
     product,
     replaced,
-    scaled,
     total,
     written,
 )
 from rov_fmu.equation.forces import COUPLING, forces_of
-from rov_fmu.equation.layout import Curve, Layout, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis
 from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
 from rov_fmu.equation.thrust import steady_name
+from rov_fmu.report.page.typeset import MATHML, TEXT, collected
 from rov_fmu.report.templates import number
 
 
@@ -112,7 +110,7 @@ def equations_of(layout: Layout) -> Equations:
             return line(Name(form.axis.inertia) * _rate(v), right, form.axis.equations[1])
         if layout.coupled:
             munk = [(sign, _entry(*entry), pair) for pair, own in mass.products(v).items() for sign, entry in own]
-            loads += [scaled(sign, product(entry, *map(Name, pair))) for sign, entry, pair in munk]
+            loads += [sign * product(entry, *map(Name, pair)) for sign, entry, pair in munk]
         partners = {b if a == v else a: _entry(a, b) for a, b in mass.entries if v in (a, b)}
         masses = {v: _entry(v, v), **partners}
         left = total(entry * _rate(axis) for axis, entry in masses.items() if axis in layout.by_velocity)
@@ -128,7 +126,7 @@ def equations_of(layout: Layout) -> Equations:
         shown = [line(steady, _with_sign(replaced(equation.thrust[steady.identifier], formulas)), curve.equation)]
         shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
         lag = [line(Name(curve.coefficient("T")) * _rate(force.identifier), steady - force)] if curve.has_lag else []
-        by_arm = any(t.position is None for t in layout.drivers(YAW) if t in thrusters)
+        by_arm = any(t.position is None for t in layout.thrusters_along(YAW) if t in thrusters)
         tau = Name(f"tau_{curve.name}")
         turning = equation.forces.get(tau.identifier)
         torque = [] if turning is None else [line(tau, turning, "(4)" if by_arm else "")]

@@ -102,7 +102,7 @@ def documentation_page(
         parts=equations.parts_in_mathml,
         choices=equations.choices,
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
-        live=live([Flown(vehicle, module)]) if module and layout.driven else None,
+        live=live([Flown(vehicle, module)]) if module and layout.actuators else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",

@@ -14,7 +14,8 @@ from markupsafe import Markup
 
 from rov_fmu.c.compile import MODULE_SOURCES
 from rov_fmu.equation.catalogue import PITCH, ROLL, Axis
-from rov_fmu.equation.layout import Layout, Thruster
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Thruster
 from rov_fmu.fmu.variables import variables
 from rov_fmu.report.plots.geometry import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis

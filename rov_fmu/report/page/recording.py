@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import EXTERNAL
-from rov_fmu.equation.layout import Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.arrays import Array
@@ -51,7 +52,7 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     start, end = float(log.commands.rows[0]), log.commands.end
     signals = [*_signals(log, vehicle.layout.axes, start, end)]
     if not signals:
-        names = ", ".join(vehicle.layout.kinds)
+        names = ", ".join(vehicle.layout.by_name)
         raise DataFileError(f"{path}: no motion of an axis of this vehicle was found: {names}")
     begin = min([start, *(float(c.samples[0][0]) for c in log.channels if not c.unused and c.count)])
     forces = [*_add_identified(identified, log, vehicle.layout, signals, begin - start)] if identified else []

@@ -9,7 +9,7 @@ from itertools import product
 from math import atan2, copysign, cos, hypot, sin
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
-from rov_fmu.equation.layout import Thruster
+from rov_fmu.equation.parts import Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Point = tuple[float, float, float]

@@ -188,7 +188,7 @@ class _Reader:
         finally:
             self._depth -= 1
 
-    def _read(self, node: ast.expr) -> ast.expr:  # noqa: PLR0911, PLR0912 (a case for each kind of syntax)
+    def _read(self, node: ast.expr) -> ast.expr:  # noqa: C901, PLR0911, PLR0912 (a case for each kind of syntax)
         match node:
             case ast.Constant(value=int() | float() as value):
                 return _constant(value)

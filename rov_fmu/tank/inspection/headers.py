@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
-from rov_fmu.equation.layout import Curve, Layout, SourcedVector, Thruster, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (

@@ -5,7 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import FAINT, Layout, Thruster
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import FAINT, Thruster
 from rov_fmu.io.messages import InputError, listed, only
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding, about

@@ -210,7 +210,7 @@ def _no_commands(
 
 def _no_axis_in_name(path: Path, layout: Layout) -> str:
     """Explain that the name of a file does not contain an axis of the vehicle."""
-    axes, word = [*layout.kinds], path.stem.lower().partition("_")[2].partition("_")[0]
+    axes, word = [*layout.by_name], path.stem.lower().partition("_")[2].partition("_")[0]
     names = " or ".join(f"log_{name}*{path.suffix}" for name in axes)
     hint = did_you_mean(word, axes)
     return f"{word or repr('')} is not an axis of this vehicle: the name of the file must be {names}{hint}"

@@ -8,8 +8,7 @@ import math
 import pytest
 
 from rov_fmu.equation.expression import (
-    MATHML,
-    TEXT,
+    ZERO,
     Expression,
     Language,
     Name,
@@ -19,16 +18,16 @@ from rov_fmu.equation.expression import (
     compiled,
     directed,
     equal,
-    minus,
     product,
     saturated,
-    scaled,
     tangent,
     to_c,
     total,
     where,
+    with_positive_zero,
     written,
 )
+from rov_fmu.report.page.typeset import MATHML, TEXT
 
 a, b, c, d = map(Name, "abcd")
 
@@ -45,19 +44,60 @@ a, b, c, d = map(Name, "abcd")
         (beyond_dead_band(a, b, c), "a < 0.0 || (a == 0.0 && b > 0.0) ? 0.0 : c"),
         (a - b - (c - d) + (a + b), "a - b - (c - d) + (a + b)"),
         (a / b / (c / d) * (a * b), "a / b / (c / d) * (a * b)"),
-        (-(a + b) - -c * -(a * b), "-(a + b) - -c * -(a * b)"),
+        (-(a + b) - c * -(a + b), "-(a + b) - c * -(a + b)"),
         (where(a + b > c * d, a, b) + c, "(a + b > c * d ? a : b) + c"),
         (where(equal(a, -1.5), math.inf, 2.0) * where(a >= b, a, c), "(a == -1.5 ? INFINITY : 2.0) * (a >= b ? a : c)"),
         (total([a, -b * c, -(b * c), -(a / b) / c, d]), "a - b * c - b * c - a / b / c + d"),
-        (total([]) + product() + product(a, 2.0, b), "0.0 + 1.0 + a * 2.0 * b"),
-        (scaled(-2.0, a * b) + scaled(1.0, a / b) + scaled(0.5, a + b), "-2.0 * a * b + a / b + 0.5 * (a + b)"),
-        (scaled(-1.0, a * b) + minus(-a), "-a * b + a"),
+        (total([]) + product() + product(a, 2.0, b), "1.0 + a * 2.0 * b"),
+        (-2.0 * (a * b) + 1.0 * (a / b) + 0.5 * (a + b), "-2.0 * a * b + a / b + 0.5 * (a + b)"),
         (where(where(b < c, a, b) < 1.0, 1.0, 2.0), "(b < c ? a : b) < 1.0 ? 1.0 : 2.0"),
         (where(b >= c, where(a < b, 1.0, 2.0), 3.0), "b >= c ? (a < b ? 1.0 : 2.0) : 3.0"),
     ],
 )
 def test_c_has_the_brackets_that_it_needs(expression: Expression, in_c: str) -> None:
     assert to_c(expression) == in_c
+
+
+@pytest.mark.parametrize(
+    ("expression", "same"),
+    [
+        *(
+            (a + 0.0, a),
+            (0.0 + a, a),
+            (a - 0.0, a),
+            (0.0 - a, -a),
+            (a * 1.0, a),
+            (1.0 * a, a),
+            (a / 1.0, a),
+            (-1.0 * a, -a),
+        ),
+        *(
+            (a * 0.0, ZERO),
+            (0.0 * a, ZERO),
+            (0.0 / a, ZERO),
+            (-ZERO, ZERO),
+            (-(0.0 - a), a),
+            (a + -b, a - b),
+            (a - -b / c, a + b / c),
+        ),
+        *((-(a * b), -a * b), (-(a / b) * c, -a / b * c), (-1.0 * (a * b), -a * b), (a + -(b * c), a - b * c)),
+        *(
+            (where(a < b, c, c), c),
+            (directed(a, b, b), b),
+            (total([ZERO, a, ZERO]), a),
+            (product(1.0, a, -1.0), -a),
+        ),
+    ],
+)
+def test_operators_leave_out_what_0_and_1_and_minus_1_do_not_change(expression: Expression, same: Expression) -> None:
+    assert expression == same
+
+
+@pytest.mark.parametrize("x", [-0.0, 0.0, 1.5])
+def test_a_zero_is_made_positive(x: float) -> None:
+    found = compiled({"y": with_positive_zero(a)})({"a": x})["y"]
+    assert math.copysign(1.0, found) == 1.0
+    assert found == x
 
 
 @pytest.mark.parametrize("language", [TEXT, MATHML], ids=["text", "MathML"])
@@ -89,8 +129,7 @@ def test_two_quantities_never_have_the_same_identifier() -> None:
 )
 def test_the_derivative_of_an_expression_is_its_slope(expression: Expression) -> None:
     at, change = {"a": 0.7, "b": 1.3, "c": 0.4, "d": 2.1}, {"d_a": 0.3, "d_b": -0.5, "d_c": 0.9, "d_d": 0.2}
-    slope = tangent(expression, lambda name: Name(f"d_{name}"))
-    assert slope
+    slope = tangent(expression, {name: Name(f"d_{name}") for name in at})
 
     def moved(t: float) -> float:
         return float(compiled({"y": expression})({name: x + t * change[f"d_{name}"] for name, x in at.items()})["y"])

@@ -18,7 +18,7 @@ from rov_fmu.equation.catalogue import (
     cross_name,
     cross_of,
 )
-from rov_fmu.equation.layout import arm, effect_along
+from rov_fmu.equation.parts import arm, effect_along
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VIDEORAY, fin, pulsed, thruster, with_axes
 

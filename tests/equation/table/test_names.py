@@ -1,4 +1,4 @@
-"""The names of curves, thrusters, fins and inputs do not change the motion.
+"""The names of curves, thrusters, fins and inputs do not change the motion, unless two coefficients have one name.
 
 Random vehicles are renamed at random. Names from the equation itself, such as `max_rudder` and `main_1`, and words of C
 and Python are the most dangerous ones.
@@ -16,9 +16,11 @@ from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.c.simulation import simulate
 from rov_fmu.c.source import sources
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.equation.layout import Curve, Layout
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Curve
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.io.paths import FMU_SRC
+from rov_fmu.vehicle.checks import check_distinct_names
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.often import often
 from tests.vehicles import (
@@ -74,7 +76,7 @@ def random_rov(rng: random.Random) -> Vehicle:
     rov = rng.choice([*FILES, random_vehicle(rng), random_body(rng, "uvwpqr")])
     dropped = {(curve.name, key) for curve in rov.layout.curves for key in ("d", "T") if rng.random() < 0.3}
     layout = rov.layout.with_keys(
-        lambda part, key: key in part.keys and (part.owner, key.removesuffix("_reverse")) not in dropped
+        lambda part, key: key in part.keys and (part.suffix, key.removesuffix("_reverse")) not in dropped
     )
     layout = replace(layout, has_dead_time=layout.has_dead_time and rng.random() < 0.5)
     return Vehicle(layout, {name: rov[name] for name in layout.coefficients})
@@ -105,8 +107,8 @@ def random_names(rng: random.Random, layout: Layout) -> Names:
     return found
 
 
-def renamed(rov: Vehicle, names: Names) -> Vehicle:
-    """Return a vehicle with other names of its parts, and tables that are named after their curves."""
+def renamed(layout: Layout, names: Names) -> Layout:
+    """Return a layout with other names of its parts, and tables that are named after their curves."""
 
     def of(kind: str, name: str) -> str:
         return names.get(kind, {}).get(name, name)
@@ -116,18 +118,22 @@ def renamed(rov: Vehicle, names: Names) -> Vehicle:
         tables = tuple(replace(table, name=f"{table.name.partition('_')[0]}_{new}") for table in curve.tables)
         return replace(curve, name=new, tables=tables)
 
-    layout = replace(
-        rov.layout,
-        curves=tuple(map(named, rov.layout.curves)),
+    return replace(
+        layout,
+        curves=tuple(map(named, layout.curves)),
         thrusters=tuple(
-            replace(one, name=of("driven", one.name), curve=of("curves", one.curve)) for one in rov.layout.thrusters
+            replace(one, name=of("driven", one.name), curve=of("curves", one.curve)) for one in layout.thrusters
         ),
-        fins=tuple(replace(one, name=of("driven", one.name)) for one in rov.layout.fins),
+        fins=tuple(replace(one, name=of("driven", one.name)) for one in layout.fins),
         mix={
             of("inputs", name): {of("driven", one): gain for one, gain in gains.items()}
-            for name, gains in rov.layout.mix.items()
+            for name, gains in layout.mix.items()
         },
     )
+
+
+def moved(rov: Vehicle, layout: Layout) -> Vehicle:
+    """Return the vehicle with a layout that only has other names."""
     return Vehicle(layout, dict(zip(layout.coefficients, rov.coefficients.values(), strict=True)))
 
 
@@ -175,7 +181,7 @@ def check_python(rng: random.Random, plain: Vehicle, other: Vehicle) -> None:
         return [*found.after.values(), *np.hstack([found.states, found.inputs, found.coefficients]).flat]
 
     same(jacobian)
-    driven = [form.axis for form in plain.layout.axes if plain.layout.drivers(form.axis)]
+    driven = [form.axis for form in plain.layout.axes if plain.layout.thrusters_along(form.axis)]
     same(lambda rov, *_: [x for axis in driven for c in (0.4, -0.7) for x in rov.response(axis, c)])
 
 
@@ -193,32 +199,30 @@ Check = Callable[[random.Random, Vehicle, Vehicle], None]
 IN_TEXT: tuple[Check, ...] = (lambda _, plain, other: check_c(plain, other), check_python)
 
 
-SHOWN: dict[str, tuple[Names, tuple[str, ...]]] = {
-    "a table of one curve and the second table of another": ({"curves": {"bow": "main_1"}}, ()),
-    "a loss of thrust and the change of a velocity": ({"curves": {"bow": "v"}}, ()),
-    "a force that begins like a force": ({"driven": {"l": "F_1", "top": "F_F_1"}}, ()),
-    "two fins": ({"driven": {"top": "t", "rudder": "max_rudder", "keel": "rudder"}}, ()),
-    "two curves, one in reverse": ({"curves": {"bow": "main_reverse"}}, ("d_main_reverse_2",)),
-    "a lag and the dead time": ({"curves": {"main": "d"}}, ("T_d_2",)),
-    "a thrust and a load": ({"driven": {"l": "0_w"}}, ("F_0_w_2",)),
+ALIKE: dict[str, Names] = {
+    "a table of one curve and the second table of another": {"curves": {"bow": "main_1"}},
+    "a loss of thrust and the change of a velocity": {"curves": {"bow": "v"}},
+    "a force that begins like a force": {"driven": {"l": "F_1", "top": "F_F_1"}},
+    "two fins": {"driven": {"top": "t", "rudder": "max_rudder", "keel": "rudder"}},
 }
-"""For each case, new names of parts, and the coefficients that get a number in the FMU."""
+"""New names of parts that make quantities of the equation alike."""
 
 
-@pytest.mark.parametrize("name", SHOWN)
-def test_equal_names_get_a_number(name: str) -> None:
-    names, numbered = SHOWN[name]
-    other = renamed(KEELED, names)
+@pytest.mark.parametrize("name", ALIKE)
+def test_quantities_that_are_named_alike_stay_different(name: str) -> None:
+    other = moved(KEELED, renamed(KEELED.layout, ALIKE[name]))
     for check in IN_TEXT:
         check(random.Random(1), KEELED, other)
-    assert tuple(name for name in other.coefficients if name.endswith("_2")) == numbered
 
 
 @often("vehicles", 1, 12, 300)
 def test_random_names_change_nothing(vehicles: int) -> None:
-    rng = random.Random(8 + vehicles)
-    for _ in range(vehicles):
+    rng, compared = random.Random(8 + vehicles), 0
+    while compared < vehicles:
         plain = random_rov(rng)
-        other = renamed(plain, random_names(rng, plain.layout))
+        layout = renamed(plain.layout, random_names(rng, plain.layout))
+        if any(check_distinct_names(layout)):  # a vehicle file with these names is refused
+            continue
+        compared += 1
         for check in (*IN_TEXT, check_engine) if vehicles == 12 else IN_TEXT:
-            check(rng, plain, other)
+            check(rng, plain, moved(plain, layout))

@@ -14,7 +14,7 @@ from fmpy.fmi2 import fmi2EventInfo
 from lxml import etree
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.step import MOST_WAITING
+from rov_fmu.equation.python.step import MOST_WAITING
 from tests import fmi3
 from tests.equation.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, MODEL_EXCHANGE, WARNING, WITH_EVENTS, AnyInstance, Fmu, reals

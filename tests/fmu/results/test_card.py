@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.fmu.card import card, card_text, read_card
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle

@@ -10,7 +10,7 @@ import pytest
 from mpmath import mp
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.layout import EVERY_COMMAND
+from rov_fmu.equation.parts import EVERY_COMMAND
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests import fmi2, fmi3

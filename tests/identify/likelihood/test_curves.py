@@ -8,7 +8,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.equation.layout import Curve
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, nearest
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.vehicle.shipped import SHIPPED

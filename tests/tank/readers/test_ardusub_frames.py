@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.equation.layout import Layout, Thruster
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Thruster
 from rov_fmu.io.messages import InputError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import MISFITS as KINDS

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.layout import BodyForce, Layout, VehicleAxis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import BodyForce, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.commands import Commanded, LogKeys, Parameters, commands_of, wrench_of

@@ -100,7 +100,7 @@ class Simulated:
         thrusters = {t.name: np.zeros(len(switches)) for t in k.layout.thrusters}
         for axis in self.axes:
             sticks = self.strength * random.uniform(-1.0, 1.0, len(switches)) * (random.random(len(switches)) < 0.6)
-            for name, sign in k.layout.driving(axis, 1.0).items():
+            for name, sign in k.layout.commands_along(axis, 1.0).items():
                 thrusters[name.removeprefix("u_")] += sign * sticks
         commands = Commands(switches, {name: np.clip(c, -1.0, 1.0) for name, c in thrusters.items()})
         simulate = rigid_pool.motion if k.layout.has_attitude else pool.motion

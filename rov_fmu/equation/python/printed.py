@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
 
-from .attitude import QUATERNION, entry, quaternion_rates, start_formulas
-from .catalogue import AXES
-from .expression import FUNCTIONS, PYTHON, Expression, Name, call, of, replaced, total, written
-from .layout import Layout
+from ..attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from ..catalogue import AXES
+from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
+from ..layout import Layout
+from ..terms import Equation, equation_of, mass_matrix, rate_formula
 from .step import interpolated
-from .terms import Equation, equation_of, mass_matrix, rate_formula
 
 _FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
 
@@ -118,8 +118,7 @@ def accelerations_text(layout: Layout) -> str:
     equation = equation_of(layout)
     every = [axis.velocity for axis in AXES.values()]
     states = [*every, *(entry(3, column) for column in (1, 2, 3))]
-    products = {name: x for name, x in equation.starts.items() if x.names <= {*states} and x != Name(name)}
-    rates = {v: replaced(rate_formula(equation.rows[v]), products) for v in layout.velocities}
+    rates = {v: rate_formula(equation.rows[v]) for v in layout.velocities}
     formulas = {**equation.program, **equation.forces}
     numbers = {name: x for name, x in formulas.items() if name not in equation.orientation}
     mass = mass_matrix(layout, equation.names)

@@ -1,6 +1,6 @@
 """A step of a vehicle by an explicit Runge-Kutta method of order 8, and the dead time (standard library only).
 
-The method has the coefficients of DOP853 (Hairer, Norsett and Wanner, Solving Ordinary Differential Equations I, 1993).
+The method is DOP853, whose coefficients are in dop853.py.
 It is a second, independent way to the step that fmu_src/c computes by Taylor series. It moves a `model`: a module that
 printed.py prints for each vehicle. Forces that lag follow their exponential, which makes nothing stiff. A substep ends
 where a velocity reverses, because drag then has other coefficients.
@@ -11,6 +11,8 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from math import atan2, copysign, hypot, inf, isfinite, nan, sqrt, tau
 from typing import Any, NamedTuple
+
+from .dop853 import FIFTH, THIRD, A, B, C
 
 MOST_SUBSTEPS = 100_000
 """The largest number of substeps that a step may try. Hours of a fast turn or of a fast decay need more."""
@@ -25,36 +27,15 @@ _EPSILON = 2.0**-52
 _TOLERANCE = 64.0 * _EPSILON  # of the estimated error, which is far above the true one; rounding gives up to 40
 _SHARE = 1e-3  # a velocity below this share of the largest needs no smaller errors than one of this share
 _SHORTEST = 1e-30  # a substep in s; a motion that needs shorter ones overflows
-_TABLE = """
-0.05260015195876773 | 0:0.05260015195876773
-0.0789002279381516 | 0:0.0197250569845379 1:0.0591751709536137
-0.1183503419072274 | 0:0.02958758547680685 2:0.08876275643042054
-0.2816496580927726 | 0:0.2413651341592667 2:-0.8845494793282861 3:0.924834003261792
-0.3333333333333333 | 0:0.037037037037037035 3:0.17082860872947386 4:0.12546768756682242
-0.25 | 0:0.037109375 3:0.17025221101954405 4:0.06021653898045596 5:-0.017578125
-0.3076923076923077 | 0:0.03709200011850479 3:0.17038392571223998 4:0.10726203044637328 5:-0.015319437748624402 \
-   6:0.008273789163814023
-0.6512820512820513 | 0:0.6241109587160757 3:-3.3608926294469414 4:-0.868219346841726 5:27.59209969944671 \
-   6:20.154067550477894 7:-43.48988418106996
-0.6 | 0:0.47766253643826434 3:-2.4881146199716677 4:-0.590290826836843 5:21.230051448181193 6:15.279233632882423 \
-   7:-33.28821096898486 8:-0.020331201708508627
-0.8571428571428571 | 0:-0.9371424300859873 3:5.186372428844064 4:1.0914373489967295 5:-8.149787010746927 \
-   6:-18.52006565999696 7:22.739487099350505 8:2.4936055526796523 9:-3.0467644718982196
-1.0 | 0:2.273310147516538 3:-10.53449546673725 4:-2.0008720582248625 5:-17.9589318631188 6:27.94888452941996 \
-   7:-2.8589982771350235 8:-8.87285693353063 9:12.360567175794303 10:0.6433927460157636
-1.0 | 0:0.054293734116568765 5:4.450312892752409 6:1.8915178993145003 7:-5.801203960010585 8:0.3111643669578199 \
-   9:-0.1521609496625161 10:0.20136540080403034 11:0.04471061572777259
-1.0 | 0:0.01312004499419488 5:-1.2251564463762044 6:-0.4957589496572502 7:1.6643771824549864 8:-0.35032884874997366 \
-   9:0.3341791187130175 10:0.08192320648511571 11:-0.022355307863886294
-1.0 | 0:-0.18980075407240762 5:4.450312892752409 6:1.8915178993145003 7:-5.801203960010585 8:-0.4226823213237919 \
-   9:-0.1521609496625161 10:0.20136540080403034 11:0.02265179219836082
-"""
-# Each line is a stage: the share of the substep at which it lies, and its weights of earlier rates by their numbers.
-# The last three lines are the states at the end, and two estimates of the error of their rate.
-_NODES, _ROWS = zip(*(line.split("|") for line in _TABLE.strip().splitlines()), strict=True)
-_WEIGHTS = [{int(n): float(x) for n, x in (pair.split(":") for pair in row.split())} for row in _ROWS]
-_STAGES = [*zip(map(float, _NODES[:11]), _WEIGHTS[:11], strict=True)]
-_END, _FIFTH, _THIRD = _WEIGHTS[11:]
+
+
+def _used(weights: Sequence[float]) -> dict[int, float]:
+    """Return the weights that are not 0, by the number of the rate."""
+    return {n: weight for n, weight in enumerate(weights) if weight}
+
+
+_STAGES = [(node, _used(weights)) for node, weights in zip(C, A, strict=True)]
+_END, _FIFTH, _THIRD = map(_used, (B, FIFTH, THIRD))
 
 State = list[float]
 
@@ -96,7 +77,8 @@ class Motion:
     def begin(self) -> None:
         """Begin a substep: find the directions, the rates, and the sizes of the terms in the rates.
 
-        The rate of a velocity that is 0 tells its direction, unless it is a rounding error.
+        A velocity of exactly 0 will move with the sign of its rate, and needs the drag coefficients of that side,
+        unless the rate is a rounding error.
         """
         self.size = [max(size, abs(x)) for size, x in zip(self.size, self.y, strict=True)]
         self.terms: State = self.model.sizes(self.held, self.time, self.y)

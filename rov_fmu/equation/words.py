@@ -1,0 +1,77 @@
+"""What people read about coefficients and variables, and where the vehicle file has the coefficients."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from rov_fmu.io.messages import listed
+
+from .catalogue import (
+    CURVE,
+    FIN,
+    HEAVE,
+    SURGE,
+    SWAY,
+    TUNING,
+    Declaration,
+    axis_words,
+    cited,
+)
+from .parts import FAINT, Curve, Fin, Thruster, VehicleAxis
+
+
+class CoefficientTable(NamedTuple):
+    """A table of the vehicle file with coefficients."""
+
+    place: tuple[str, ...]
+    """The tables around it, and its own name."""
+    names: Mapping[str, str]
+    """The names of its coefficients, by key."""
+    declarations: Mapping[str, Declaration]
+    words: Mapping[str, str]
+    """What fills the fields in their texts."""
+
+
+def table_of_curve(curve: Curve) -> CoefficientTable:
+    words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
+    names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
+    return CoefficientTable(("curves", curve.name), names, CURVE, words)
+
+
+def table_of_axis(vehicle_axis: VehicleAxis, kinds: Mapping[str, Declaration]) -> CoefficientTable:
+    names = {key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys}
+    return CoefficientTable(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
+
+
+def table_of_fin(fin: Fin) -> CoefficientTable:
+    names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
+    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
+
+
+def _pushes(direction: tuple[float, float, float]) -> str:
+    """Return the direction of a positive force in words."""
+    words = [
+        axis.positive if part > 0.0 else axis.negative
+        for axis, part in zip((SURGE, SWAY, HEAVE), direction, strict=True)
+        if abs(part) > FAINT
+    ]
+    return listed(words)
+
+
+def command_words(driven: Thruster | Fin) -> str:
+    kind = "fin" if isinstance(driven, Fin) else "thruster"
+    words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
+    return f"{words}, positive {_pushes(driven.direction.value)}"
+
+
+def thrust_declaration(thruster: Thruster, curve: Curve) -> Declaration:
+    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
+    share = {1: "", 2: ", half of the pair's"}.get(curve.n_thrusters, f", 1/{curve.n_thrusters} of their curve")
+    rest = ", in water at rest" if "d" in curve.keys else ""
+    return Declaration(
+        "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"
+    )
+
+
+def torque_declaration(curve: Curve) -> Declaration:
+    of = f"of the {curve.description}" if curve.description else curve.name
+    return Declaration("N.m", f"Torque τ_{curve.name} of the thrusters with the curve {of}, positive bow to starboard")

@@ -1,0 +1,36 @@
+"""Write the page on which a vehicle flies in a browser, for `rov-fmu fly`."""
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import mkdtemp
+
+from rov_fmu.fmu.content import web_module
+from rov_fmu.io.file_kinds import PAGE, check_written
+from rov_fmu.io.output import Output, check_replaced, check_targets, sealed, write_whole
+from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.recording import recording_of
+from rov_fmu.vehicle.vehicle import load_vehicle
+
+
+def write_fly_page(
+    paths: Sequence[Path], recording: Path | None, identified: Path | None, output: Path | None, *, force: bool
+) -> Path:
+    """Write the page of one vehicle file, or of two, of which the second is the ghost. Return its path.
+
+    `recording` is a log that is flown beside the measurements, and `identified` what `rov-fmu identify --mcap` wrote of
+    it. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
+    """
+    vehicles = [load_vehicle(path) for path in paths]
+    if output:
+        given = [path for path in (recording, identified) if path]
+        check_targets([output], [*paths, *given, *(file for vehicle in vehicles for file in vehicle.files)])
+        check_written(output, PAGE)
+        check_replaced([output], force=force)
+    flown = recording_of(recording, vehicles[0], identified) if recording else None
+    names = [path.name for path in paths]
+    names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
+    shown = [Flown(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)]
+    page = sealed(fly_page(shown, recording=flown), "<!-- {} -->", "fly").encode()
+    path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
+    write_whole(Output(path, page), force=force)
+    return path
