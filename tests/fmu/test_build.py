@@ -9,6 +9,7 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import rov_fmu
+from rov_fmu.build import chosen_platforms
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
@@ -49,6 +50,12 @@ def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
         assert "\\" not in m.filename
         assert m.external_attr >> 16 == 0o644  # a file, not a link
         assert not m.flag_bits & 0x1
+
+
+def test_by_default_an_fmu_has_all_platforms_of_64_bits() -> None:
+    x64 = ["linux64", "aarch64-linux", "win64", "darwin64", "aarch64-darwin"]
+    assert chosen_platforms(None) == chosen_platforms(()) == x64
+    assert {*fmu_compile.PLATFORMS} - {*x64} == {"linux32", "win32"}
 
 
 @pytest.mark.usefixtures("without_page")
