@@ -15,6 +15,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.archive import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE
+from tests.conftest import compile_anew
 
 
 def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
@@ -90,8 +91,13 @@ def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
 
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)
 def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
-    either_fmu: Path, fmi: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    either_fmu: Path,
+    fmi: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(fmu_compile._Library, "compile", compile_anew)
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
     assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(again)]) == 0
