@@ -26,6 +26,7 @@ from tests.fmi2 import Fmu
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle
 
 compile_anew = compilation._Library.compile
+"""The method that compiles a library even if another test has done so."""
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
 """The logger of instances without one. FMPy 0.3 forwards messages to the logger that it was given last in the process,

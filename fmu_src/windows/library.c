@@ -1,10 +1,10 @@
-/* What a library for Windows has that is built with the C run time of the system alone, without the libraries of MinGW,
- * which take a minute to compile: its entry point, the mark that it uses floating-point numbers, and two functions of
+/* A library for Windows is built with the C run time of the system, without the libraries of MinGW, which take a minute to
+ * compile. Here is what it lacks then: its entry point, the mark that it uses floating-point numbers, and two functions of
  * <stdio.h> that the run time has only under another name. */
 #include <stdarg.h>
 #include <stdio.h>
 
-enum { AS_IN_C99 = 2 }; /* the text ends with '\0', and the result is the whole length (_CRT_INTERNAL_PRINTF_STANDARD_...) */
+enum { AS_IN_C99 = 2 }; /* _CRT_INTERNAL_PRINTF_STANDARD_SNPRINTF_BEHAVIOR: '\0' at the end, and the length of the whole text */
 
 int _fltused;
 

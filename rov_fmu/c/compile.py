@@ -50,7 +50,7 @@ _MODULE_FLAGS = (
     *("-Wno-unused-function", MODULE_FILE),
 )
 _TIME_LIMIT = 900.0
-"""The longest time of one compiler, s. Without a cache, all of them together take a minute on two free processors."""
+"""The longest time of one compiler, s. Without a cache, all of them together take 15 s on two free processors."""
 _CACHE_VARIABLE = "ZIG_GLOBAL_CACHE_DIR"
 _NO_SPACE = ("No space left on device", "NoSpaceLeft", "FileTooBig", "File too large")
 """What the compiler prints about a file that it could not write completely."""

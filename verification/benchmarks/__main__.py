@@ -31,9 +31,7 @@ class Effort:
 
     repetitions: int = 25
     commands: int = 16384
-    known: int = (
-        64  # commands whose results are compared with 50 digits; the error of RK4 in some is ten times that in others
-    )
+    known: int = 64  # commands whose results are compared with 50 digits; with few, RK4 looks more exact than it is
     manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
     runs_in_fmpy: int = 2000
