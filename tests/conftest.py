@@ -126,16 +126,12 @@ def _compiled_once(made_once: Made) -> Iterator[None]:
 
     def compiled(library: compilation._Library, compilers: compilation._Compilers) -> bytes:
         key = hashlib.sha256(repr((library, compilation.compiler())).encode()).hexdigest()
-        fill = partial(_write_library, lambda: compile_anew(library, compilers))
-        return (made_once(f"compiled {key}", fill) / "library").read_bytes()
+        folder = made_once(f"C {key}", lambda of: (of / "library").write_bytes(compile_anew(library, compilers)))
+        return (folder / "library").read_bytes()
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(compilation._Library, "compile", compiled)
         yield
-
-
-def _write_library(content: Callable[[], bytes], folder: Path) -> None:
-    (folder / "library").write_bytes(content())
 
 
 def _videoray(folder: Path, fmi: int) -> None:
