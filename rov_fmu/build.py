@@ -75,15 +75,15 @@ def build(
     """Build the FMU of a vehicle, validate it and run it. After a failure no file is written.
 
     `output` is the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
-    `platforms` names one or several of PLATFORMS, or `host` for this machine; by default it is all. `backend` is
-    `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the version of
-    FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or `both`,
-    which is the default; the FMU in pure Python has only `cs`. `osp` also writes <identifier>_OspModelDescription.xml
-    to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `sign` is the file of a private key by Ed25519, which
-    signs the FMU in <output>.sig; it needs the extra `sign`. `force` allows replacing files that this program did not
-    write, or that have changed since. `inputs` are further files that must not be
-    overwritten, like those that the vehicle names. `on_content` is called once the content is made and the compilers
-    begin, and `on_compiled` with the name of each platform that has been compiled.
+    `platforms` names one or several of PLATFORMS, or `host` for this machine; by default it is those with 64 bits.
+    `backend` is `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the
+    version of FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or
+    `both`, which is the default; the FMU in pure Python has only `cs`. `osp` also writes
+    <identifier>_OspModelDescription.xml to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `sign` is the
+    file of a private key by Ed25519, which signs the FMU in <output>.sig; it needs the extra `sign`. `force` allows
+    replacing files that this program did not write, or that have changed since. `inputs` are further files that must
+    not be overwritten, like those that the vehicle names. `on_content` is called once the content is made and the
+    compilers begin, and `on_compiled` with the name of each platform that has been compiled.
 
     Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
@@ -156,12 +156,12 @@ def _check_options(vehicle: object, backend: str, fmi: int, interface: str | Non
 
 
 def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[str]:
-    """Return the platforms with these names, with `host` resolved. Without names, return all platforms.
+    """Return the platforms with these names, with `host` resolved. Without names, return those by default.
 
     Raises OptionError about an unknown name, and BuildError if there is no platform for this machine.
     """
     if not names:
-        return list(PLATFORMS)
+        return [name for name, platform in PLATFORMS.items() if platform.by_default]
     names = [names] if isinstance(names, str) else names
     if unknown := set(names) - {"host", *PLATFORMS}:
         hint = did_you_mean(min(unknown), ["host", *PLATFORMS], also=OTHER_NAMES)

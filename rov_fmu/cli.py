@@ -205,7 +205,7 @@ def _commands(context: click.Context) -> None:
     multiple=True,
     type=_Choice(["host", *PLATFORMS], OTHER_NAMES),
     metavar="NAME",
-    help=f"Platform to compile for: host, {', '.join(PLATFORMS)}. It may be repeated; the default is all.",
+    help=f"Platform to compile for: host, {', '.join(PLATFORMS)}. It may be repeated; the default is all with 64 bits.",
 )
 @click.option(
     "--osp",

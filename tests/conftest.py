@@ -1,6 +1,7 @@
 """The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
 import gc
+import hashlib
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -13,6 +14,7 @@ from filelock import FileLock
 from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
+from rov_fmu.c import compile as compilation
 from rov_fmu.c.compile import compile_all, host_platform
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
@@ -23,6 +25,8 @@ from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle
 
+compile_anew = compilation._Library.compile
+"""The method that compiles a library even if another test has done so."""
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
 defaultCallbacks.logger = _LOGGER
 """The logger of instances without one. FMPy 0.3 forwards messages to the logger that it was given last in the process,
@@ -116,23 +120,31 @@ def made_once(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFact
     return made
 
 
-def _videoray(made_once: Made, folder: Path, fmi: int) -> None:
-    """Build the VideoRay's FMU into a folder, and unzip it there. Its page has the same module in both versions."""
-    from rov_fmu.fmu.content import web_module
+@pytest.fixture(scope="session", autouse=True)
+def _compiled_once(made_once: Made) -> Iterator[None]:
+    """Let the builds of all workers compile the same C with the same compiler and flags once in a run."""
 
-    path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
-    layout = load_vehicle(VIDEORAY).layout
-    module = made_once("module", lambda of: (of / "module.wasm").write_bytes(web_module(layout))) / "module.wasm"
+    def compiled(library: compilation._Library, compilers: compilation._Compilers) -> bytes:
+        key = hashlib.sha256(repr((library, compilation.compiler())).encode()).hexdigest()
+        folder = made_once(f"C {key}", lambda of: (of / "library").write_bytes(compile_anew(library, compilers)))
+        return (folder / "library").read_bytes()
+
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("rov_fmu.build.web_module", lambda _: module.read_bytes())
-        assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
+        patched.setattr(compilation._Library, "compile", compiled)
+        yield
+
+
+def _videoray(folder: Path, fmi: int) -> None:
+    """Build the VideoRay's FMU into a folder, and unzip it there."""
+    path = folder / f"videoray{'.fmi3' if fmi == 3 else ''}.fmu"
+    assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(path)]) == 0
     fmpy.extract(str(path), unzipdir=str(path.with_suffix("")))
 
 
 @pytest.fixture(scope="session")
 def videoray_fmu(made_once: Made) -> Path:
     # a path with a space and an umlaut, as users have them
-    return made_once("FMU für Tests", lambda folder: _videoray(made_once, folder, 2)) / "videoray.fmu"
+    return made_once("FMU für Tests", lambda folder: _videoray(folder, 2)) / "videoray.fmu"
 
 
 @pytest.fixture(scope="session")
@@ -142,7 +154,7 @@ def videoray_dir(videoray_fmu: Path) -> Path:
 
 @pytest.fixture(scope="session")
 def videoray3_fmu(made_once: Made) -> Path:
-    return made_once("FMU für FMI 3", lambda folder: _videoray(made_once, folder, 3)) / "videoray.fmi3.fmu"
+    return made_once("FMU für FMI 3", lambda folder: _videoray(folder, 3)) / "videoray.fmi3.fmu"
 
 
 @pytest.fixture(scope="session")

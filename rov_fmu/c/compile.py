@@ -35,6 +35,7 @@ FILTER_FILE = FMU_SRC / "engine" / "filter.c"
 LANES_FILE = FMU_SRC / "engine" / "lanes.c"
 FILTER_LANES_FILE = FMU_SRC / "engine" / "filter_lanes.c"
 _LOCATION_FILE = FMU_SRC / "python" / "location.c"
+_WINDOWS_FILE = FMU_SRC / "windows" / "library.c"
 PYTHONFMU_LIBRARY = "libpythonfmu-export.so"
 """The name by which PythonFMU's library for Linux knows itself."""
 # The numbers and their cost depend on these flags: the same rounding on every processor, no errno in the mathematics.
@@ -49,7 +50,7 @@ _MODULE_FLAGS = (
     *("-Wno-unused-function", MODULE_FILE),
 )
 _TIME_LIMIT = 900.0
-"""The longest time of one compiler, s. Without a cache, all of them together take a minute on two free processors."""
+"""The longest time of one compiler, s. Without a cache, all of them together take 15 s on two free processors."""
 _CACHE_VARIABLE = "ZIG_GLOBAL_CACHE_DIR"
 _NO_SPACE = ("No space left on device", "NoSpaceLeft", "FileTooBig", "File too large")
 """What the compiler prints about a file that it could not write completely."""
@@ -76,6 +77,8 @@ class Platform:
     flags: Sequence[str] = ()
     also: str | None = None
     """A second target. In FMI 2.0, the libraries of both are joined into one universal file."""
+    by_default: bool = True
+    """False if an FMU has this platform only on request."""
 
     def targets(self, fmi: int) -> list[str]:
         """Return the targets of the library for a version of FMI."""
@@ -84,6 +87,12 @@ class Platform:
 
 # GLIBC 2.17 is as old as CentOS 7 (2012). Pages of 4 KiB keep the file small.
 _LINUX = ("-lm", "-Wl,-z,max-page-size=4096", "-Wl,-z,common-page-size=4096")
+# For a library that uses the libraries of MinGW, the compiler first builds all of them, which takes over a minute. What
+# an FMU needs is in the C run time of Windows, and the compiler has the rest, such as sin().
+_WINDOWS = (
+    *("-nostdlib", "-rtlib=compiler-rt"),
+    *(f"-lapi-ms-win-crt-{part}-l1-1-0" for part in ("heap", "math", "stdio", "string")),
+)
 _APPLE_SILICON = "aarch64-macos.11.0"
 
 # In FMI 2.0, FMPy and FMILibrary load darwin64 on Apple Silicon too. Therefore the file for darwin64 has code for both
@@ -92,10 +101,12 @@ _APPLE_SILICON = "aarch64-macos.11.0"
 # FMI 3.0.
 PLATFORMS: dict[str, Platform] = {
     "linux64": Platform("x86_64-linux", ".so", "x86_64-linux-gnu.2.17", _LINUX),
-    "linux32": Platform("x86-linux", ".so", "x86-linux-gnu.2.17", _LINUX),
+    "linux32": Platform("x86-linux", ".so", "x86-linux-gnu.2.17", _LINUX, by_default=False),
     "aarch64-linux": Platform("aarch64-linux", ".so", "aarch64-linux-gnu.2.17", _LINUX),
-    "win64": Platform("x86_64-windows", ".dll", "x86_64-windows-gnu"),
-    "win32": Platform("x86-windows", ".dll", "x86-windows-gnu"),
+    "win64": Platform("x86_64-windows", ".dll", "x86_64-windows-gnu", (*_WINDOWS, "-Wl,-e,begin_library")),
+    "win32": Platform(
+        "x86-windows", ".dll", "x86-windows-gnu", (*_WINDOWS, "-Wl,-e,begin_library@12"), by_default=False
+    ),
     "darwin64": Platform("x86_64-darwin", ".dylib", "x86_64-macos.11.0", also=_APPLE_SILICON),
     "aarch64-darwin": Platform("aarch64-darwin", ".dylib", _APPLE_SILICON),
 }
@@ -130,8 +141,12 @@ def host_platform(fmi: int = 2) -> str | None:
 
 def compiler() -> list[str]:
     """Return the C compiler's command. Raises BuildError when it is not installed."""
-    zig = "zig.exe" if os.name == "nt" else "zig"
-    return [str(_package_folder("ziglang", "the C compiler is missing: pip install ziglang") / zig), "cc"]
+    return [str(_compiler_folder() / ("zig.exe" if os.name == "nt" else "zig")), "cc"]
+
+
+def _compiler_folder() -> Path:
+    """Return the folder of the C compiler. Raises BuildError when it is not installed."""
+    return _package_folder("ziglang", "the C compiler is missing: pip install ziglang")
 
 
 def fmi_headers() -> Path:
@@ -171,10 +186,18 @@ def _library(name: str, target: str, sources: Mapping[str, str], identifier: str
         *("-target", target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS),
         *(f"-DFMI{version}_OVERRIDE_FUNCTION_PREFIX" for version in (2, 3)),
         *("-isystem", str(fmi_headers())),  # without warnings about the headers
-        *(UNITY_FILE, *platform.flags),
+        *(UNITY_FILE, *_platform_flags(platform)),
         *((f"-Wl,-install_name,@rpath/{file}",) if platform.suffix == ".dylib" else ()),
     ]
     return _Library(file, sources, arguments, f"{name}: the compiler failed for {target}")
+
+
+def _platform_flags(platform: Platform) -> Sequence[str]:
+    """Return the arguments for any library of a platform. On Windows, they include a file with its entry point."""
+    if platform.suffix != ".dll":
+        return platform.flags
+    headers = _compiler_folder() / "lib" / "libc" / "include" / "any-windows-any"  # which -nostdlib leaves out
+    return ["-isystem", str(headers), str(_WINDOWS_FILE), *platform.flags]
 
 
 def compile_module(sources: Mapping[str, str]) -> bytes:
@@ -213,7 +236,7 @@ def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
     target = ["-target", PLATFORMS[name].target] if name else []
     vectors = ["-mcpu=native", "-Wno-conversion", *(["-ffp-contract=on"] if of_vehicles else [])]
     processor = vectors if in_lanes else [] if name else ["-mcpu=baseline"]
-    libraries = PLATFORMS[name].flags if name else ("-lm",)
+    libraries = _platform_flags(PLATFORMS[name]) if name else ("-lm",)
     files = [file, ENGINE_FILE.name] if of_vehicles else [file]
     return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, *processor, "-Wno-unused-function", *files, *libraries]
 

@@ -25,7 +25,7 @@ REPORT = "identification.html"
 _EXTERNAL_DEPENDENCIES = """What the binaries need of the system, and nothing else:
 
 Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
-Windows  the Universal C Runtime, which is part of Windows since 10
+Windows  the Universal C Runtime (ucrtbase.dll), which is part of Windows since 10
 macOS    11 or newer
 """
 

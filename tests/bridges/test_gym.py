@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,18 @@ from gymnasium.utils.env_checker import check_env
 import rov_fmu
 from rov_fmu.bridges.gym import RovEnv, RovVectorEnv
 from rov_fmu.io.messages import InputError
-from tests.vehicles import THRUST_EFFECTS
+from tests.commands import BARE
 
+_LATE = """
+[[thruster]]
+name = "b"
+curve = "top"
+direction = {{ value = [0, 0, -1], source = "Made up" }}
+
+[commands]
+T_d = {{ value = {}, unit = "s", source = "Made up" }}
+"""
+"""A second thruster, and a dead time, for a vehicle that compiles in a second."""
 SCALE = 1e-12
 """Many vehicles are stepped in the lanes of vectors, whose rounding errors differ from those of the FMU."""
 
@@ -95,9 +106,10 @@ def _flown(env: RovVectorEnv, actions: Any, steps: int) -> Any:
 
 
 @pytest.mark.parametrize("dead_time", [0.03, 0.1, 0.25])
-def test_commands_that_wait_for_the_dead_time_arrive_in_later_steps(dead_time: float) -> None:
+def test_commands_that_wait_for_the_dead_time_arrive_in_later_steps(dead_time: float, tmp_path: Path) -> None:
     """A new episode begins with no command on its way. A copy of the environment goes on like the environment."""
-    vehicle = rov_fmu.load(THRUST_EFFECTS).with_(T_d=dead_time)
+    (tmp_path / "late.toml").write_text(BARE.read_text(encoding="utf-8") + _LATE.format(dead_time), encoding="utf-8")
+    vehicle = rov_fmu.load(tmp_path / "late.toml")
     env = RovVectorEnv(vehicle, 3, steps=8)
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 10, len(env.commands)))
 

@@ -57,7 +57,7 @@ def environment(folder: Path, *requirements: str | Path, python: str = sys.execu
 
     It has no pip of its own, and its modules are not compiled, because most of them are never imported. If its C
     compiler has the version of the one here, it is replaced by a link to that, because at another place a compiler
-    first builds the C libraries of all platforms again, which takes minutes.
+    first builds the C libraries of all platforms again.
     """
     subprocess.run([python, "-m", "venv", "--without-pip", folder], check=True)
     command = [sys.executable, *_PIP, "--python", str(folder), "install", "--no-compile", *map(str, requirements)]

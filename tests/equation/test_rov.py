@@ -67,9 +67,9 @@ def test_thrust_and_drag_of_any_vehicle_are_those_of_the_equations(cases: int) -
     for _ in range(cases):
         rov, inputs, state, _ = random_case(rng, random_vehicle(rng))
         with mp.workdps(50):
-            exact = steady_forces(rov, inputs)
+            exact = steady_forces(rov, inputs, mp)
             assert rov.commanded(inputs) == pytest.approx({n: float(F) for n, F in exact.items()}, rel=1e-13, abs=1e-13)
-            rates = equations(rov, inputs).rates({name: mp.mpf(value) for name, value in state.items()}, inputs)
+            rates = equations(rov, inputs, mp).rates({n: mp.mpf(x) for n, x in state.items()}, inputs, mp)
             size = 1.0 + sum(abs(float(rate)) for rate in rates.values())
             expected = {name: float(rate) for name, rate in rates.items()}
         assert rov.derivatives(inputs, state) == pytest.approx(expected, rel=1e-13, abs=1e-13 * size)

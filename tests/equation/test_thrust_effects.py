@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.c.simulation import simulate
@@ -68,7 +69,7 @@ def test_the_forces_are_those_of_the_tables_and_of_the_voltage() -> None:
     rng = random.Random(1)
     for _ in range(200):
         inputs = inputs_of(rng, NOW)
-        expected = steady_forces(NOW, inputs)
+        expected = steady_forces(NOW, inputs, mp)
         for name, force in NOW.commanded(inputs).items():
             assert force == pytest.approx(float(expected[name]), rel=1e-14, abs=1e-13), (name, inputs)
 

@@ -9,12 +9,14 @@ import pytest
 from fmpy.validation import validate_fmu
 
 import rov_fmu
+from rov_fmu.build import chosen_platforms
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import META_DATA
 from rov_fmu.fmu.content import native_content
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE
+from tests.conftest import compile_anew
 
 
 def test_the_fmu_is_valid_and_reaches_the_speed_of_table_9(either_fmu: Path) -> None:
@@ -52,6 +54,12 @@ def test_every_importer_can_unpack_the_archive(either_fmu: Path) -> None:
         assert not m.flag_bits & 0x1
 
 
+def test_by_default_an_fmu_has_all_platforms_of_64_bits() -> None:
+    x64 = ["linux64", "aarch64-linux", "win64", "darwin64", "aarch64-darwin"]
+    assert chosen_platforms(None) == chosen_platforms(()) == x64
+    assert {*fmu_compile.PLATFORMS} - {*x64} == {"linux32", "win32"}
+
+
 @pytest.mark.usefixtures("without_page")
 def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -84,8 +92,13 @@ def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
 
 @pytest.mark.parametrize("fmi", [2, pytest.param(3, marks=pytest.mark.long)], indirect=True)
 def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
-    either_fmu: Path, fmi: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    either_fmu: Path,
+    fmi: int,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    monkeypatch.setattr(fmu_compile._Library, "compile", compile_anew)
     again = tmp_path / "elsewhere" / "other name.fmu"
     again.parent.mkdir()
     assert main(["build", "--fmi", str(fmi), "--platform", "host", "-o", str(again)]) == 0

@@ -6,6 +6,7 @@ from math import copysign
 
 import pytest
 from lxml import html
+from mpmath import mp
 
 from rov_fmu.equation.expression import Expression, Name, Operation, compiled, where
 from rov_fmu.equation.layout import Layout
@@ -40,7 +41,7 @@ def exactly(rov: Vehicle, inputs: Values, state: Values) -> dict[str, float]:
     if rov.layout.has_attitude:
         rates = {f"der({name})": x for name, x in rov.derivatives(inputs, state).items()}
         return rates | rov.calculated(inputs, state)
-    return {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}).items()}
+    return {name: float(x) for name, x in calculated(rov, {**rov.coefficients, **inputs, **state}, mp).items()}
 
 
 def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> dict[str, float]:

@@ -31,7 +31,7 @@ class Effort:
 
     repetitions: int = 25
     commands: int = 16384
-    known: int = 64  # commands whose results are compared with 50 digits
+    known: int = 64  # commands whose results are compared with 50 digits; with few, RK4 looks more exact than it is
     manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
     runs_in_fmpy: int = 2000
@@ -43,7 +43,7 @@ A cell's second number is the error at the end of a held command against 50 digi
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
-_QUICK = Effort(3, 1024, 8, 1, 1000, 100, (100, 400))
+_QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, runs_in_fmpy=100, study_runs=(100, 400))
 _PROMISED = (0.8, 1.0)
 """The largest ratio of the cost of many vehicles to that of heyoka's best batches: VideoRay, BlueROV2 Heavy."""
 

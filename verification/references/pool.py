@@ -17,7 +17,7 @@ from scipy.integrate import solve_ivp
 from rov_fmu.equation.layout import Layout
 from rov_fmu.vehicle.vehicle import Vehicle
 
-from .equations import PLACES, driven
+from .equations import FLOATS, PLACES, driven
 from .equations import thrust as thrust_of
 
 Array = NDArray[np.float64]
@@ -157,11 +157,11 @@ def _holds(
 
 def _rates(k: Vehicle, command: Array, given: Conditions) -> Rates:
     """Return the function that gives the derivatives of the state under held commands."""
-    steady = {
-        t.name: given.curves[t.curve](c) if t.curve in given.curves else thrust_of(k, k.layout.curve_of[t.name], c)
-        for t, c in zip(k.layout.thrusters, command.tolist(), strict=True)
-    }
-    held = driven(k, steady, {}).of(float)
+    steady = {}
+    for t, c in zip(k.layout.thrusters, command.tolist(), strict=True):
+        curve = given.curves.get(t.curve)
+        steady[t.name] = curve(c) if curve else thrust_of(k, k.layout.curve_of[t.name], c, FLOATS)
+    held = driven(k, steady, {}, FLOATS)
     n, lags = len(held.axes), [*held.lags.values()]
     weight = k.coefficients.get("F_0_w", 0.0) if given.tilt and "w" in held.axes else 0.0
     pulled = [(at, PLACES[name], axis.inertia) for at, (name, axis) in enumerate(held.axes.items()) if name in PLACES]

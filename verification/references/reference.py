@@ -242,7 +242,7 @@ class Step:
 def step(rov: Vehicle, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> Step:
     """Return the state of the vehicle after h seconds with the inputs held."""
     with mp.workdps(4 * DIGITS):
-        equation = equations(rov, inputs)
+        equation = equations(rov, inputs, mp)
         if equation.lags or equation.coupled:
             ended = integrate(equation, state, h)
             found, fastest, paths = ended.state, ended.fastest, ended.paths

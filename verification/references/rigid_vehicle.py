@@ -83,8 +83,8 @@ def _wrench(place: Sequence[Number], force: Sequence[Number]) -> Array:
 
 def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> tuple[Array, Array, Array, Array]:
     """Return the wrenches, the steady forces, the losses and the lags of all thrusters."""
-    forces, rows = steady_forces(rov, inputs), []
-    for thruster, (name, command) in zip(rov.layout.thrusters, commands(rov, inputs).items(), strict=True):
+    forces, rows = steady_forces(rov, inputs, mp), []
+    for thruster, (name, command) in zip(rov.layout.thrusters, commands(rov, inputs, mp).items(), strict=True):
         curve = rov.layout.curve_of[name]
         assert thruster.position
         reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
@@ -165,7 +165,7 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     """
     layout = rov.layout
     if not layout.has_attitude:
-        return equations.calculated(rov, values)
+        return equations.calculated(rov, values, mp)
     k = Vehicle(layout, {name: values[name] for name in rov.coefficients})
     of_vehicle = body(k, {name: values[name] for name in layout.inputs}, number)
     y = np.array([number(x) for x in places(k, values)])
@@ -173,7 +173,7 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
     found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
     found |= {f"der({name})": rate for name, rate in zip(names, rates, strict=True) if name in layout.state}
-    forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values).items()}
+    forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values, mp).items()}
     found |= {f"F_{name}": mp.mpf(F) for name, F in forces.items()}
     for curve in layout.turning_curves:
         own = [t for t in layout.thrusters if t.curve == curve.name]
