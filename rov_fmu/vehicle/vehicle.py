@@ -498,7 +498,7 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
     if mistakes := [*check_mass(layout, coefficients)]:
         raise VehicleFileError(*lines_on(path, mistakes))
     for doubt in doubts(layout, coefficients):
-        warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=2)
+        warnings.warn(one_line(f"{path}: {doubt}"), UserWarning, stacklevel=3)
     vehicle = Vehicle(
         layout,
         coefficients,
