@@ -14,17 +14,22 @@ from pathlib import Path
 import pytest
 
 from rov_fmu import __version__
+from rov_fmu.build import build
 from rov_fmu.c.compile import compiler
-from tests.commands import FEW_TESTS, ROOT
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE, FEW_TESTS, ROOT
 from tests.conftest import Made
 
 CONSTRAINTS = ROOT / "constraints.txt"
 _PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 
 
-def built(kind: str, folder: Path) -> Path:
-    """Build the wheel or the sdist of this checkout, and return its path."""
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder], check=True, cwd=ROOT)
+def built(kind: str, folder: Path, *, prebuilt: bool = False) -> Path:
+    """Build the wheel or the sdist of this checkout, and return its path. A wheel without prebuilt files is quick."""
+    own = os.environ | ({} if prebuilt else {"HATCH_BUILD_NO_HOOKS": "true"})
+    command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
+    subprocess.run(command, check=True, cwd=ROOT, env=own)
     (path,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
     return path
 
@@ -43,12 +48,12 @@ class Environment:
     def python(self) -> str:
         return str(self.bin / "python")
 
-    def run(self, *command: str | Path, where: Path) -> str:
+    def run(self, *command: str | Path, where: Path, stderr: int | None = None) -> str:
         """Run a program of this environment, with no other on the path, in a folder; return what it prints."""
         path = {"PATH": str(self.bin), "PYTHONSAFEPATH": "1"}
         program = [str(self.bin / command[0]), *map(str, command[1:])]
         return subprocess.run(
-            program, cwd=where, env=os.environ | path, stdout=subprocess.PIPE, text=True, check=True
+            program, cwd=where, env=os.environ | path, stdout=subprocess.PIPE, stderr=stderr, text=True, check=True
         ).stdout
 
 
@@ -132,8 +137,44 @@ def test_the_installed_command_does_everything_outside_the_checkout(
         assert expected in made.run(*command.split(), where=here)
 
 
+@pytest.fixture(scope="module")
+def full_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("wheel", tmp_path_factory.mktemp("full wheel"), prebuilt=True)
+
+
 @pytest.mark.long
-def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+def test_the_fmus_in_the_wheel_are_those_of_a_build(full_wheel: Path, tmp_path: Path) -> None:
+    inside = {Path(name).name: content for name, content in _content(full_wheel).items() if name.endswith(".fmu")}
+    assert {*inside} == {f"{name}.fmu" for name in SHIPPED}
+    for name, file in SHIPPED.items():
+        own = build(load_vehicle(file), tmp_path / f"{name}.fmu")
+        assert own.seconds.keys() == own.binaries.keys(), "all of it was compiled"
+        assert own.path.read_bytes() == inside[f"{name}.fmu"]
+
+
+@pytest.mark.long
+def test_vehicles_that_ship_need_no_compiler(full_wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made, here = environment(tmp_path / "venv", "-c", CONSTRAINTS, full_wheel), tmp_path / "here"
+    (link,) = made.folder.glob("lib/python3*/site-packages/ziglang")
+    link.unlink() if link.is_symlink() else shutil.rmtree(link)
+    here.mkdir()
+    for variable in ("XDG_CACHE_HOME", "ZIG_GLOBAL_CACHE_DIR"):
+        monkeypatch.setenv(variable, str(tmp_path / "empty cache"))
+    for name in SHIPPED:
+        made.run("rov-fmu", "fly", name, "-o", f"{name}.html", where=here)
+        assert "after 10 s" in made.run("rov-fmu", "simulate", name, where=here)
+        assert "The FMU is valid" in made.run("rov-fmu", "build", name, "-o", f"{name}.fmu", where=here)
+        assert (here / f"{name}.fmu").read_bytes() == _content(full_wheel)[f"rov_fmu/data/prebuilt/{name}.fmu"]
+    made.run("fmpy", "simulate", "videoray.fmu", "--output-file", "result.csv", where=here)
+    shutil.copy(BARE, here / "own.toml")
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        made.run("rov-fmu", "build", "own.toml", where=here, stderr=subprocess.PIPE)
+    assert failed.value.stderr == "rov-fmu: the C compiler is missing: pip install ziglang\n"
+
+
+@pytest.mark.long
+def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")
     sdist = built("sdist", tmp_path / "sdist")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}
