@@ -10,6 +10,7 @@ under "Compatibility information". Beside them stands tools.json, the entry of t
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from csv import QUOTE_NONNUMERIC
+from importlib.metadata import metadata
 from pathlib import Path
 
 import click
@@ -30,13 +31,15 @@ MOST_VARIABLES = 10
 MOST_BYTES = 1_000_000
 TOLERANCE = 1e-6
 """The tolerance of a comparison, relative to the largest value of a variable."""
+_URLS = dict(text.split(", ", 1) for text in metadata("rov-fmu").get_all("Project-URL") or [])
+_HOMEPAGE = _URLS.get("Homepage", "")
 ENTRY = {
     "name": "rov-fmu",
     "license": "osi",
-    "url": "",
+    "url": _HOMEPAGE,
     "logo": "",
     "vendor": "the rov-fmu authors",
-    "vendorURL": "",
+    "vendorURL": _HOMEPAGE,
     "description": "Identifies a model of an underwater vehicle (ROV) from tank tests and dive logs, and exports it",
     "features": [],
     "platforms": ["Linux", "macOS", "Windows"],
@@ -46,7 +49,7 @@ ENTRY = {
     "fmuImport": [],
     "layeredStandards": ["FMI-LS-REF"],
 }
-"""The entry in the list of tools. The addresses are entered when the project has a public one."""
+"""The entry in the list of tools. It has an address as soon as [project.urls] of pyproject.toml has the Homepage."""
 
 
 README = """{name}
