@@ -197,7 +197,7 @@ def steps_left(folder: Path) -> list[str]:
         f"git tag v{__version__} && git push origin v{__version__}",
         "Wait for the workflow release.yml, and compare its SHA256SUMS with this one",
         "Approve its job pypi. Before the first release, register a pending publisher on PyPI (CONTRIBUTING.md)",
-        "Send the entry and the folders of `python -m verification.compatibility` (docs/importers.md, Publish)",
+        "Send the entry and the folders of `python -m verification.compatibility` (CONTRIBUTING.md, Publish)",
     ]
 
 
