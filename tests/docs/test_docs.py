@@ -33,7 +33,7 @@ State = dict[str, float]
 WEEKLY = ".github/workflows/weekly.yml"
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [
-    *(README, ROOT / "CONTRIBUTING.md", CHANGELOG),
+    *(README, ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", CHANGELOG),
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "models").rglob("README.md")),
     *sorted((ROOT / "examples").rglob("README.md")),
