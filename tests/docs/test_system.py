@@ -130,7 +130,7 @@ def test_the_command_runs_and_judges(
     assert run.main([str(tmp_path / "system")]) == 0
     told = capsys.readouterr().out
     assert told.count(" ok\n") >= 4
-    assert (tmp_path / "system" / "station_keeping.svg").is_file()
+    assert (tmp_path / "system" / "system.svg").is_file()
     monkeypatch.setattr(run, "DEPTH", 1e-9)
     assert run.main([str(tmp_path / "system")]) == 1
     assert "FAILED" in capsys.readouterr().out
