@@ -81,7 +81,7 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
         whole = MOVING_PICTURE.sub(lambda _: COCKPIT, whole)
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
-        return re.sub(r"\[([^\]]+)\]\(CITATION\.cff\)", r"\1 (`CITATION.cff`)", whole)
+        return re.sub(r"\[([^\]]+)\]\((CITATION\.cff|SECURITY\.md)\)", r"\1 (`\2`)", whole)
 
     source[0] = SHOWN_HERE.sub(text, source[0]).replace("](../README.md", "](index.md")
 

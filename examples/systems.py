@@ -31,22 +31,34 @@ class System:
     stop: float
     connections: Mapping[tuple[str, str], tuple[str, str]] = field(default_factory=dict)
     """The connections from outputs to inputs, each given by component and variable."""
-    groups: Sequence[str] = ()
-    """The connections for OSP, between variable groups of the components."""
+    groups: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """The connections for OSP between variable groups of two components, which stand for all connections of the two."""
+
+    @property
+    def single_connections(self) -> list[tuple[tuple[str, str], tuple[str, str]]]:
+        """The connections that no group stands for."""
+        grouped = [{*pair} for pair in self.groups.values()]
+        return [(start, end) for start, end in self.connections.items() if {start[0], end[0]} not in grouped]
 
 
 def write_ssp(path: Path, system: System) -> None:
-    """Write the SSP archive: the structure, with a parameter binding for each component, and the FMUs."""
+    """Write the SSP archive: the structure, and for each component its FMU and a parameter set (SSV)."""
     with ZipFile(path, "w") as archive:
-        archive.writestr("SystemStructure.ssd", _render("SystemStructure.ssd.j2", system))
-        for component in system.components.values():
+        archive.writestr("SystemStructure.ssd", _rendered("SystemStructure.ssd.j2", system=system))
+        for name, component in system.components.items():
             archive.write(component.fmu, f"resources/{component.fmu.name}")
+            archive.writestr(f"resources/{name}.ssv", parameter_set(component))
+
+
+def parameter_set(component: Component) -> str:
+    """Return the parameter set (SSV) of a component."""
+    return _rendered("ParameterSet.ssv.j2", component=component)
 
 
 def write_osp(path: Path, system: System) -> None:
     """Write the OSP configuration. The FMUs and their OSP model descriptions are in the same folder."""
-    path.write_text(_render("OspSystemStructure.xml.j2", system), encoding="utf-8")
+    path.write_text(_rendered("OspSystemStructure.xml.j2", system=system), encoding="utf-8")
 
 
-def _render(template: str, system: System) -> str:
-    return render(template, Path(__file__).parent / "templates", system=system, parameter_set=PARAMETER_SET)
+def _rendered(template: str, **content: Component | System) -> str:
+    return render(template, Path(__file__).parent / "templates", parameter_set=PARAMETER_SET, **content)

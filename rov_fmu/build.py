@@ -16,6 +16,7 @@ from rov_fmu.c.compile import (
     compile_all,
     host_platform,
 )
+from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import Content, native_content, python_content, web_module
 from rov_fmu.fmu.meta_data import meta_data
@@ -46,7 +47,8 @@ class Built:
     binaries: Mapping[str, int]
     """The size of each binary in bytes by platform; none in pure Python."""
     seconds: Mapping[str, float]
-    """The time until each platform was compiled, from the start of all compilers, which run in parallel."""
+    """The time until each platform was compiled, from the start of all compilers, which run in parallel; none of a
+    binary that the installed wheel contains."""
     note: str
     """The result of validating and running the FMU."""
     was_run: bool
@@ -112,7 +114,9 @@ def build(
         seconds[name] = perf_counter() - start
         on_compiled(name)
 
-    binaries = compile_all(chosen or [], content.sources, content.identifier, done, fmi)
+    binaries = prebuilt_binaries(content.identifier, content.guid, chosen or [])
+    missing = [name for name in chosen or [] if name not in binaries]
+    binaries |= compile_all(missing, content.sources, content.identifier, done, fmi)
     files = dict(content.files)
     for name, library in binaries.items():
         files[f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}"] = library

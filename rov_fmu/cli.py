@@ -252,10 +252,11 @@ def _print_built(built: "Built", seconds: float) -> None:
         paragraph(out, f"Replaced {shell_words(built.path)}, which also had {listed(built.lost)}.")
     size = f"{built.size / 1000:.0f} kB, built in {seconds:.1f} s, GUID {built.guid}"
     paragraph(out, f"{shell_words(built.path)}: {size}")
-    if len(built.binaries) > 1:
+    if len(built.seconds) > 1:
         paragraph(out, "The compilers ran in parallel. Each time is that from their start to the end of one:")
     for name, size_of_binary in built.binaries.items():
-        out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{built.seconds[name]:7.1f} s")
+        time = f"{built.seconds[name]:7.1f} s" if name in built.seconds else ", compiled for the wheel"
+        out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{time}")
     paragraph(out, built.note)
     following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
     print_end([built.path, *built.beside], following)

@@ -2,7 +2,8 @@
 
 For each vehicle that ships and for FMI 2.0 and 3.0 there is a folder with the FMU, its inputs, its reference solution,
 the options, a Readme.txt and the report of a checker, as CONTRIBUTING.md of modelica/fmi-standard.org describes them
-under "Compatibility information". Beside them stands tools.json, the entry of the list of tools.
+under "Compatibility information". Beside them stand tools.json, the entry of the list of tools, and README.md, the
+importers with their versions.
 
 `check` says where a folder breaks these rules, and how far FMPy's run of an FMU is from its reference solution.
 """
@@ -10,6 +11,7 @@ under "Compatibility information". Beside them stands tools.json, the entry of t
 import json
 from collections.abc import Iterable, Iterator, Sequence
 from csv import QUOTE_NONNUMERIC
+from importlib.metadata import metadata
 from pathlib import Path
 
 import click
@@ -18,25 +20,31 @@ import numpy as np
 import pandas as pd
 from fmpy.validation import validate_fmu
 
+from rov_fmu import __version__
 from rov_fmu.build import build
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from verification.checkouts import ROOT
 from verification.interoperability.manoeuvre import STEP, TIMES, Manoeuvre
+from verification.interoperability.page import read_table
 
 VERSIONS = (2, 3)
 MOST_VARIABLES = 10
 MOST_BYTES = 1_000_000
 TOLERANCE = 1e-6
 """The tolerance of a comparison, relative to the largest value of a variable."""
+_URLS = dict(text.split(", ", 1) for text in metadata("rov-fmu").get_all("Project-URL") or [])
+_HOMEPAGE = _URLS.get("Homepage", "")
 ENTRY = {
     "name": "rov-fmu",
     "license": "osi",
-    "url": "",
+    "url": _HOMEPAGE,
     "logo": "",
     "vendor": "the rov-fmu authors",
-    "vendorURL": "",
+    "vendorURL": _HOMEPAGE,
+    "examplesURL": _URLS.get("Compatibility", ""),
     "description": "Identifies a model of an underwater vehicle (ROV) from tank tests and dive logs, and exports it",
     "features": [],
     "platforms": ["Linux", "macOS", "Windows"],
@@ -44,9 +52,15 @@ ENTRY = {
     "fmiVersions": ["2.0", "3.0"],
     "fmuExport": ["CS", "ME"],
     "fmuImport": [],
-    "layeredStandards": ["FMI-LS-REF"],
+    "layeredStandards": ["REF"],
 }
-"""The entry in the list of tools. The addresses are entered when the project has a public one."""
+"""The entry in the list of tools. Its addresses are those of [project.urls] in pyproject.toml."""
+PAGE = """# FMUs of rov-fmu {version}, and the importers that have run them
+
+These pages are by the authors of rov-fmu, not by the Modelica Association. Each folder has an FMU, its inputs, and what
+it computes from them. FMPy {fmpy} has checked and run them all. The table shows the largest difference of any output
+from the step in Python, in SI units, in Co-Simulation (CS) and Model Exchange (ME).
+{table}"""
 
 
 README = """{name}
@@ -55,7 +69,7 @@ README = """{name}
 The FMU (FMI {version}.0, Co-Simulation and Model Exchange) moves along these axes: {axes}.
 
 Inputs are the commands of the thrusters, loads and a current. They are held over a step, and the motion of a
-Co-Simulation step is exact to rounding for any length of the step. So the reference solution holds for every step that
+Co-Simulation step is exact to rounding, however long it is. So the reference solution holds for every step that
 meets the changes of the inputs. This one was computed every {step} s.
 
 What can be tested: Co-Simulation with a variable step; states that are saved, serialized and restored; directional
@@ -80,11 +94,14 @@ def recorded(vehicle: Vehicle) -> list[str]:
 
 
 def write(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str | None = None) -> None:
-    """Write the folders of some vehicles, and the entry of the list of tools."""
+    """Write the folders of some vehicles, the entry of the list of tools, and the page of the importers."""
     for name in vehicles:
         for version in VERSIONS:
             _write_fmu(folder / f"fmi{version}" / name, name, version, platforms)
     (folder / "tools.json").write_text(json.dumps([ENTRY], indent=4) + "\n", encoding="utf-8")
+    table = read_table(ROOT / "docs" / "importers.md")
+    page = PAGE.format(version=__version__, fmpy=fmpy.__version__, table=table)
+    (folder / "README.md").write_text(page, encoding="utf-8")
 
 
 def _write_fmu(folder: Path, name: str, version: int, platforms: str | None) -> None:

@@ -3,6 +3,9 @@
 The wheel, the source distribution and the FMUs of all vehicles that ship are built in two folders, and the bytes of
 both are compared. Beside them stand SHA256SUMS, and for the wheel and for each FMU a list of what is in it or what it
 needs, in CycloneDX 1.6 (ECMA-424). These lists contain no time and no random number, so their bytes do not change.
+
+Then the wheel is installed into a fresh environment, and its user's commands are run there. The last lines say what is
+left for a person.
 """
 
 import hashlib
@@ -13,6 +16,7 @@ from collections.abc import Iterable
 from filecmp import cmpfiles
 from importlib import metadata
 from pathlib import Path
+from time import perf_counter
 from uuid import NAMESPACE_URL, uuid5
 
 import click
@@ -30,6 +34,7 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.checkouts import ROOT
+from verification.fresh_environment import environment
 
 _TOOLS = {"native": ("rov-fmu", "ziglang"), "pythonfmu": ("rov-fmu", "pythonfmu")}
 """The packages that make an FMU of each kind, parts of which are in its binaries."""
@@ -135,6 +140,67 @@ def sums(folder: Path) -> str:
     return "".join(f"{digest(path.read_bytes())}  {path.name}\n" for path in sorted(folder.iterdir()))
 
 
+def obstacles() -> list[str]:
+    """Return a line for each reason why this checkout, or this environment, cannot make a release."""
+    lines = []
+    for line in (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines():
+        name, _, wanted = line.partition("==")
+        if wanted and (installed := metadata.version(name)) != wanted:
+            lines.append(f"{name} {installed} is installed, and constraints.txt has {wanted}: CONTRIBUTING.md, Release")
+    for name, text in (("CHANGELOG.md", f"## [{__version__}] – 2"), ("CITATION.cff", f"\nversion: {__version__}\n")):
+        if text not in (ROOT / name).read_text(encoding="utf-8"):
+            lines.append(f"{name}: must have a line {text.strip()!r}")
+    return lines
+
+
+def other_fmus(wheel: Path, folder: Path) -> list[str]:
+    """Return a line for each FMU in a wheel that has other bytes than the file in the folder."""
+    with zipfile.ZipFile(wheel) as archive:
+        inside = {Path(name).name: archive.read(name) for name in archive.namelist() if name.endswith(".fmu")}
+    wrong = [name for name in sorted(inside) if (folder / name).read_bytes() != inside[name]]
+    return [f"{wheel.name}: has other bytes of {name}" for name in wrong]
+
+
+def tried(wheel: Path, scratch: Path) -> dict[str, float]:
+    """Install a wheel into a fresh environment, and run its user's commands there; return the seconds of each.
+
+    Raises subprocess.CalledProcessError if one fails.
+    """
+    folder = scratch / "tests"
+    subprocess.run(
+        [sys.executable, "-m", "examples.tank_tests", str(folder)], cwd=ROOT, check=True, capture_output=True
+    )
+    begun = perf_counter()
+    made = environment(scratch / "venv", "-c", ROOT / "constraints.txt", wheel.resolve())
+    seconds = {f"pip install {wheel.name}": perf_counter() - begun}
+    for command in (
+        "rov-fmu fly videoray -o fly.html",
+        "rov-fmu simulate videoray --set surge=0.3",
+        "rov-fmu build videoray",
+        "fmpy simulate videoray.fmu --start-values u_l 0.3 u_r 0.3 --output-file result.csv",
+        "rov-fmu identify tests -o rov.toml --report rov.html",
+        "rov-fmu build rov.toml --platform host",
+    ):
+        begun = perf_counter()
+        made.run(*command.split(), where=scratch)
+        seconds[command] = perf_counter() - begun
+    return seconds
+
+
+def steps_left(folder: Path) -> list[str]:
+    """Return what a person does after this program."""
+    no_address = not metadata.metadata("rov-fmu").get_all("Project-URL")
+    first = "Enter the public addresses in [project.urls] of pyproject.toml, and repeat this command"
+    return [
+        *([first] if no_address else []),
+        f"Look at {folder / 'videoray.fmu'} in a tool that you know",
+        f"git tag v{__version__} && git push origin v{__version__}",
+        "Wait for the workflow release.yml, and compare its SHA256SUMS with this one",
+        "Approve its job pypi. Before the first release, register a pending publisher on PyPI (CONTRIBUTING.md)",
+        "Send the entry and the folders of `python -m verification.compatibility` (CONTRIBUTING.md, Publish)",
+    ]
+
+
 @click.command(help=__doc__)
 @click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
 def main(folder: Path) -> None:
@@ -142,15 +208,24 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if any(folder.iterdir()):
         raise click.UsageError(f"{folder}: must be empty or new")
+    if lines := obstacles():
+        raise click.ClickException("\n".join(lines))
     with temporary_folder("release-") as again:
         for target in (folder, Path(again)):
             distributions(target)
             fmus(target)
-        if found := differences(folder, Path(again)):
-            raise click.ClickException("\n".join(found))
+        (wheel,) = folder.glob("*.whl")
+        if lines := [*differences(folder, Path(again)), *other_fmus(wheel, folder)]:
+            raise click.ClickException("\n".join(lines))
     inventories(folder)
     (folder / "SHA256SUMS").write_text(sums(folder), encoding="utf-8")
     click.echo(f"{folder}: two builds have the same bytes; {len([*folder.iterdir()])} files")
+    with temporary_folder("release-") as scratch:
+        for command, seconds in tried(wheel, Path(scratch)).items():
+            click.echo(f"{seconds:6.1f} s  {command}")
+    click.echo("\nWhat is left for a person:")
+    for n, step in enumerate(steps_left(folder), 1):
+        click.echo(f"{n}. {step}")
 
 
 if __name__ == "__main__":

@@ -127,16 +127,22 @@ OTHER_NAMES = {
 """Other names of the platforms, such as those of FMI 3.0, and the names used here for them."""
 
 
+_MACHINES = {
+    ("Linux", "x86_64"): "linux64",
+    ("Linux", "aarch64"): "aarch64-linux",
+    ("Windows", "x86_64"): "win64",
+    ("Darwin", "x86_64"): "darwin64",
+    ("Darwin", "aarch64"): "aarch64-darwin",
+}
+HOSTS = tuple(_MACHINES.values())
+"""The platforms that this package runs on."""
+
+
 def host_platform(fmi: int = 2) -> str | None:
     """Return the platform that importers of this version look for on this machine, or None if it is not supported."""
     processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    return {
-        ("Linux", "x86_64"): "linux64",
-        ("Linux", "aarch64"): "aarch64-linux",
-        ("Windows", "x86_64"): "win64",
-        ("Darwin", "x86_64"): "darwin64",
-        ("Darwin", "aarch64"): "darwin64" if fmi == 2 else "aarch64-darwin",
-    }.get((platform.system(), processor))
+    name = _MACHINES.get((platform.system(), processor))
+    return "darwin64" if name == "aarch64-darwin" and fmi == 2 else name
 
 
 def compiler() -> list[str]:
@@ -223,15 +229,17 @@ def compile_location(pythonfmu: bytes) -> bytes:
     return _one(_Library("location.so", files, arguments, reason))
 
 
-def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
+def engine_flags(file: str = ENGINE_FILE.name, platform: str | None = None) -> list[str]:
     """Return the compiler's arguments for a file of the engine: those of the FMU, so the numbers are the same.
+
+    The library is for one of PLATFORMS, by default for this machine.
 
     The files that compute in the lanes of a vector are compiled for the widest vectors of this processor. The compiler
     warns wrongly about conditions that are vectors (-Wno-conversion). The file for many vehicles is compiled together
     with the engine. There, a product and a sum are one operation with one rounding error, which takes a sixth of the
     time away: the numbers need not be those of the FMU to the last bit.
     """
-    name = host_platform(fmi=3)
+    name = platform or host_platform(fmi=3)
     in_lanes, of_vehicles = file in (LANES_FILE.name, FILTER_LANES_FILE.name), file == LANES_FILE.name
     target = ["-target", PLATFORMS[name].target] if name else []
     vectors = ["-mcpu=native", "-Wno-conversion", *(["-ffp-contract=on"] if of_vehicles else [])]
@@ -241,14 +249,14 @@ def engine_flags(file: str = ENGINE_FILE.name) -> list[str]:
     return [*target, *C_FLAGS, *_LIBRARY_FLAGS, *WARNINGS, *processor, "-Wno-unused-function", *files, *libraries]
 
 
-def compile_engine(sources: Mapping[str, str]) -> bytes:
-    """Compile sources (file name to text), the last of which includes the others, to a library for this machine.
+def compile_engine(sources: Mapping[str, str], platform: str | None = None) -> bytes:
+    """Compile sources (file name to text), the last of which includes the others, to a library.
 
-    Raises BuildError.
+    It is for one of PLATFORMS, by default for this machine. Raises BuildError.
     """
     *_, file = sources
     reason = "the C compiler failed for the engine"
-    return _one(_Library("engine.library", sources, engine_flags(file), reason, most_lines=1))
+    return _one(_Library("engine.library", sources, engine_flags(file, platform), reason, most_lines=1))
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""The compiled engine or filter of a vehicle, from the user's cache folder, or compiled if it is not there yet."""
+"""The compiled engine or filter of a vehicle: from the user's cache folder, as the wheel has it, or compiled now."""
 
 import ctypes
 import hashlib
@@ -23,9 +23,12 @@ from rov_fmu.c.compile import (
     BuildError,
     compile_engine,
     engine_flags,
+    host_platform,
 )
 from rov_fmu.c.own_files import is_own_file, own_folder
+from rov_fmu.c.prebuilt import prebuilt
 from rov_fmu.c.source import sources
+from rov_fmu.equation.layout import Layout
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -42,6 +45,11 @@ _LOADED: dict[str, ctypes.CDLL] = {}
 _LOADING = Lock()
 
 
+def engine_sources(layout: Layout, file: Path = ENGINE_FILE) -> dict[str, str]:
+    """Return the C files of a library by their names. The last one includes the others."""
+    return sources(layout) | {path.name: path.read_text(encoding="utf-8") for path in _FILES[file]}
+
+
 def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     """Return the library of a vehicle made from a file of the engine. It does not depend on the coefficients.
 
@@ -50,7 +58,7 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
     key = f"{file.name} {vehicle.layout!r}"
     with _LOADING:
         if key not in _LOADED:
-            texts = sources(vehicle.layout) | {path.name: path.read_text(encoding="utf-8") for path in _FILES[file]}
+            texts = engine_sources(vehicle.layout, file)
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:
@@ -61,14 +69,14 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
 def _load(texts: dict[str, str]) -> ctypes.CDLL:
     """Load the library of these sources from the cache folder, or from a temporary one when that fails."""
     key = _key(texts)
-    content = None
+    content = prebuilt(host_platform(fmi=3), texts)
     folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
     try:
         own = own_folder(folder)
         for path in own.glob(f"{key}-*"):
             if is_own_file(path) and path.name == _name(key, path.read_bytes()):  # otherwise the library is damaged
                 return ctypes.CDLL(str(path))
-        content = compile_engine(texts)
+        content = content or compile_engine(texts)
         return ctypes.CDLL(str(_write(own, key, content)))
     except OSError as error:
         reason = f"{folder}: the compiled engine cannot be kept there: {error.strerror or error}"

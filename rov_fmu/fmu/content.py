@@ -8,6 +8,7 @@ from types import MappingProxyType
 from uuid import UUID
 
 from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
+from rov_fmu.c.prebuilt import MODULE, prebuilt
 from rov_fmu.c.source import generated_sources, unused_sources
 from rov_fmu.c.source import sources as motion_sources
 from rov_fmu.equation.layout import Layout
@@ -107,10 +108,16 @@ def _fmi_license(fmi: int) -> bytes:
     return ("\n".join(line.strip() for line in lines).strip() + "\n").encode()
 
 
+def module_sources(layout: Layout) -> dict[str, str]:
+    """Return the C files of the module of a page by their names: those of the FMU's motion, and what the page calls."""
+    page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
+    return page | motion_sources(layout)
+
+
 def web_module(layout: Layout) -> bytes:
     """Return the C of the FMU's motion, unchanged, as a WebAssembly module for the page that flies the vehicle.
 
     The page passes the coefficients to it. Raises BuildError.
     """
-    page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
-    return compile_module(page | motion_sources(layout))
+    sources = module_sources(layout)
+    return prebuilt(MODULE, sources) or compile_module(sources)

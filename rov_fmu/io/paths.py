@@ -17,6 +17,8 @@ LICENSE = _TOP / "LICENSE"
 """The licence, which goes into an FMU."""
 MODELS = _TOP / "models"
 """The folder of the vehicles that ship; each has a folder of its own."""
+PREBUILT = _TOP / "prebuilt"
+"""The folder of what a wheel has compiled for these vehicles. A checkout has no such folder."""
 
 
 def inside(folder: Path, name: str) -> Path:

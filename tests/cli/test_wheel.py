@@ -7,65 +7,30 @@ import subprocess
 import sys
 import tarfile
 import zipfile
-from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 from rov_fmu import __version__
-from rov_fmu.c.compile import compiler
-from tests.commands import FEW_TESTS, ROOT
+from rov_fmu.build import build
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE, FEW_TESTS, ROOT
 from tests.conftest import Made
+from verification.fresh_environment import Environment, environment
 
 CONSTRAINTS = ROOT / "constraints.txt"
 _PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
 
 
-def built(kind: str, folder: Path) -> Path:
-    """Build the wheel or the sdist of this checkout, and return its path."""
-    subprocess.run([sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", folder], check=True, cwd=ROOT)
+def built(kind: str, folder: Path, *, prebuilt: bool = False) -> Path:
+    """Build the wheel or the sdist of this checkout, and return its path. A wheel without prebuilt files is quick."""
+    own = os.environ | ({} if prebuilt else {"HATCH_BUILD_NO_HOOKS": "true"})
+    command = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
+    subprocess.run(command, check=True, cwd=ROOT, env=own)
     (path,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
     return path
-
-
-@dataclass(frozen=True)
-class Environment:
-    """A fresh virtual environment."""
-
-    folder: Path
-
-    @property
-    def bin(self) -> Path:
-        return self.folder / ("Scripts" if os.name == "nt" else "bin")
-
-    @property
-    def python(self) -> str:
-        return str(self.bin / "python")
-
-    def run(self, *command: str | Path, where: Path) -> str:
-        """Run a program of this environment, with no other on the path, in a folder; return what it prints."""
-        path = {"PATH": str(self.bin), "PYTHONSAFEPATH": "1"}
-        program = [str(self.bin / command[0]), *map(str, command[1:])]
-        return subprocess.run(
-            program, cwd=where, env=os.environ | path, stdout=subprocess.PIPE, text=True, check=True
-        ).stdout
-
-
-def environment(folder: Path, *requirements: str | Path, python: str = sys.executable) -> Environment:
-    """Make a virtual environment of a Python with the requirements installed.
-
-    It has no pip of its own, and its modules are not compiled, because most of them are never imported. If its C
-    compiler has the version of the one here, it is replaced by a link to that, because at another place a compiler
-    first builds the C libraries of all platforms again.
-    """
-    subprocess.run([python, "-m", "venv", "--without-pip", folder], check=True)
-    command = [sys.executable, *_PIP, "--python", str(folder), "install", "--no-compile", *map(str, requirements)]
-    subprocess.run(command, check=True, cwd=folder)
-    for own in folder.glob(f"lib/python3*/site-packages/ziglang-{version('ziglang')}.dist-info"):
-        shutil.rmtree(own.with_name("ziglang"))
-        own.with_name("ziglang").symlink_to(Path(compiler()[0]).parent, target_is_directory=True)
-    return Environment(folder)
 
 
 def pinned_environment(made_once: Made, factory: pytest.TempPathFactory) -> Environment:
@@ -132,8 +97,47 @@ def test_the_installed_command_does_everything_outside_the_checkout(
         assert expected in made.run(*command.split(), where=here)
 
 
+@pytest.fixture(scope="module")
+def full_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return built("wheel", tmp_path_factory.mktemp("full wheel"), prebuilt=True)
+
+
 @pytest.mark.long
-def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+def test_the_fmus_in_the_wheel_are_those_of_a_build(full_wheel: Path, tmp_path: Path) -> None:
+    inside = {Path(name).name: content for name, content in _content(full_wheel).items() if name.endswith(".fmu")}
+    assert {*inside} == {f"{name}.fmu" for name in SHIPPED}
+    for name, file in SHIPPED.items():
+        own = build(load_vehicle(file), tmp_path / f"{name}.fmu")
+        assert own.seconds.keys() == own.binaries.keys(), "all of it was compiled"
+        assert own.path.read_bytes() == inside[f"{name}.fmu"]
+
+
+@pytest.mark.long
+def test_vehicles_that_ship_need_no_compiler(full_wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pinned = [line.partition("==")[0] for line in CONSTRAINTS.read_text("utf-8").splitlines() if "==" in line]
+    same = tmp_path / "same.txt"  # the versions that the wheel was built with here
+    same.write_text("".join(f"{name}=={version(name)}\n" for name in pinned), encoding="utf-8")
+    made, here = environment(tmp_path / "venv", "-c", same, full_wheel), tmp_path / "here"
+    (link,) = made.folder.glob("lib/python3*/site-packages/ziglang")
+    link.unlink() if link.is_symlink() else shutil.rmtree(link)
+    here.mkdir()
+    for variable in ("XDG_CACHE_HOME", "ZIG_GLOBAL_CACHE_DIR"):
+        monkeypatch.setenv(variable, str(tmp_path / "empty cache"))
+    for name in SHIPPED:
+        made.run("rov-fmu", "fly", name, "-o", f"{name}.html", where=here)
+        assert "after 10 s" in made.run("rov-fmu", "simulate", name, where=here)
+        assert "The FMU is valid" in made.run("rov-fmu", "build", name, "-o", f"{name}.fmu", where=here)
+        assert (here / f"{name}.fmu").read_bytes() == _content(full_wheel)[f"rov_fmu/data/prebuilt/{name}.fmu"]
+    made.run("fmpy", "simulate", "videoray.fmu", "--output-file", "result.csv", where=here)
+    shutil.copy(BARE, here / "own.toml")
+    with pytest.raises(subprocess.CalledProcessError) as failed:
+        made.run("rov-fmu", "build", "own.toml", where=here, stderr=subprocess.PIPE)
+    assert failed.value.stderr == "rov-fmu: the C compiler is missing: pip install ziglang\n"
+
+
+@pytest.mark.long
+def test_the_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")
     sdist = built("sdist", tmp_path / "sdist")
     with tarfile.open(sdist) as archive:
         names = {name.partition("/")[2] for name in archive.getnames()}

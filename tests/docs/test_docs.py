@@ -33,7 +33,7 @@ State = dict[str, float]
 WEEKLY = ".github/workflows/weekly.yml"
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [
-    *(README, ROOT / "CONTRIBUTING.md", CHANGELOG),
+    *(README, ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", CHANGELOG),
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "models").rglob("README.md")),
     *sorted((ROOT / "examples").rglob("README.md")),
@@ -311,9 +311,11 @@ def test_tables_that_follow_from_the_code_are_as_it_has_them() -> None:
 
 
 def test_version_is_that_of_the_package() -> None:
-    assert f"\nversion: {__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    citation = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {__version__}\n" in citation
     newest = re.findall(r"^## (.*)$", CHANGELOG.read_text(encoding="utf-8"), re.MULTILINE)[0]
-    assert newest == f"[Unreleased] – {__version__}" or newest.startswith(f"[{__version__}] – ")
+    dated = re.fullmatch(rf"\[{__version__}\] – (\d{{4}}-\d\d-\d\d)", newest)
+    assert newest == f"[Unreleased] – {__version__}" or (dated and f'\ndate-released: "{dated[1]}"\n' in citation)
 
 
 def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() -> None:

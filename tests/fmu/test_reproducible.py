@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.cli.test_wheel import CONSTRAINTS, built, environment, interpreter, pinned_environment
+from tests.cli.test_wheel import CONSTRAINTS, built, interpreter, pinned_environment
 from tests.commands import ROOT
 from tests.conftest import Made
+from verification.fresh_environment import environment
 
 _SOME = ("--platform", "linux64", "--platform", "win64")
 _BUILDS = {"native": _SOME, "fmi3": ("--fmi", "3", *_SOME), "pythonfmu": ("--backend", "pythonfmu")}

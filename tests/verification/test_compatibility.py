@@ -1,5 +1,6 @@
 """The folder for fmi-standard.org keeps its rules, and the check finds what breaks them."""
 
+import json
 import shutil
 from pathlib import Path
 
@@ -10,6 +11,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.conftest import without_page
 from verification.compatibility import check, write
+from verification.interoperability.importers import IMPORTERS
 
 
 @pytest.fixture(scope="module")
@@ -35,6 +37,23 @@ def test_the_rules_are_kept_and_fmpy_agrees(written: Path, version: str) -> None
     assert (folder / "fmpy-validate.txt").read_text(encoding="utf-8").endswith(" 0 problems\n")
     reference = np.genfromtxt(folder / "videoray_ref.csv", delimiter=",", names=True)
     assert all(np.ptp(reference[name]) > 0.01 for name in ("u", "w", "r", "x", "z", "psi"))  # every axis moves
+
+
+def test_the_entry_has_the_keys_and_values_of_the_list_of_tools(written: Path) -> None:
+    """Those in the table "Format" of CONTRIBUTING.md of modelica/fmi-standard.org, of 2026-06-11."""
+    (entry,) = json.loads((written / "tools.json").read_text(encoding="utf-8"))
+    addresses = {"url", "logo", "vendorURL", "examplesURL"}
+    abilities = {"features", "platforms", "interfaces", "fmiVersions", "fmuExport", "fmuImport", "layeredStandards"}
+    assert entry.keys() == {"name", "license", "vendor", "description", *addresses, *abilities}
+    assert {*entry["platforms"]} <= {"macOS", "Linux", "Windows"}
+    assert {*entry["interfaces"]} <= {"GUI", "CLI", "library"}
+    assert not entry["description"].endswith(".")
+
+
+def test_the_page_names_every_importer_with_its_version(written: Path) -> None:
+    page = (written / "README.md").read_text(encoding="utf-8")
+    missing = [one.title for one in IMPORTERS if f"| {one.title} {one.version} |" not in page]
+    assert not missing
 
 
 BROKEN = {

@@ -5,13 +5,16 @@ import json
 import subprocess
 import sys
 import zipfile
+from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
+import build_backend
+from rov_fmu import __version__
 from rov_fmu.build import build
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE
+from tests.commands import BARE, ROOT
 from verification import release
 
 
@@ -70,8 +73,41 @@ def test_a_difference_of_two_builds_is_a_line(tmp_path: Path) -> None:
     assert release.differences(first, first) == []
 
 
+def test_an_fmu_in_the_wheel_that_differs_is_named(tmp_path: Path) -> None:
+    for name in ("same", "other"):
+        (tmp_path / f"{name}.fmu").write_bytes(b"beside")
+    wheel = tmp_path / "rov_fmu-0-py3-none-any.whl"
+    with zipfile.ZipFile(wheel, "w") as archive:
+        archive.writestr("rov_fmu/data/prebuilt/same.fmu", b"beside")
+        archive.writestr("rov_fmu/data/prebuilt/other.fmu", b"inside")
+    assert release.other_fmus(wheel, tmp_path) == [f"{wheel.name}: has other bytes of other.fmu"]
+
+
+def test_what_is_no_release_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numpy = version("numpy")
+    (tmp_path / "constraints.txt").write_text(f"# pinned\nnumpy=={numpy}\nclick==0.1\n", encoding="utf-8")
+    (tmp_path / "CHANGELOG.md").write_text(f"## [Unreleased] – {__version__}\n", encoding="utf-8")
+    (tmp_path / "CITATION.cff").write_text(f"type: software\nversion: {__version__}\n", encoding="utf-8")
+    monkeypatch.setattr(release, "ROOT", tmp_path)
+    pinned, undated = release.obstacles()
+    assert pinned.startswith(f"click {version('click')} is installed, and constraints.txt has 0.1")
+    assert undated.startswith("CHANGELOG.md: must have a line")
+
+
+def test_a_wheel_is_built_with_what_the_package_needs_in_the_pinned_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(ROOT)
+    monkeypatch.delenv("HATCH_BUILD_NO_HOOKS", raising=False)
+    needed = build_backend.get_requires_for_build_wheel()
+    pins = [line for line in (ROOT / "constraints.txt").read_text("utf-8").splitlines() if "==" in line]
+    assert {*pins, "click>=8.2"} <= {*needed}
+    assert not {*pins} & {*build_backend.get_requires_for_build_editable()}
+    monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")
+    assert not {*pins} & {*build_backend.get_requires_for_build_wheel()}
+
+
 @pytest.mark.long
-def test_two_builds_have_the_same_bytes(tmp_path: Path) -> None:
+def test_two_builds_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")  # tests/cli/test_wheel.py looks at the FMUs in a wheel
     first, second = tmp_path / "first", tmp_path / "the second"
     for folder in (first, second):
         folder.mkdir()

@@ -23,13 +23,20 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     """
     if bad := [one for one in outcomes if not one.verdict.is_good]:
         raise PageError(f"{page}: {bad[0].importer.name} {bad[0].verdict.value}, so the table is not written")
+    read_table(page)
     text = page.read_text(encoding="utf-8")
-    if not _TABLE.search(text):
-        raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
     heads, *rows = matrix(outcomes)
     lines = [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
     content = "\n".join(["", *lines, "", f"Run on {date.today()}.", "", ""])
     write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()), force=True)
+
+
+def read_table(page: Path) -> str:
+    """Return the table of a page, with the day of the run. Raises PageError."""
+    table = _TABLE.search(page.read_text(encoding="utf-8"))
+    if not table:
+        raise PageError(f"{page}: there is no <!-- matrix --> with an <!-- end --> after it")
+    return table[0]
 
 
 def matrix(outcomes: Sequence[Outcome]) -> list[list[str]]:

@@ -1,16 +1,16 @@
 """The closed loop in three engines, and in a plain loop.
 
-All are Jacobi masters: at each communication point they pass on the outputs, then both FMUs step with what they got.
+All are Jacobi masters: at each communication point they pass on the outputs, then all FMUs step with what they got.
 So a command acts one step after the depth that it answers to.
 
 Each function gives the outputs at the end of every step, named as "rov.z".
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,45 +20,60 @@ from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-from .autopilot import Autopilot
-from .system import OUTPUTS, STEP, STEPS, STOP, parameter_sets, system_files
+from .system import CONNECTIONS, OUTPUTS, SLAVES, STEP, STEPS, STOP, Values, parameter_sets, system_files
+from .with_fmpy import fly
 
 Trajectory = dict[str, NDArray[np.float64]]
-NAMES = [(component, name) for component, names in OUTPUTS.items() for name in names]
+NAMES = [(component, name) for component, names in OUTPUTS.items() for name in names if not name.startswith("F_")]
+"""What is compared. Thrust follows a command at once, and Ecos has passed on the next commands when it is read."""
+
+
+class Rov:
+    """The vehicle with the interface of the slaves: attributes for its variables, and a step."""
+
+    def __init__(self, values: Values) -> None:
+        rov = load_vehicle(VIDEORAY)
+        layout = rov.layout
+        self._inputs = list(layout.inputs)
+        vars(self).update({name: values.get(name, 0.0) for name in (*self._inputs, *OUTPUTS["rov"])})
+        rov = rov.with_(**{name: values[name] for name in layout.coefficients})
+        self._stepper = Stepper(rov, {}, OUTPUTS["rov"])
+
+    def do_step(self, current_time: float, step_size: float) -> None:  # noqa: ARG002
+        """Hold the inputs for a step."""
+        results = self._stepper.step([getattr(self, name) for name in self._inputs], step_size)
+        vars(self).update(zip(OUTPUTS["rov"], results, strict=True))
 
 
 def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
-    """The engine and the autopilot's class in a loop; sequential: the ROV gets the commands without delay."""
+    """Run the slaves and the vehicle in a loop; sequential: each gets the newest outputs of the others."""
     values = parameter_sets()[parameters]
-    rov = load_vehicle(VIDEORAY)
-    layout, given = rov.layout, values["rov"]
-    rov = rov.with_(**{name: given[name] for name in layout.coefficients})
-    inputs = dict.fromkeys(layout.inputs, 0.0) | {name: given[name] for name in layout.inputs if name in given}
-    stepper, state = Stepper(rov, inputs, [*layout.state]), dict.fromkeys(layout.state, 0.0)
-    autopilot = Autopilot(instance_name="autopilot")
-    for name, value in values["autopilot"].items():
-        setattr(autopilot, name, value)
+    parts: dict[str, Any] = {name: SLAVES[name](instance_name=name) for name in values if name in SLAVES}
+    for name, slave in parts.items():
+        vars(slave).update(values[name])
+    parts["rov"] = Rov(values["rov"])
 
-    def commands() -> list[float]:
-        return [getattr(autopilot, name) for name in layout.commands]
+    def pass_on(components: Iterable[str]) -> None:
+        for (start, output), (end, name) in CONNECTIONS.items():
+            if end in components:
+                setattr(parts[end], name, getattr(parts[start], output))
 
     rows = []
     for n in range(STEPS):
-        autopilot.z, autopilot.psi = state["z"], state["psi"]
-        before = commands()
-        autopilot.do_step(n * STEP, STEP)
-        after = stepper.step(commands() if sequential else before, STEP)
-        state = dict(zip(layout.state, after, strict=True))
-        now = {"rov": state, "autopilot": vars(autopilot)}
-        rows.append([now[component][name] for component, name in NAMES])
+        pass_on(parts)
+        for name, part in parts.items():
+            if sequential:
+                pass_on([name])
+            part.do_step(n * STEP, STEP)
+        rows.append([getattr(parts[component], name) for component, name in NAMES])
     return _trajectory(rows)
 
 
 def fmpy(folder: Path, parameters: str) -> Trajectory:
     """FMPy takes the parameters of all components as one set, and labels a row with the start of its step.
 
-    At the first step it sets each connected input to zero, not to the output at its other end: the ROV starts at the
-    surface, heading north.
+    At the first step it sets each connected input to zero, not to the output at its other end. Here all outputs start
+    at zero.
     """
     from fmpy.ssp.simulation import simulate_ssp
     from fmpy.ssp.ssd import Parameter, ParameterSet, read_ssd
@@ -70,6 +85,12 @@ def fmpy(folder: Path, parameters: str) -> Trajectory:
             together.parameters.append(Parameter(name=f"{component.name}.{p.name}", type=p.type, value=p.value))
     result = simulate_ssp(path, stop_time=STOP, step_size=STEP, parameter_set=together)
     return {f"{c}.{name}": np.array(result[f"{c}.{name}"][:STEPS]) for c, name in NAMES}
+
+
+def in_30_lines(folder: Path, parameters: str) -> Trajectory:
+    """Run FMPy from the SSP archive by with_fmpy.py."""
+    rows = list(fly(str(system_files(folder, parameters)[0]), STEP, STEPS))
+    return {f"{c}.{name}": np.array([row[f"{c}.{name}"] for row in rows]) for c, name in NAMES}
 
 
 def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
@@ -130,6 +151,7 @@ class Engine(NamedTuple):
 
 ENGINES = {
     "FMPy, SSP": Engine(fmpy, "fmpy"),
+    "FMPy, 30 lines": Engine(in_30_lines, "fmpy"),
     "libcosim, SSP": Engine(libcosim, "libcosimpy.CosimExecution"),
     "libcosim, OSP": Engine(partial(libcosim, osp=True), "libcosimpy.CosimExecution"),
     "Ecos, SSP": Engine(ecos, "ecospy"),

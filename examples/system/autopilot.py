@@ -24,6 +24,7 @@ _INPUTS: dict[str, tuple[float | bool, str]] = {
     "yaw": (0.0, "Stick to starboard, -1 ... 1: opposite commands of the rear thrusters while heading hold is off"),
     "depth_hold": (False, "Depth hold is on"),
     "heading_hold": (False, "Heading hold is on"),
+    "sag": (0.0, "Drop of the battery's voltage, by which the largest command falls (1)"),
 }
 _OUTPUTS = {
     "u_l": (0.0, "Left thruster command, positive forward"),
@@ -44,7 +45,7 @@ _PARAMETERS = {
     "omega_psi": (1.0, "Heading hold: natural frequency of the reference model (rad/s)"),
     "r_max": (0.3, "Heading hold: most yaw velocity of the reference (rad/s)"),
     "T_t": (1.0, "Tracking time of the anti-windup (s)"),
-    "u_max": (1.0, "Most of a command, 0 ... 1"),
+    "u_max": (1.0, "Most of a command with a full battery, 0 ... 1"),
     "u_rate": (4.0, "Most change of a command (1/s)"),
     "a_t_rear": (42.9, "Quadratic thrust coefficient of the rear pair (N)"),
     "b_t_rear": (2.711, "Linear thrust coefficient of the rear pair (N)"),
@@ -157,13 +158,16 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
 
         Z_d = self.depth.demand(self.K_p_z, self.K_d_z) if self.depth_hold else top.force(self.heave)
         N_d = self.heading.demand(self.K_p_psi, self.K_d_psi) if self.heading_hold else arm * rear.force(self.yaw)
-        most = rear.force(self.u_max)
+        u_most = self.u_max * (1.0 - self.sag)
+        most = rear.force(u_most)
         turning = clamp(N_d / arm, most)
         ahead = clamp(rear.force(self.surge), most - abs(turning))  # heading goes before speed
 
-        self.u_t = self._limited(self.u_t, top.command(Z_d), h)
-        self.u_l = self._limited(self.u_l, rear.command(ahead + turning), h)
-        self.u_r = self._limited(self.u_r, rear.command(ahead - turning), h)
+        change = self.u_rate * h
+        wanted = {"u_t": top.command(Z_d), "u_l": rear.command(ahead + turning), "u_r": rear.command(ahead - turning)}
+        for name, command in wanted.items():
+            before = getattr(self, name)
+            setattr(self, name, clamp(before + clamp(command - before, change), u_most))
 
         if self.depth_hold:
             excess = (Z_d - top.force(self.u_t)) / self.T_t
@@ -173,7 +177,3 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
             self.heading.advance(self.psi_ref, self.omega_psi, self.r_max, self.K_i_psi, excess, h)
         self.z_d, self.psi_d = self.depth.reference, self.heading.reference
         return True
-
-    def _limited(self, before: float, wanted: float, h: float) -> float:
-        """A command within its limits of magnitude and of change."""
-        return clamp(before + clamp(wanted - before, self.u_rate * h), self.u_max)

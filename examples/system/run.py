@@ -1,4 +1,4 @@
-"""Build the system, run it in every engine, compare, and draw it: python -m examples.station_keeping.run
+"""Build the system, run it in every engine, compare, and draw it: python -m examples.system.run
 
 It ends with 1 where two engines differ, or where the vehicle is not held.
 """
@@ -28,12 +28,12 @@ TIME = STEP * np.arange(1, STEPS + 1)
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line; the exit code."""
-    parser = argparse.ArgumentParser(prog="python -m examples.station_keeping.run", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m examples.system.run", description=__doc__)
     parser.add_argument(
         "folder",
         nargs="?",
         type=Path,
-        default=Path("build/station_keeping"),
+        default=Path("build/system"),
         help="where the files of the system go (default: %(default)s)",
     )
     parser.add_argument("--figure", type=Path, metavar="FILE.svg", help="the picture (default: in that folder)")
@@ -56,7 +56,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             "  a master that steps one after the other would differ by up to "
             f"{1000 * hasty['rov.z']:.1f} mm and {degrees(hasty['rov.psi']):.2f} deg"
         )
-    figure = options.figure or folder / "station_keeping.svg"
+    figure = options.figure or folder / "system.svg"
     draw(drawn, figure, force=options.force)
     print(f"\n{figure}")
     return 0 if good else 1
@@ -88,26 +88,28 @@ def held(result: Trajectory) -> tuple[float, float]:
 
 
 def draw(results: Mapping[str, Trajectory], path: Path, *, force: bool) -> None:
-    """Depth, heading, track and commands, to an SVG file."""
+    """Draw depth, heading, track, commands, current and battery to an SVG file."""
 
     def drawn(figure: Figure) -> None:
-        depth, heading, track, commands = figure.subplots(2, 2).flat
-        blue = {"color": LIGHT["blue"]}
+        depth, heading, track, commands, current, battery = figure.subplots(3, 2).flat
         t = TIME[::6]
+        blue = {"color": LIGHT["blue"]}
         for parameters, result in results.items():
             few = {name: values[::6] for name, values in result.items()}
-            line: dict[str, Any] = {"linewidth": 1.1, "linestyle": "--", "label": "model without tuning"}
-            if parameters == DEFAULT:
-                line = {"linewidth": 1.6, "label": "tuned model"}
-            depth.plot(t, few["rov.z"], **blue, **line)
+            is_default = parameters == DEFAULT
+            line: dict[str, Any] = {"linewidth": 1.6 if is_default else 1.1, "linestyle": "-" if is_default else "--"}
+            depth.plot(t, few["rov.z"], **blue, **line, label=parameters)
             heading.plot(t, np.degrees(few["rov.psi"]), **blue, **line)
             track.plot(few["rov.y"], few["rov.x"], **blue, **line)
             for name, role in (("u_l", "teal"), ("u_r", "violet"), ("u_t", "orange")):
-                line["label"] = name if parameters == DEFAULT else None
-                commands.plot(t, 100.0 * few[f"autopilot.{name}"], color=LIGHT[role], **line)
+                label = name if is_default else None
+                commands.plot(t, 100.0 * few[f"autopilot.{name}"], color=LIGHT[role], **line, label=label)
+            battery.plot(t, 100.0 * few["battery.sag"], color=LIGHT["teal"], **line, label=parameters)
         wanted: Any = {"color": LIGHT["orange"], "linewidth": 1.3, "linestyle": ":", "label": "wanted"}
         depth.plot(t, few["autopilot.z_d"], **wanted)
         heading.plot(t, np.degrees(few["autopilot.psi_d"]), **wanted)
+        for name, role in (("V_N", "teal"), ("V_E", "violet")):
+            current.plot(t, few[f"current.{name}"], color=LIGHT[role], linewidth=1.6, label=name)
         track.plot(0.0, 0.0, "o", markersize=4.5, **blue)
         track.set_aspect("equal", adjustable="datalim")
         for ax, quantity, unit, x in (
@@ -115,14 +117,16 @@ def draw(results: Mapping[str, Trajectory], path: Path, *, force: bool) -> None:
             (heading, "heading", "deg", "time (s)"),
             (track, "way to the north", "m", "way to the east (m)"),
             (commands, "commands", "%", "time (s)"),
+            (current, "current", "m/s", "time (s)"),
+            (battery, "drop of the voltage", "%", "time (s)"),
         ):
             name_axes(ax, quantity, unit, x)
         heading.set_yticks(np.arange(0.0, degrees(pi / 2) + 1.0, 15.0))
-        for ax in (depth, commands):
+        for ax in (depth, commands, current, battery):
             ax.legend()
         depth.invert_yaxis()
 
-    svg = svg_file(drawn, (8.6, 6.4), salt="station keeping", background=LIGHT["page"])
+    svg = svg_file(drawn, (8.6, 9.2), salt="system", background=LIGHT["page"])
     write_whole(Output(path, svg.encode()), force=force)
 
 

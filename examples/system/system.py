@@ -1,4 +1,4 @@
-"""The system of ROV and autopilot as files: two FMUs; an SSP archive and an OSP configuration a parameter set."""
+"""The system as files: four FMUs; an SSP archive and an OSP configuration for each vehicle."""
 
 import shutil
 import subprocess
@@ -9,22 +9,27 @@ from pathlib import Path
 
 from examples.systems import Component, System, write_osp, write_ssp
 from rov_fmu.cli import main
-from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+
+from .autopilot import Autopilot
+from .battery import Battery
+from .current import Current
 
 HERE = Path(__file__).parent
 STOP = 60.0  # s
 STEP = 0.05  # s, between two communication points
 STEPS = round(STOP / STEP)
 
-DEFAULT = "table9"
+DEFAULT = "videoray"
+IDENTIFIED = "videoray_refit"
 
 Values = Mapping[str, float | bool]
 
 # The set points, and as much forward stick as holds the place against current and tether.
 MISSION: Values = {"z_ref": 5.0, "psi_ref": pi / 2, "surge": 0.26, "depth_hold": True, "heading_hold": True}
-# The tether pulls aft, up and to starboard; the current runs westward, at the bow after the turn.
-SEA: Values = {"X_ext": -2.0, "Z_ext": -1.5, "N_ext": 0.05, "V_E": -0.2}
+# The tether pulls aft, up and to starboard. The current runs westward, at the bow after the turn.
+TETHER: Values = {"X_ext": -2.0, "Z_ext": -1.5, "N_ext": 0.05}
 
 # From output to input. What is not connected keeps the value of the parameter set.
 CONNECTIONS = {
@@ -33,25 +38,31 @@ CONNECTIONS = {
     ("autopilot", "u_l"): ("rov", "u_l"),
     ("autopilot", "u_r"): ("rov", "u_r"),
     ("autopilot", "u_t"): ("rov", "u_t"),
+    ("current", "V_N"): ("rov", "V_N"),
+    ("current", "V_E"): ("rov", "V_E"),
+    ("rov", "F_l"): ("battery", "F_l"),
+    ("rov", "F_r"): ("battery", "F_r"),
+    ("rov", "F_t"): ("battery", "F_t"),
+    ("battery", "sag"): ("autopilot", "sag"),
 }
-# The same by the groups of the OSP model descriptions.
-GROUPS = ("depth", "heading", "thruster_commands")
+# What stands for the connections of ROV and autopilot: the groups of the OSP model descriptions.
+GROUPS = dict.fromkeys(("depth", "heading", "thruster_commands"), ("rov", "autopilot"))
 
-FMUS = {"rov": "videoray.fmu", "autopilot": "Autopilot.fmu"}
+SLAVES: dict[str, type] = {"current": Current, "battery": Battery, "autopilot": Autopilot}
+FMUS = {"rov": "videoray.fmu"} | {name: f"{slave.__name__}.fmu" for name, slave in SLAVES.items()}
 OUTPUTS = {
-    "rov": ("x", "y", "z", "psi", "u", "w", "r"),
+    "rov": ("x", "y", "z", "psi", "u", "w", "r", "F_l", "F_r", "F_t"),
+    "current": ("V_N", "V_E"),
+    "battery": ("sag", "drawn", "electric_current"),
     "autopilot": ("u_l", "u_r", "u_t", "z_d", "psi_d"),
 }
 
 
 def parameter_sets() -> dict[str, dict[str, Values]]:
-    """Name to the values of each component: Table 9, and the same with α = β = 1."""
-    table9 = dict(load_vehicle(VIDEORAY).coefficients)
-    untuned = {name: 1.0 if name.startswith(("alpha", "beta")) else value for name, value in table9.items()}
-    return {
-        DEFAULT: {"rov": {**table9, **SEA}, "autopilot": MISSION},
-        "alpha_beta_1": {"rov": {**untuned, **SEA}, "autopilot": MISSION},
-    }
+    """Name of a vehicle to the values of each component. The FMU of the VideoRay takes those of the identified one."""
+    vehicles = {name: load_vehicle(SHIPPED[name]).coefficients for name in (DEFAULT, IDENTIFIED)}
+    others: dict[str, Values] = {"current": {}, "battery": {}, "autopilot": MISSION}
+    return {name: {"rov": {**values, **TETHER}, **others} for name, values in vehicles.items()}
 
 
 def system_files(folder: Path, parameters: str) -> tuple[Path, Path]:
@@ -60,7 +71,7 @@ def system_files(folder: Path, parameters: str) -> tuple[Path, Path]:
     A parameter set is a system of its own: of several, tools take another one each, and they open one .ssd an archive.
     """
     suffix = "" if parameters == DEFAULT else f"_{parameters}"
-    return folder / f"videoray{suffix}.ssp", folder / f"OspSystemStructure{suffix}.xml"
+    return folder / f"{parameters}.ssp", folder / f"OspSystemStructure{suffix}.xml"
 
 
 def build_system(folder: Path) -> None:
@@ -68,8 +79,9 @@ def build_system(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if main(["build", "--platform", "host", "--osp", "-o", str(folder / "videoray.fmu")]):
         raise RuntimeError("videoray.fmu was not built")
-    build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "autopilot.py"), "-d", str(folder)]
-    subprocess.run(build, check=True)
+    for name in SLAVES:
+        build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / f"{name}.py"), "-d", str(folder)]
+        subprocess.run(build, check=True)
     shutil.copy(HERE / "Autopilot_OspModelDescription.xml", folder)
     for parameters, values in parameter_sets().items():
         # Only connected inputs are connectors, for FMPy sets every one of them at every step.
@@ -79,7 +91,7 @@ def build_system(folder: Path) -> None:
             )
             for name, fmu in FMUS.items()
         }
-        system = System("station_keeping", components, STEP, STOP, CONNECTIONS, GROUPS)
+        system = System("dive", components, STEP, STOP, CONNECTIONS, GROUPS)
         ssp, osp = system_files(folder, parameters)
         write_ssp(ssp, system)
         write_osp(osp, system)

@@ -1,1 +1,0 @@
-"""The VideoRay under depth hold and heading hold, in three co-simulation engines."""
