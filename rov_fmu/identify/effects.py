@@ -20,8 +20,9 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
     """Yield all optional effects with their evidence, beside those that are kept."""
     file = fit.file.posterior
     for n, p in enumerate(file.table.parameters):
-        if p.null is None:
+        if not p.is_effect:
             continue
+        assert p.null is not None
         posterior = fit.posterior if n in file.absent else file
         value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
         if p.kind == "dead band":
