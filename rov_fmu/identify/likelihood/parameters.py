@@ -357,6 +357,8 @@ class Beginning:
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
     unseen: Sequence[Axis] = ()
     """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
+    has_times: bool = False
+    """True if there are tables of time constants, which contain the lag."""
     bent: frozenset[str] = frozenset()
     """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
@@ -375,11 +377,11 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
     found = [*_of_curves(known, prior), *_advance(known, prior("advance")), *_of_axes(known, prior)]
+    if (logs or known.has_times) and prior("lag"):
+        T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
+        mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
+        yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
     if logs:
-        if prior("lag"):
-            T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
-            mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
-            yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
         for part, key in CENTRE.items():
             if prior("buoyancy") and key in {*known.layout.restoring} - known.exact:
                 yield Parameter("centre of buoyancy", "", part, deviation=prior("buoyancy"), null=0.0, unit="m")
