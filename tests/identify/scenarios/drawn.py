@@ -5,7 +5,7 @@ of 20 ms), and shares no line with the identification. The folders are small, so
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, cos, exp, log, sin, sqrt
 from pathlib import Path
 
