@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
@@ -131,8 +131,10 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     run = proposed.run(z, number)
     parameters = enumerate(objective.table.parameters)
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
-    data = Data.of(run, concerned, len(z))
-    proposed.differentiate(z, number, range(len(concerned)), run, data, exact=False)
+    steps = np.array([objective.table.parameters[k].step for k in concerned])
+    # Where all innovations are 0, it does not matter that the gains of the filter would change, too.
+    slopes = proposed.changes(z, number, concerned, steps, run, begin=-1.0, span=inf)
+    data = Data(run.innovations, run.variances, slopes, np.zeros_like(slopes), concerned, len(z))
     return data.information(slice(None))[1]
 
 
