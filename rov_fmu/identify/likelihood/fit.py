@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, minimise
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, exact_minimum, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
@@ -23,9 +23,6 @@ _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
 _QUICK = 8.0
 """The reduction of J by new derivatives at which a quick fit ends."""
-_MOST = 8
-"""The most derivatives of the fit to all samples. Where it needs more, sizes of noise change on and on, and answers do
-not."""
 STARTS: tuple[Mapping[str, float], ...] = (
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
     {"slow": 1.0, "white": 2.0},
@@ -99,7 +96,7 @@ def fit_all(
     ends.sort(key=lambda end: end.value)
 
     show = moving(on_progress, "all samples", 0.3, 0.7)
-    near = minimise(full, _scaled(full, ends[0].z), show, most=_MOST, last=False)
+    near = minimise(full, _scaled(full, ends[0].z), show)
     for n, curve in enumerate(known.measured_curves):
         other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
@@ -109,11 +106,12 @@ def fit_all(
 
         low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
         show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
-        found = minimise(objective, near.z, show, enough=_QUICK, last=False, promises=bends)
+        found = minimise(objective, near.z, show, enough=_QUICK, promises=bends)
         if bends(found.value, found.information):
-            known, full, near = other, objective, minimise(objective, found.z, last=False)
+            known, full, near = other, objective, minimise(objective, found.z)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    best = minimise(full, _scaled(full, near.z), moving(on_progress, "exact derivatives", 0.8, 0.88), most=1)
+    on_progress("exact derivatives", 0.8)
+    best = exact_minimum(full, _scaled(full, near.z))
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
@@ -130,7 +128,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     For a measured curve, a linear share of 2 d almost makes up for a dead band d, as a (c - d)^2 is almost
     a c^2 - 2 a d c. In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
-    end = minimise(objective, start, on_step=on_step, enough=enough, last=False)
+    end = minimise(objective, start, on_step=on_step, enough=enough)
     larger = end.z.copy()
     for n, p in enumerate(objective.table.parameters):
         band = objective.table.place("dead band", p.of)
@@ -139,7 +137,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough)
     return min(end, other, key=lambda found: found.value)
 
 

@@ -123,7 +123,7 @@ def _least(tests: Tests, hypothesis: Hypothesis, start: Array | None = None) -> 
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
     quick = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows, thinned=True)
     try:
-        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
+        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start).value
     except DivergedError:
         return np.inf
     return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in hypothesis)

@@ -38,12 +38,9 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
 
 @pytest.fixture(scope="module")
 def place(objective: Objective) -> Array:
-    """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none.
-
-    Ten steps come near enough.
-    """
+    """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none."""
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
-    found = minimise(objective, objective.mean + louder * objective.deviation, most=10)
+    found = minimise(objective, objective.mean + louder * objective.deviation)
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
     z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
