@@ -19,6 +19,7 @@ from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.parameters import PRIORS
+from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.pictures import diagram
@@ -56,6 +57,7 @@ def tables() -> dict[str, Table]:
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
+    found["verdict"] = [("", "*usable*", "*do not use*"), ("---",) * 3, *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
         "varied": Varied,

@@ -51,8 +51,8 @@ def closed_form() -> dict[str, Expression]:
     }
 
 
-def way_formula() -> Expression:
-    """Return the way from the velocity v until `share` of it without any force: the integral of 1 / (A |v| + B)."""
+def stopping_formula() -> Expression:
+    """Return the distance from v until `share` of it without any force: the integral of 1 / (A |v| + B)."""
     A, B, share, speed = Name("A"), Name("B"), Name("share"), call("abs", Name("v"))
     quadratic = call("log", (A * speed + B) / (A * share * speed + B)) / A
     linear = where(B > 0.0, (1.0 - share) * speed / B, inf)
@@ -98,7 +98,7 @@ def response_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     return {"C": formulas["C"], **drag, **closed_form()}
 
 
-_closed_form, _way = compiled(closed_form()), compiled({"way": way_formula()})
+_closed_form, _stopping = compiled(closed_form()), compiled({"distance": stopping_formula()})
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:
@@ -149,7 +149,7 @@ class AxisAlone:
         A, B = self.drag(self.C)
         return float(_closed_form({"A": A, "B": B, "C": self.C})[name])
 
-    def stopping_way(self, v: float, share: float) -> float:
-        """Return the way from v until `share` of it without any force, m or rad."""
+    def stopping_distance(self, v: float, share: float) -> float:
+        """Return the distance from v until `share` of it without any force, m or rad."""
         A, B = self.drag(v)
-        return float(_way({"A": A, "B": B, "v": v, "share": share})["way"])
+        return float(_stopping({"A": A, "B": B, "v": v, "share": share})["distance"])

@@ -7,13 +7,21 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, Axis
+from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout
-from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axis_alone
+from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
-from rov_fmu.identify.likelihood.records import SampledLog, changes, driven_axes, recorded, typical, velocities
+from rov_fmu.identify.likelihood.records import (
+    SampledLog,
+    changes,
+    driven_axes,
+    recorded,
+    shown_axes,
+    typical,
+    velocities,
+)
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
@@ -194,11 +202,15 @@ def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
 def _layout_of(log: Log, of: Folder | Layout) -> Layout:
     """Return the part of the vehicle that a log concerns: one axis alone for a test of this axis.
 
-    Of a folder, it is that of the largest layout that the vehicle can have.
+    Of a folder, it is that of the largest layout that the vehicle can have. A dive that does not show how the vehicle
+    turns concerns only the axes that it shows: turns that nothing corrects would run away and, by the coupling, carry
+    the motion along these axes with them.
     """
     layout = of if isinstance(of, Layout) else of.layout if log.axis else of.logged
     assert layout
-    return with_axis_alone(layout, log.axis) if log.axis and log.axis.name in layout.kinds else layout
+    shown = [log.axis] if log.axis else shown_axes(log, layout)
+    is_part = bool(log.axis) or (layout.has(YAW) and YAW not in shown)
+    return with_axes_alone(layout, shown) if is_part and layout.has(*shown) else layout
 
 
 # ---- The prior -------------------------------------------------------------------------------------------------------
@@ -233,18 +245,25 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
     has_lag = any(name.startswith("T_") for name in given.base)
-    exact = _exact(given, vehicle.layout, measured)
+    moved = {form.axis for one in logs for form in one.layout.axes}
+    exact = _exact(given, vehicle.layout, measured, moved)
     errors = _thrust_errors(given, curves)
+    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
         vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
     )
+    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
+    known = replace(known, unseen=unseen, bent=bent)
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
-def _exact(given: GivenVehicle, layout: Layout, measured: Collection[str]) -> frozenset[str]:
+def _exact(given: GivenVehicle, layout: Layout, measured: Collection[str], moved: Collection[Axis]) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
-    leave as they are. The curves of a base are uncertain unless their forces were measured, and so is a lag."""
+    leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, and the
+    drag and the inertia of all axes along which a log moves: by the coupling, they decide about the other axes."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
+    keys = ("beta", *(f"{key}{end}" for key in ("a_d", "b_d") for end in ("", REVERSE)))
+    uncertain |= {axis.coefficient(key) for axis in moved for key in keys}
     own = given.description.known
     return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
 

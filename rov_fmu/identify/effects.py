@@ -17,11 +17,11 @@ _OUTLIER = 6.0
 
 def effects_of(fit: Fit) -> Iterator[Effect]:
     """Yield all optional effects with their evidence, beside those that are kept."""
-    table, gone = fit.posterior.table, fit.posterior.absent
-    for n, p in enumerate(table.parameters):
+    file = fit.file.posterior
+    for n, p in enumerate(file.table.parameters):
         if p.null is None:
             continue
-        posterior = fit.posterior.without([m for m in gone if m != n])
+        posterior = fit.posterior if n in file.absent else file
         value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
         if p.kind == "dead band":
             error = max(error, EXACT_BAND / QUANTILE)
@@ -54,20 +54,16 @@ _WORDS = {
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:
     """Yield how long after their rows the commands of each log act, s, without the dead time and lag of the vehicle."""
-    posterior, table = fit.posterior, fit.posterior.table
+    posterior, table = fit.file.posterior, fit.file.posterior.table
     for one in fit.objective.logs:
         place = table.place("logging offset", one.log.file)
         if place is None:
             continue
-        total = np.zeros(len(posterior.z))
-        total[place] = 1.0
-        for kind in ("dead time", "lag"):  # a delay that the vehicle does not keep belongs to the logger
-            later = table.place(kind)
-            if later is not None and later in posterior.absent:
-                total[later] = 1.0
-        offset, error = float(total @ posterior.z), float(np.sqrt(total @ posterior.covariance @ total))
+        offset, lag = float(posterior.z[place]), table.place("lag")
+        if lag in posterior.absent:  # a delay that the vehicle does not keep belongs to the logger
+            offset += float(posterior.z[lag])
         width = table.get(posterior.z, "logging width", one.log.file) * one.interval
-        yield Logging(one.log.file, one.interval, offset, around(offset, error), width)
+        yield Logging(one.log.file, one.interval, offset, around(offset, posterior.errors[place]), width)
 
 
 def sensors_of(fit: Fit) -> Iterator[Sensor]:

@@ -10,13 +10,14 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
     PLACED,
     Answer,
+    AxisOfBase,
     AxisResult,
     Coefficient,
     Disturbance,
@@ -54,8 +55,8 @@ _MOST_OUTLIERS = 0.005
 SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
-    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The way to stop is "
-    "that without thrust, from the steady speed to a tenth of it."
+    "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The "
+    "stopping distance is that without thrust, from the steady speed to a tenth of it."
 )
 _ASIDE = 0.2
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
@@ -116,6 +117,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         "nothing predicted": (
             "{axes}: no motion was predicted that the fit had not seen, so the errors of predictions are not known. "
             "Another log would show them"
+        ),
+        "assumed thrust": (
+            "{curve} thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A "
+            "spring balance tells it: pull with full command, and write command and force into thrust_{curve}.csv"
         ),
         "not identified": "{of}: the tests do not determine {coefficients}{instead}",
         "points differ": "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from the model",
@@ -241,13 +246,15 @@ def told(identification: Identification) -> Identification:
         "warnings": warnings(findings),
         # other files beside the tests say nothing about the vehicle
         "facts": facts(finding for finding in findings if finding.kind != "other files"),
-        "verdicts": tuple(map(verdict_in_words, identification.axes)),
+        "verdicts": tuple(verdict.of(axis) for axis, verdict in identification.verdicts.items()),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
     layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
-    vehicle = replace(vehicle, layout=layout, provenance=made)
+    units = " (in units of the assumed thrust)" if any(one.kind == "assumed thrust" for one in findings) else ""
+    data = vehicle.measured_from + units
+    vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
 
 
@@ -272,7 +279,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         found += _on_points(result)
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += _on_forces(identification)
+    found += [*_on_forces(identification), *_on_scale(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
     found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
@@ -287,16 +294,6 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
-
-
-def verdict_in_words(result: AxisResult) -> str:
-    """Return the verdict of an axis with its reasons: `surge: good. The 95% bands contain 97% ...`."""
-    return f"{result.axis.name}: {result.verdict.word}. {' '.join(map(with_stop, result.verdict.reasons))}"
-
-
-def with_stop(sentence: str) -> str:
-    """Return a sentence that ends with a full stop or a question mark."""
-    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
 
 
 def name_of(p: Prediction) -> str:
@@ -318,8 +315,28 @@ def next_tests(identification: Identification) -> list[str]:
     """Return what to measure next, in sentences: the useful test of each axis, the widest interval first.
 
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
-    any test there is none.
+    any test there is none. How to identify the other axes of the vehicle comes last.
     """
+    others = [f"{one.axis.name}: {how_to_identify(one)}." for one in identification.axes_of_base]
+    return [*_next_tests(identification), *others]
+
+
+def how_to_identify(one: AxisOfBase) -> str:
+    """Return what an owner can record, so that an axis of the base is identified."""
+    axis, sensor = one.axis, "its angle and its rate"
+    if axis is HEAVE:
+        sensor = "the depth"
+    elif axis is YAW:
+        sensor = "the heading or the turn rate"
+    elif not axis.is_rotation:
+        sensor = (
+            "its velocity (a DVL). Without one, film the vehicle along a tape on the floor, and write time, command "
+            f"and distance into log_{axis.name}_1.csv; a track from a video does, too"
+        )
+    return f"{one.reason}. Command it both ways, and log {sensor}"
+
+
+def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
         f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
@@ -530,6 +547,21 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+
+
+def _on_scale(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding for each curve whose thrust is an assumption: neither a test nor rov.toml tells it."""
+    layout, description = identification.vehicle.layout, identification.folder.rov_file.description
+    told = {p.subject for p in identification.forces} | ({*description.known} if description else set())
+    for curve, known in identification.curves.items():
+        a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
+        if a_t in {one.name for one in known} and not {curve, a_t} & told:
+            yield Finding("assumed thrust", curve=curve)
+
+
+def assumed_thrust(identification: Identification) -> tuple[str, ...]:
+    """Return a sentence for each curve whose thrust is an assumption: it says in which units the forces are."""
+    return sentences(finding for finding in identification.findings if finding.kind == "assumed thrust")
 
 
 _REMEDIES = {

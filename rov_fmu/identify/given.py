@@ -89,7 +89,7 @@ def narrowed(description: Description, tested: TestContents, folder: Path, usele
     known = {**_kept_from_base(description, tested), **description.known}
     wide = _without_unknown_options(description.layout, known)
     axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
-    layout = _with_axes_alone(wide, axes)
+    layout = with_axes_alone(wide, axes)
     if not layout.axes:
         line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
         return Narrowing(None, test_mistakes=tuple(useless) or (line,))
@@ -100,7 +100,7 @@ def narrowed(description: Description, tested: TestContents, folder: Path, usele
         if wrong := [*check_thruster_places(own)]:
             hardware += wrong
         else:
-            own = _with_axes_alone(own, axes)
+            own = with_axes_alone(own, axes)
             hardware += check_layout(own, tested.axes)
     hardware += _missing_hardware(description, layout, known)
     tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
@@ -166,12 +166,7 @@ def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, axes=tuple(form for form in layout.axes if form.axis in axes))
 
 
-def with_axis_alone(layout: Layout, axis: Axis) -> Layout:
-    """Return the part of a layout that moves along one axis."""
-    return _with_axes_alone(layout, [axis])
-
-
-def _with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
+def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     """Keep these axes, the thrusters and fins that act on them, and the curves and inputs of these."""
     layout = _with_axes(layout, axes)
     thrusters = tuple(t for t in layout.thrusters if any(t in layout.drivers(axis) for axis in axes))

@@ -1,8 +1,12 @@
 """The vehicle of a fit, with the sources, intervals and correlations of its coefficients."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+import warnings
+from collections.abc import Iterable, Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import partial
+from os.path import commonpath
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,21 +20,24 @@ from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG
-from rov_fmu.identify.likelihood.posterior import QUANTILE, around
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
+from rov_fmu.vehicle.writer import vehicle_text
 
 _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 """The keys of dead bands."""
-_DIGITS = 6
-"""The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1.
-They are more than any test gives, but few enough to be equal on every machine."""
+_DIGITS = (6, 9, 17)
+"""The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1:
+more than most tests give, and few enough to be equal on every machine. The others are for very exact data."""
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
+_SAME = 0.1
+"""The difference of J that makes no other vehicle; 1 is one unit of 2 ln of the likelihood."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
 
@@ -40,18 +47,17 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
 
     These have intervals where the tests determine them.
     """
-    given, kept = tests.given, fit.kept
+    given, file = tests.given, fit.file.posterior
     layout = _layout(tests, fit)
     own = replace(layout, has_fixed_names=False)  # the names that the vehicle has when its file is read
-    values = {name: float(value) for name, value in _in_file(fit, kept.z).items()}
-    values |= {  # a file has no smaller exponent
-        c.coefficient("n_V"): max(values[c.coefficient("n_V")], 1.0) for c in layout.curves if "n_V" in c.keys
-    }
+    values = {name: float(value) for name, value in file.table.coefficients(file.z).items()}
     rov = Vehicle(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in given.known.items() if name in layout.coefficients}
-    changed = _changed(fit, rov)
+    changed = _changed(file, rov)
     coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
-    identified = {name: one.interval for name, one in coefficients.items() if one.interval}
+    forms = (form for form in layout.axes if form.axis in fit.known.unseen)
+    unseen = {form.coefficient(key) for form in forms for key in (*form.keys, "beta")}
+    identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = given.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
@@ -66,20 +72,20 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     names = [name for name in changed if name in identified or name in intervals]
     for name in changed:
         sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
-        if name not in names:
+        if name not in {*names, *unseen}:
             sources[name] = "Assumed: the tests do not determine it"
     if names:
         held = [  # a file without a dead band has an exact one of 0
             name
             for name, (*_, key) in fit.known.layout.keys_in_file.items()
-            if name not in names and (name in changed or key in _DEAD_BAND)
+            if name not in {*names, *unseen} and (name in changed or key in _DEAD_BAND)
         ]
-        _, covariance, _ = _numbers(fit, [*names, *held])
-        marginal = np.sqrt(np.diag(covariance))
-        covariance = _given_the_last(covariance, len(names))
+        of_file, full = (_numbers(posterior, fit, [*names, *held]) for posterior in fit.posteriors)
+        shift = full.values - of_file.values
+        covariance = _given_the_last(full.covariance + np.outer(shift, shift), len(names))
         errors = np.sqrt(np.diag(covariance))
         for n, name in enumerate(names):
-            intervals[name] = identified.get(name) or _interval(rov, name, float(marginal[n]))
+            intervals[name] = identified.get(name) or _interval(rov, name, n, (of_file, full))
             others = {
                 other: float(np.clip(covariance[n, m] / (errors[n] * errors[m]), -1.0, 1.0))
                 for m, other in enumerate(names[:n])
@@ -136,11 +142,29 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
     )
 
 
-def rounded(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle with meaningful digits. Rounding keeps each value within its interval."""
+def written(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
+    """Return the vehicle with meaningful digits, after a check that its file, when it is read, is the fit.
 
+    Rounding keeps each value within its interval, and J, which very exact data change with the seventh digit. Raises
+    RuntimeError: this program is wrong then.
+    """
+    top = Path(commonpath([folder.resolve(), *(path.resolve().parent for path in vehicle.files)]))
+    objective, least = copy(fit.file.objective), fit.file.minimum
+    for digits in _DIGITS:
+        short = _rounded(vehicle, digits)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            read = read_vehicle(top / "vehicle.toml", vehicle_text(short, top).encode())
+        objective.table = fit.file.objective.table.of_vehicle(read)
+        rise = objective.value(least.z, objective.runs(least.z, least.runs)) - least.value
+        if abs(rise) < _SAME:
+            return short
+    raise RuntimeError(f"{folder}: J of the vehicle file differs by {rise:.3g} from that of the fit")
+
+
+def _rounded(vehicle: Vehicle, digits: int) -> Vehicle:
     def short(value: float) -> float:
-        return float(f"{value:.{_DIGITS}g}")
+        return float(f"{value:.{digits}g}")
 
     low, high = vehicle.command_range
     return replace(
@@ -151,7 +175,7 @@ def rounded(vehicle: Vehicle) -> Vehicle:
         estimates={
             name: Estimated(
                 error=short(row.error),
-                correlation={other: r for other, value in row.correlation.items() if (r := round(value, _DIGITS))},
+                correlation={other: r for other, value in row.correlation.items() if (r := round(value, digits))},
             )
             for name, row in vehicle.estimates.items()
         },
@@ -177,35 +201,44 @@ METHOD = (
 _SOURCE = "Identified from the tests, as the method says"
 
 
-def _in_file(fit: Fit, z: Array) -> dict[str, Any]:
-    """Return the coefficients of the vehicle file for the coordinates of the parameters."""
-    table = fit.kept.table
-    coefficients = table.coefficients(z)
-    for one in _quadratics(fit, z):
+def _in_file(posterior: Posterior, fit: Fit, z: Array) -> dict[str, Any]:
+    """Return the coefficients of a vehicle file for the coordinates of the parameters."""
+    coefficients = posterior.table.coefficients(z)
+    for one in _quadratics(posterior, fit, z):
         coefficients |= one.coefficients
-    return coefficients | {name: table.base[name] for name in table.exact}
+    return coefficients | {name: posterior.table.base[name] for name in posterior.table.exact}
 
 
-def _quadratics(fit: Fit, z: Array) -> Iterator[Quadratic]:
-    """Yield the curves of the file for those that bend. A file has no shapes of curves: it has the nearest ones."""
-    table, (low, high) = fit.kept.table, fit.command_range
-    vehicle, shapes = table.model(z)
+def _quadratics(posterior: Posterior, fit: Fit, z: Array) -> Iterator[Quadratic]:
+    """Yield the curves of a file for those that bend. A file has no shapes of curves: it has the nearest ones."""
+    low, high = fit.command_range
+    vehicle, shapes = posterior.table.model(z)
     for curve in fit.known.curves:
-        if curve.name in shapes.of:
+        if curve.name in shapes.of and shapes.of[curve.name].any():
             bands = shapes.dead_bands[curve.name]
             yield from nearest(curve, partial(shapes.forces, vehicle, curve), bands, low, high)
 
 
-def _changed(fit: Fit, vehicle: Vehicle) -> list[str]:
+def _changed(posterior: Posterior, vehicle: Vehicle) -> list[str]:
     """Return the names of the coefficients of the vehicle that the parameters change."""
-    parameters = fit.posterior.table.parameters
-    moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in fit.posterior.of_vehicle]
-    values = _in_file(fit, changed(fit.posterior.z, [(0, 0.0), *moves]))
+    parameters = posterior.table.parameters
+    moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in posterior.of_vehicle]
+    values = posterior.table.coefficients(changed(posterior.z, [(0, 0.0), *moves]))
     return [name for name in vehicle.coefficients if np.ptp(values[name]) > 0.0]
 
 
-def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
-    """Return some coefficients of the vehicle file, their covariance, and their covariance by the prior.
+@dataclass(frozen=True, eq=False)
+class _Numbers:
+    """Some coefficients of a vehicle file by a posterior."""
+
+    values: Array
+    covariance: Array
+    prior: Array
+    """Their covariance by the prior."""
+
+
+def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
+    """Return some coefficients of a vehicle file.
 
     The forces of a measured curve that bends differ from those of the file by a misfit, which is uncertain, too. The
     covariance of a_t and b_t contains it: the mean variance of the forces grows by the mean square of the misfit. The
@@ -213,29 +246,30 @@ def _numbers(fit: Fit, names: Sequence[str]) -> tuple[Array, Array, Array]:
     """
 
     def measured(z: Array) -> list[Quadratic]:
-        some = (one for one in _quadratics(fit, z) if one.curve.name in fit.known.measured_curves)
+        some = (one for one in _quadratics(posterior, fit, z) if one.curve.name in fit.known.measured_curves)
         return [one for one in some if {*one.coefficients} <= {*names}]
 
     def values(z: Array) -> Array:
-        coefficients, misfits = _in_file(fit, z), [one.misfit for one in measured(z)]
+        coefficients, misfits = _in_file(posterior, fit, z), [one.misfit for one in measured(z)]
         return np.vstack([*(np.broadcast_to(coefficients[name], z.shape[1]) for name in names), *misfits])
 
-    found, covariance, prior = fit.averaged.numbers(values)
+    found, covariance, prior = posterior.numbers(values)
     first, own = len(names), slice(len(names))
-    for one in measured(fit.averaged.z[:, None]):
+    for one in measured(posterior.z[:, None]):
         here = slice(first, first := first + len(one.misfit))
         places = [names.index(name) for name in one.coefficients]
         mean_square = float(np.mean(found[here] ** 2 + np.diag(covariance[here, here])))
         covariance[np.ix_(places, places)] += one.covariance(mean_square)
-    return found[own], covariance[own, own], prior[own, own]
+    return _Numbers(found[own], covariance[own, own], prior[own, own])
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
     """Return the layout without the effects that are absent."""
-    table = fit.kept.table
-    present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in fit.posterior.absent}
+    file = fit.file.posterior
+    table = file.table
+    present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in file.absent}
     base, own = tests.given.base, tests.given.description.known
-    coefficients: dict[str, float] = table.coefficients(fit.kept.z)
+    coefficients: dict[str, float] = table.coefficients(file.z)
 
     def has(part: Part, key: str) -> bool:
         name = part.coefficient(key)
@@ -281,21 +315,24 @@ def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterato
     """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
     if not changed:
         return
-    _, covariance, prior = _numbers(fit, changed)
-    began = _in_file(fit, np.array([p.mean for p in fit.posterior.table.parameters]))
+    numbers = [_numbers(posterior, fit, changed) for posterior in fit.posteriors]
+    began = _in_file(fit.posterior, fit, np.array([p.mean for p in fit.posterior.table.parameters]))
     for n, name in enumerate(changed):
-        error, before = float(np.sqrt(covariance[n, n])), float(np.sqrt(prior[n, n]))
+        error, before = (float(np.sqrt(C[n, n])) for C in (numbers[-1].covariance, numbers[-1].prior))
         told = error / before if before > 0.0 else 0.0
         declaration, value = vehicle.layout.coefficients[name], vehicle[name]
-        interval = _interval(vehicle, name, error) if told <= _TOLD and error > 0.0 else None
+        interval = _interval(vehicle, name, n, numbers) if told <= _TOLD and error > 0.0 else None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
 
 
-def _interval(vehicle: Vehicle, name: str, error: float) -> Interval:
-    """Return the 95 % interval of a coefficient within its bounds."""
+def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Numbers]) -> Interval:
+    """Return the smallest interval of a coefficient with the 95 % intervals of all posteriors, within its bounds."""
     declaration, key = vehicle.layout.coefficients[name], vehicle.layout.keys_in_file[name][-1]
-    if key in _DEAD_BAND:
-        error = max(error, EXACT_BAND / QUANTILE)
-    low, high = around(vehicle[name], error, positive=declaration.minimum >= 0.0 and key not in ("T", *_DEAD_BAND))
-    return max(low, declaration.minimum), min(high, declaration.maximum)
+    least = EXACT_BAND / QUANTILE if key in _DEAD_BAND else 0.0
+    positive = declaration.minimum >= 0.0 and key not in ("T", *_DEAD_BAND)
+    ends = [
+        around(one.values[place], max(one.covariance[place, place] ** 0.5, least), positive=positive) for one in numbers
+    ]
+    low, high = hull((vehicle[name], vehicle[name]), *ends)
+    return float(max(low, declaration.minimum)), float(min(high, declaration.maximum))

@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -14,15 +14,26 @@ from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import beyond_thrusters, told
-from rov_fmu.identify.identified_vehicle import identified_vehicle, rounded, with_own_inputs
+from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions, structure
+from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.result import AxisResult, Coefficient, Disturbance, Effect, Identification, Prediction, Slip
-from rov_fmu.identify.rows import HeldOut, held_out_rows, points_of
+from rov_fmu.identify.result import (
+    AxisOfBase,
+    AxisResult,
+    Coefficient,
+    Disturbance,
+    Effect,
+    Identification,
+    Prediction,
+    Slip,
+)
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
+from rov_fmu.identify.verdict import MOST_GAIN, Evidence, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
+from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
 from rov_fmu.vehicle.uncertainty import correlation
@@ -49,7 +60,8 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
     show(0)
     predicted = []
-    for prediction in assess.predictions(fit.objective, fit.best, against):
+    out = held_out(fit.objective, fit.best)
+    for prediction in predictions(fit.objective, fit.best, out, against):
         predicted.append(prediction)
         show(len(predicted))
     runs = followed(fit.objective, fit.best.z)
@@ -59,29 +71,32 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = slips(tests, known, fit.objective, fit.best.z)
-    held_out = held_out_rows(fit)
+    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors)
+    values = held_out_rows(fit.objective, fit.best)
+    errors = structure(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests.given)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
-        one = _axis(tests, fit, vehicle, coefficients, axis, predicted, slow, wrong, held_out, effects)
-        if pushes := assess.pushes_of_thrusters(vehicle, of_file, axis):
-            strongest = fit.command_range[1]
-            one = replace(one, answers=assess.answers(fit.averaged, axis, vehicle, pushes, strongest))
+        pushes = assess.pushes_of_thrusters(vehicle, of_file, axis)
+        one = _axis(
+            tests, fit, vehicle, coefficients, axis, out, predicted, slow, wrong, values, effects, errors, pushes
+        )
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
+    of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(
         folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
         inputs=tests.inputs,
-        vehicle=rounded(of_file),
+        vehicle=of_file,
         against=against,
         axes=tuple(axes),
+        axes_of_base=tuple(_of_base(tests, fit, of_file)),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
-        forces=tuple(points_of(tests, held_out, vehicle, "thrust")),
+        forces=tuple(points_of(tests, values, vehicle, "thrust")),
         effects=effects,
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
@@ -101,33 +116,72 @@ def _axis(
     vehicle: Vehicle,
     coefficients: Mapping[str, Coefficient],
     axis: Axis,
+    out: Sequence[HeldOut],
     predicted: Sequence[Prediction],
     slow: Sequence[Disturbance],
     wrong: Sequence[Slip],
-    held_out: HeldOut,
+    values: Values,
     effects: Sequence[Effect],
+    errors: Mapping[Axis, float],
+    pushes: Sequence[float],
 ) -> AxisResult:
-    own = tuple(p for p in predicted if p.axis is axis)
+    own, strongest = tuple(p for p in predicted if p.axis is axis), fit.command_range[1]
     is_told = _is_thrust_told(tests, vehicle, axis)
-    answers = assess.answers(fit.averaged, axis, vehicle, strongest=fit.command_range[1]) if is_told else ()
+    fits = [one.fit for one in out if axis in one.axes]
+    is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
+    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, strongest, fits) if is_told and is_steady else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.drivers(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
-    steady, times = ([*points_of(tests, held_out, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
+    steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
     limits = tests.given.description.tables.limits
+    shown = replace(fit.posterior, z=fit.file.posterior.z)
+    known = _those_of(coefficients, vehicle.layout.kinds[axis.name], "beta")
+    evidence = Evidence(
+        predictions=own,
+        answers=answers,
+        strongest=strongest,
+        steady=steady,
+        disturbances=unknown,
+        effects=acting,
+        slips=[s for s in wrong if s.file in files],
+        misfits=misfits,
+        structure=max(
+            (ratio for other, ratio in errors.items() if _share_thrusters(vehicle, axis, other)), default=0.0
+        ),
+        inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
+        difference=fit.difference,
+    )
     return AxisResult(
         axis=axis,
-        verdict=assess.verdict(
-            own, answers, unknown, fit.difference, [s for s in wrong if s.file in files], steady, acting, misfits
-        ),
+        verdict=verdict(evidence),
         answers=answers,
-        known=_those_of(coefficients, vehicle.layout.kinds[axis.name], "beta"),
+        known=known,
         predictions=own,
         points=(*steady, *times),
-        next_test=next_test(fit.objective, fit.averaged, axis, limits, answers) if is_told else None,
+        next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
     )
+
+
+def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
+    """Return True if a thruster drives both axes: what it lacks in one of them it lacks in both."""
+    return one is other or any(t in vehicle.layout.drivers(other) for t in vehicle.layout.drivers(one))
+
+
+def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
+    """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them."""
+    description = tests.given.description
+    shown = {m.sensor.axis for one in fit.objective.logs for m in one.measured}
+    for axis in (form.axis for form in vehicle.layout.axes if form.axis not in fit.known.fitted):
+        is_of_file = axis.coefficient("a_d") in description.known
+        told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
+        if axis.name in tests.tested.axes:
+            told = "no test changes it"
+        elif axis in shown:
+            told = "nothing in the logs drives it"
+        yield AxisOfBase(axis, ROV_FILE if is_of_file else description.base_name, told)
 
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:

@@ -3,9 +3,9 @@
 Nothing here is computed: `identify` puts the result together, and the findings (findings.py) are functions of it.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, isfinite, nan, sqrt
+from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
 import numpy as np
@@ -14,10 +14,10 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
+from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Interval = tuple[float, float]
-Word = Literal["good", "usable", "do not use"]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
@@ -26,9 +26,14 @@ PLACED = {True: "velocity sensor", False: "position sensor"}
 _UNUSUAL = 2.5
 """An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 
+_MOVING = 3.0
+"""A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
+
 MOST_UNKNOWN = 0.05
 """A model must not be used if unknown slow forces, changes of the thrust and velocities over ground together exceed
 this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
+LEAST_NOISE = 0.01
+"""The noise of a sensor counts as at least this share of the motion that it shows."""
 DISAGREEMENT = 40.0
 """The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
 
@@ -61,7 +66,7 @@ class Answer:
     rise: tuple[float, Interval]
     """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
     stop: tuple[float, Interval]
-    """The way from it to a tenth of it without thrust, m or rad."""
+    """The stopping distance: from it to a tenth of it without thrust, m or rad."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +96,8 @@ class Prediction:
     """The RMS error."""
     coverage: float
     """The share of the samples inside the 95 % band."""
+    loss: float
+    """The mean of ln S + rho(e² / S), as in J, with the error e and the square S of the deviation."""
     compared: Array | None = None
     """The same prediction by the vehicle to compare with; None if it lacks the axis or has other thrusters."""
 
@@ -104,11 +111,31 @@ class Prediction:
         """True where the band says something: of a velocity over a recording, and of a position over 10 s."""
         return self.is_position == (self.span < inf)
 
+    @property
+    def least(self) -> float:
+        """The least error that counts: the noise, but at least a small share of the motion."""
+        return max(self.noise, LEAST_NOISE * self.unchanged)
+
+    @property
+    def moves(self) -> bool:
+        """True if the quantity changes by clearly more than the noise of its sensor."""
+        return self.unchanged > _MOVING * self.noise
+
 
 def coverage_of(predictions: Iterable[Prediction]) -> float:
     """Return the share of samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
     judged = [p for p in predictions if p.is_judged]
     return sum(p.coverage * len(p.time) for p in judged) / sum(len(p.time) for p in judged) if judged else nan
+
+
+def score_of(predictions: Sequence[Prediction]) -> float:
+    """Return the score G of predictions of what moves: 0 for one of no change, 1 for errors as small as the noise.
+
+    G = (L0 - L) / (L0 - Ln), where L is the loss of a prediction, L0 that of no change, whose band is as wide as its
+    errors are, and Ln that of a prediction with the errors and the band of the sensor's noise. NaN without predictions.
+    """
+    gains = [(len(p.time), 1.0 + 2.0 * log(p.unchanged), 2.0 * log(p.unchanged / p.least), p.loss) for p in predictions]
+    return sum(n * (L0 - L) for n, L0, _, L in gains) / sum(n * all_ for n, _, all_, _ in gains) if gains else nan
 
 
 @dataclass(frozen=True)
@@ -245,6 +272,32 @@ class Verdict:
     reasons: tuple[str, ...]
     """Sentences: what keeps it from being better, or for `good` what it rests on."""
 
+    def of(self, axis: Axis) -> str:
+        """Return the verdict of an axis as a sentence: `surge: good. The 95% bands contain 97% ...`."""
+        stop = ":" if self.word == "not identified" else "."
+        return f"{axis.name}: {self.word}{stop} {' '.join(map(with_stop, self.reasons))}"
+
+
+def with_stop(sentence: str) -> str:
+    """Return a sentence that ends with a full stop or a question mark."""
+    return sentence if sentence.endswith((".", "?", "!")) else f"{sentence}."
+
+
+@dataclass(frozen=True)
+class AxisOfBase:
+    """An axis of the vehicle that no test identifies."""
+
+    axis: Axis
+    source: str
+    """The base, or rov.toml."""
+    reason: str
+    """Such as `nothing in the logs shows it`."""
+
+    @property
+    def verdict(self) -> Verdict:
+        """The word, with where its coefficients are from."""
+        return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+
 
 @dataclass(frozen=True)
 class NextTest:
@@ -340,8 +393,16 @@ class Identification:
     """The slow force along each moving axis of each log."""
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
+    axes_of_base: tuple[AxisOfBase, ...] = ()
+    """The other axes of the vehicle."""
     findings: tuple[Finding, ...] = ()
     """What to tell, in the order of its weight. The sentences and severities are in findings.py."""
+
+    @property
+    def verdicts(self) -> dict[Axis, Verdict]:
+        """The verdict of every axis of the vehicle, those that are identified first."""
+        found = {one.axis: one.verdict for one in self.axes}
+        return found | {one.axis: one.verdict for one in self.axes_of_base}
 
     @property
     def seconds(self) -> float:

@@ -8,6 +8,7 @@ from rov_fmu.identify.findings import (
     SHARES,
     STOPPING,
     answer_at,
+    assumed_thrust,
     by_heading,
     driven_aside,
     extrapolated,
@@ -16,7 +17,6 @@ from rov_fmu.identify.findings import (
     not_read,
     repairs,
     size_in_words,
-    verdict_in_words,
     with_error,
 )
 from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
@@ -35,8 +35,8 @@ def print_identification(identification: Identification) -> None:
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for words in repairs(identification):
         paragraph(out, f"First: {words}")
-    for result in identification.axes:
-        paragraph(out, f"- {verdict_in_words(result)}")
+    for axis, verdict in identification.verdicts.items():
+        paragraph(out, f"- {verdict.of(axis)}")
     asides = [*driven_aside(identification), *extrapolated(vehicle)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
@@ -52,7 +52,7 @@ def print_identification(identification: Identification) -> None:
 def _answers(axes: Sequence[AxisResult]) -> Table:
     """Return the table of what an owner asks about each axis."""
     speeds = [f"speed at {share:.0%}" for share in SHARES]
-    found = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "way to stop"])
+    found = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "stopping distance"])
     for result in axes:
         axis, half = result.axis, answer_at(result, 0.5)
         cells = [_known(answer_at(result, share), "steady", axis.unit) for share in SHARES]
@@ -85,11 +85,13 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     if kept := [effect for effect in identification.effects if effect.kept]:
         words = (f"{e.name} ({f'{e.of} {size_in_words(e.value, e.unit)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
+    yield from (f"{sentence}." for sentence in assumed_thrust(identification))
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
     others = not_read(identification.findings)
     yield from others
+    others += assumed_thrust(identification)
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))

@@ -11,7 +11,7 @@ from markupsafe import Markup
 
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
-from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error
+from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
@@ -71,6 +71,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         card=card(results.vehicle),
         asides=findings.driven_aside(results),
         extrapolated=findings.extrapolated(results.vehicle),
+        assumed=findings.assumed_thrust(results),
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,
@@ -79,7 +80,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=relative_error,
         size_in_words=findings.size_in_words,
-        with_stop=findings.with_stop,
+        with_stop=with_stop,
         in_degrees=in_degrees,
     )
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
@@ -173,6 +173,12 @@ def _report(name: object, info: ValidationInfo) -> Path:
     return folder_of(info) / name
 
 
+Word = Literal["good", "usable", "do not use", "not identified"]
+"""Whether the model of an axis may be trusted, the best word first."""
+VERDICT = re.compile(rf"([\w ]+): ({'|'.join(get_args(Word))})[.:] ?(.*)")
+"""A sentence with the verdict of an axis and its reasons."""
+
+
 class Provenance(Strict):
     """What made the file, as `rov-fmu identify` writes it."""
 
@@ -197,3 +203,8 @@ class Provenance(Strict):
     """The kind of the hashes in `inputs`."""
     inputs: dict[str, Annotated[str, Field(pattern="^[0-9a-f]{64}$")]]
     """The hash of every input file, by file name."""
+
+    @property
+    def words(self) -> dict[str, str]:
+        """The word of each verdict, by the name of its axis."""
+        return {found[1]: found[2] for found in map(VERDICT.fullmatch, self.verdicts) if found}

@@ -253,9 +253,8 @@ class Vehicle:
         An axis without a verdict, or in a file without verdicts an axis of which no coefficient has an interval, was
         not identified.
         """
-        sentences = self.provenance.verdicts if self.provenance else ()
-        words = {axis: rest.partition(".")[0] for axis, _, rest in (one.partition(": ") for one in sentences)}
-        if not sentences:
+        words = self.provenance.words if self.provenance else {}
+        if not words:
             places = [keys for name, keys in self.layout.keys_in_file.items() if name in self.intervals]
             words = {keys[1]: "usable" for keys in places if keys[0] == "axes"}
         found = {axis: words.get(axis, "not identified") for axis in self.layout.kinds}
@@ -446,7 +445,11 @@ def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:
     `coming` is the path of a report that is about to be written, so it need not exist yet.
     """
     path = Path(path)
-    content = read_bytes(path, VehicleFileError, most=LARGEST)
+    return read_vehicle(path, read_bytes(path, VehicleFileError, most=LARGEST), coming=coming)
+
+
+def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> Vehicle:
+    """Return the vehicle that the content of a file with a path describes, as load_vehicle does."""
     data = parse_toml(path, content, VehicleFileError)
     check_keys(path, data, VEHICLE_FILE, VehicleFileError)
     if "format" not in data:

@@ -13,7 +13,7 @@ from rov_fmu.c.filter import DivergedError, Filter, Parameters, Record, Run, Sen
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.identify.given import with_axis_alone
+from rov_fmu.identify.given import with_axes_alone
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.c.sets import one_set
@@ -30,7 +30,7 @@ ERRORS = {"w": 0.1, "z": 0.02, "F_t": 0.05}
 def heave(**more: float) -> Vehicle:
     """Return the heave of the VideoRay alone, with other or more coefficients."""
     k = extended(VIDEORAY, **more)
-    layout = with_axis_alone(k.layout, HEAVE)
+    layout = with_axes_alone(k.layout, [HEAVE])
     return Vehicle(layout, {name: k[name] for name in layout.coefficients})
 
 

@@ -1,22 +1,19 @@
 """The examples of the pages about identification work, and what they say of the method is what the code does."""
 
 import re
-from dataclasses import replace
 from importlib import import_module
 from inspect import getsource
-from math import inf
 from pathlib import Path
 
-import numpy as np
 import pytest
 import tomlkit
 
-from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.identify import assess, effects
+from rov_fmu.identify import assess, effects, held_out
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
-from rov_fmu.identify.result import KEPT, MOST_UNKNOWN, Answer, Disturbance, Prediction, Verdict
+from rov_fmu.identify.result import MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
+from rov_fmu.identify.verdict import RULES, _largest
 from tests.commands import ROOT
 from tests.folders import FORCE, RATE, SPEED, TAU, read
 
@@ -88,13 +85,13 @@ def test_the_states_of_the_filter_are_those_of_the_code() -> None:
 
 
 def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
-    page, least = text(METHOD), assess._LEAST_CURRENT
+    page, least = text(METHOD), held_out._LEAST_CURRENT
     assert f"faster than {records.FASTEST:g} per second are averaged" in page
     assert f"up to |u| = c = {objective.OUTLYING:g}, and" in page
-    assert f"The filter reads the first {assess.SETTLING:g} s" in page
-    assert f"positions and headings over {assess.AHEAD:g} s" in page
+    assert f"The filter reads the first {held_out.SETTLING:g} s" in page
+    assert f"positions and headings over {held_out.AHEAD:g} s" in page
     assert f"never claimed to better than {100.0 * assess.EXACT:g} %" in page
-    assert f"a change of thrust of at least {100.0 * assess._LEAST_GAIN:g} %" in page
+    assert f"a change of thrust of at least {100.0 * held_out._LEAST_GAIN:g} %" in page
     assert (
         f"the current of an unseen log, which is about as large as in the others, but not below {least:g} m/s" in page
     )
@@ -112,55 +109,11 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
 # ---- Verdicts --------------------------------------------------------------------------------------------------------
 
 
-def prediction(coverage: float = 0.95, error: float = 0.1) -> Prediction:
-    """Return the prediction of a velocity that changes by 1 m/s, with noise of 0.01 m/s."""
-    time = np.arange(100.0)
-    data = (time, np.sin(time), np.sin(time), np.ones(100))
-    return Prediction(
-        HEAVE, "log.csv", "heave velocity", "m/s", False, inf, "the other log", *data, 1.0, 0.01, error, coverage
-    )
-
-
-def answer(half_width: float = 0.01) -> Answer:
-    """Return a V_ss of 1 m/s with half the width of its interval."""
-    interval = (1.0 - half_width, 1.0 + half_width)
-    return Answer(HEAVE, 0.5, (1.0, interval), (1.0, interval), (1.0, interval))
-
-
-def judged(*predictions: Prediction, half_width: float = 0.01, difference: float = 0.0) -> Verdict:
-    return assess.verdict(predictions, [answer(half_width)], (), difference)
-
-
-def test_the_rules_of_the_page_are_those_of_the_verdict() -> None:
-    """Just inside and just outside each limit that the table has."""
-    usable, bad = re.findall(r"share of unseen .*? \| below (\d+) % \| below (\d+) %", text(METHOD))[0]
-    for limit, inside, outside in ((usable, "good", "usable"), (bad, "usable", "do not use")):
-        share = float(limit) / 100.0
-        assert judged(prediction(share + 0.01)).word == inside
-        assert judged(prediction(share - 0.01)).word == outside
-    wide, wider = re.findall(r"half-width of the best V_ss \| above (\d+) % \| above (\d+) %", text(METHOD))[0]
-    for limit, inside, outside in ((wide, "good", "usable"), (wider, "usable", "do not use")):
-        share = float(limit) / 100.0
-        assert judged(prediction(), half_width=share - 0.01).word == inside
-        assert judged(prediction(), half_width=share + 0.01).word == outside
-    ((difference),) = re.findall(r"a second start ends .*? by more than (\d+)", text(METHOD))
-    assert judged(prediction(), difference=float(difference) - 1.0).word == "good"
-    assert judged(prediction(), difference=float(difference) + 1.0).word == "do not use"
-    worse, better = prediction(error=1.1), prediction()
-    assert judged(worse, better, better).word == "usable"
-    assert judged(worse, worse, better).word == "do not use"
-    (share,) = re.findall(r"what is unknown: [^|]* \| \| above (\d+) %", text(METHOD))
-    for beyond, word in ((-1.0, "good"), (1.0, "do not use")):
-        half = Disturbance("force", HEAVE, "log.csv", 1.0, "N", 0.005 * (float(share) + beyond), None, 2.0 * KEPT)
-        found = assess.verdict([prediction()], [answer()], [half, replace(half, kind="gain", axis=None)], 0.0)
-        assert found.word == word
-
-
 def test_every_reason_of_a_verdict_is_told_with_what_to_do() -> None:
     table = USE.read_text("utf-8").partition("## When the verdict is not good")[2]
     told = [row.split(" …")[0] for row in re.findall(r"^\| ([A-Z].*?) \|", table, re.MULTILINE)]
-    source, _, _ = getsource(assess.verdict).partition("if not reasons")
-    _, *reasons = re.findall(r'"([A-Z][^"]*)', source)  # without the docstring
+    _, *of_disturbances = re.findall(r'"([A-Z][^"]*)', getsource(_largest))  # without the docstring
+    reasons = [*(rule.sentence for rule in RULES if rule.sentence[0] != "{"), *of_disturbances]
     assert len(reasons) > len(told) > 0
     assert not [reason for reason in reasons if not reason.startswith(tuple(told))]
     assert not [row for row in told if not any(reason.startswith(row) for reason in reasons)]

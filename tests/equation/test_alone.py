@@ -104,12 +104,12 @@ def test_after_the_time_constant_the_velocity_is_that_of_17() -> None:
 
 
 @pytest.mark.parametrize("drag", [(2.0, 3.0), (2.0, 0.0), (0.0, 3.0)])
-def test_the_way_to_a_stop_is_the_integral_over_the_velocities(drag: tuple[float, float]) -> None:
+def test_the_stopping_distance_is_the_integral_over_the_velocities(drag: tuple[float, float]) -> None:
     A, B = drag
-    way = quad(lambda v: 1.0 / (A * v + B), 0.05 * 1.5, 1.5)[0]
-    assert AxisAlone(A, B, 1.0).stopping_way(1.5, 0.05) == pytest.approx(way, rel=1e-9)
-    assert AxisAlone(A, B, 1.0).stopping_way(inf, 0.05) == inf
-    assert AxisAlone(0.0, 0.0, 1.0).stopping_way(1.5, 0.05) == inf
+    distance = quad(lambda v: 1.0 / (A * v + B), 0.05 * 1.5, 1.5)[0]
+    assert AxisAlone(A, B, 1.0).stopping_distance(1.5, 0.05) == pytest.approx(distance, rel=1e-9)
+    assert AxisAlone(A, B, 1.0).stopping_distance(inf, 0.05) == inf
+    assert AxisAlone(0.0, 0.0, 1.0).stopping_distance(1.5, 0.05) == inf
 
 
 def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -> None:
@@ -120,5 +120,5 @@ def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -
     assert ahead.time_constant() == time_constant(2.0, 3.0, 5.0)
     assert astern.time_constant() == time_constant(0.5, 1.0, -1.5)
     assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
-    assert astern.stopping_way(-1.5, 0.1) == pytest.approx(quad(lambda v: 1.0 / (0.5 * v + 1.0), 0.15, 1.5)[0])
+    assert astern.stopping_distance(-1.5, 0.1) == pytest.approx(quad(lambda v: 1.0 / (0.5 * v + 1.0), 0.15, 1.5)[0])
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE

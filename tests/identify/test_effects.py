@@ -12,14 +12,14 @@ from scipy.stats import t
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
 from rov_fmu.identify import beginning
-from rov_fmu.identify.assess import ahead, cautious
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.held_out import ahead, cautious
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.result import Identification, Interval
+from rov_fmu.identify.result import KEPT, Identification, Interval
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
 from tests.vehicles import VIDEORAY
 
@@ -34,8 +34,11 @@ def found(fit: Fit, **others: float) -> Fit:
     parameters, z = fit.posterior.table.parameters, {**FOUND, **{k.replace("_", " "): v for k, v in others.items()}}
     at = np.array([z.get(p.kind, old) for p, old in zip(parameters, fit.posterior.z, strict=True)])
     posterior = Posterior(fit.posterior.table, at, ERROR**2 * np.eye(len(at)))
-    kept = posterior.without(posterior.absent)
-    return replace(fit, posterior=posterior, kept=kept, averaged=replace(posterior.averaged, z=kept.z))
+    null = {n: p.null for n, p in enumerate(parameters) if p.null is not None and posterior.evidence(n) < KEPT}
+    absent = np.array([n in null for n in range(len(at))])
+    kept = np.array([null.get(n, old) for n, old in enumerate(at.tolist())])
+    file = Posterior(fit.posterior.table, kept, ERROR**2 * np.diag(~absent * 1.0), frozenset(null))
+    return replace(fit, posterior=replace(posterior, z=kept), file=replace(fit.file, posterior=file))
 
 
 def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
@@ -46,15 +49,15 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     inertia = {"heave": 0.79 * 0.5, "yaw": 0.81 * 0.5}
     table = fit.posterior.table
     of = [inertia.get(p.of, 0.0) * (p.kind == "inertia") for p in table.parameters]
-    covariance = clear.averaged.covariance + np.diag(np.square(of))
+    covariance = clear.posterior.covariance + np.diag(np.square(of))
     pair = [n for n, p in enumerate(table.parameters) if p.of == "yaw" and p.kind in ("inertia", "quadratic drag")]
     covariance[pair, pair[::-1]] = 0.6 * np.sqrt(np.prod(np.diag(covariance)[pair]))
-    clear = replace(clear, averaged=replace(clear.averaged, covariance=covariance))
+    clear = replace(clear, posterior=replace(clear.posterior, covariance=covariance))
     vehicle, numbers = identified_vehicle(short, clear)
     assert [numbers[f"beta_{v}"].narrowed for v in "wr"] == pytest.approx([0.79, 0.81], abs=1e-3)
     assert ("beta_w" in vehicle.intervals, "beta_r" in vehicle.intervals) == (True, False)
     assert vehicle.sources["beta_r"] == "Assumed: the tests do not determine it"
-    z, full = clear.kept.z, fit.known.full["heave"]
+    z, full = clear.file.posterior.z, fit.known.full["heave"]
     drag = table.coefficients(z.tolist())["a_d_w"]
     expected = {
         "c_0_top": (0.05, 0.04, 0.06),
@@ -117,14 +120,12 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
     assert late.beyond == pytest.approx(2.6)
 
 
-@pytest.mark.parametrize(("dead_time", "offset", "half"), [(0.1, -0.05, HALF), (ERROR, -0.046, np.sqrt(2.0) * HALF)])
-def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(
-    dead_time: float, offset: float, half: float, fit: Fit
-) -> None:
-    one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, dead_time=dead_time))
+@pytest.mark.parametrize(("lag", "offset"), [(0.2, -0.05), (0.02, -0.03)])
+def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(lag: float, offset: float, fit: Fit) -> None:
+    one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))
     assert (one.file, other.file) == ("log_heave_a.csv", "log_yaw_a.csv")
     assert (one.interval, one.offset, one.width) == pytest.approx((0.1, offset, 0.06))
-    assert one.offset_interval == pytest.approx((offset - half, offset + half))
+    assert one.offset_interval == pytest.approx((offset - HALF, offset + HALF))
 
 
 def test_sensors_have_their_noise_and_their_outliers(fit: Fit) -> None:
@@ -142,7 +143,7 @@ def test_sensors_have_their_noise_and_their_outliers(fit: Fit) -> None:
 
 def test_a_prediction_is_as_uncertain_as_its_parameters(fit: Fit) -> None:
     """Nothing is known of a heading at 1.8 rad, and thrust is never known to better than 3 %."""
-    objective, z, table = fit.objective, fit.kept.z, fit.posterior.table
+    objective, z, table = fit.objective, fit.file.posterior.z, fit.posterior.table
     place, gain = table.place("quadratic drag", "yaw"), table.place("slow gain")
     assert place is not None
     assert gain is not None
@@ -183,7 +184,7 @@ def identified(folder: Path, rov: str, columns: Mapping[str, np.ndarray], name: 
 @pytest.mark.long
 @pytest.mark.parametrize("lost", [12.0, 0.0])
 def test_thrust_that_falls_with_the_speed_is_found(lost: float, tmp_path: Path) -> None:
-    """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the way to stop has no thrust."""
+    """The thrust at rest is exact, 78 c |c| N. Of it, d |c| v is lost; the stopping distance has no thrust."""
     h, speeds, v = 0.001, [], 0.0
     commands = np.repeat(HELD, round(4.0 / h))
     for c in commands.tolist():

@@ -95,6 +95,7 @@ def forces(*ratios: float) -> tuple[Point, ...]:
 
 
 BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
+SCALE = Coefficient("a_t_top", 6.5, (6.0, 7.0), "N", "6.5 ± 0.6 N", 0.9)
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
 DRIFTING = prediction(YAW, "heading", error=0.9)
 OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
@@ -157,6 +158,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     ("outliers", with_outliers(0.05), "heave: 5% of the samples of the depth are outliers", with_outliers(0.001)),
     ("nothing predicted", surge(predictions=()), "surge: no motion was predicted that the fit had not", quiet()),
+    (
+        "assumed thrust",
+        quiet(curves={"top": (SCALE,)}, forces=()),
+        "top thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A spring",
+        quiet(curves={"top": (SCALE,)}, forces=forces(1.0)),
+    ),
     (
         "not identified",
         surge(known=unidentified("a_d_u", "b_d_u")),

@@ -26,7 +26,7 @@ REST = 4.0
 
 
 def proposed(fit: Fit, axis: Axis = HEAVE, **limits: float) -> NextTest | None:
-    return next_test(fit.objective, replace(fit.posterior, z=fit.kept.z), axis, TankLimits(**limits), ())
+    return next_test(fit.objective, replace(fit.posterior, z=fit.file.posterior.z), axis, TankLimits(**limits), ())
 
 
 def plan(test: NextTest) -> tuple[tuple[float, float], ...]:
@@ -78,11 +78,13 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     known, logs, rows = begin(written(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
     objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
     places = [fit.posterior.table.place(p.kind, p.of, p.part) for p in objective.table.parameters]
-    z = np.array([usual if n is None else fit.kept.z[n] for n, usual in zip(places, objective.mean, strict=True)])
+    z = np.array(
+        [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(places, objective.mean, strict=True)]
+    )
     _, information = total(objective, z, objective.data(z, objective.runs(z)))
-    after = next_test(objective, Posterior.of(objective.table, z, information).averaged, HEAVE, TankLimits(), ())
+    after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
     assert after
-    assert after.now == pytest.approx(test.then, rel=0.3)
+    assert test.then <= after.now < 1.6 * test.then, "this log has an offset and a window of its own"
     assert after.now < 0.8 * test.now
 
 
@@ -90,7 +92,7 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
     """An interval of 30 %, of which the posterior explains less, has a part that no test narrows."""
     test, (low, high) = proposed(fit), (-0.26, -0.14)
     answer = Answer(HEAVE, -0.5, (-0.2, (low, high)), (1.0, (1.0, 1.0)), (1.0, (1.0, 1.0)))
-    posterior = replace(fit.posterior, z=fit.kept.z)
+    posterior = replace(fit.posterior, z=fit.file.posterior.z)
     wider = next_test(fit.objective, posterior, HEAVE, TankLimits(), [answer])
     assert test
     assert wider

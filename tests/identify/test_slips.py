@@ -25,7 +25,8 @@ from tests.recordings import PLANS, Measured, run
 from tests.vehicles import VIDEORAY
 
 SENSOR = {"surge": "distance", "heave": "depth", "yaw": "heading"}
-_COLUMN = {"distance": "distance [m]", "depth": "depth [m]", "heading": "heading [deg]"}
+KNOTS, FEET = 3600.0 / 1852.0, 1.0 / 0.3048
+_COLUMN = {"velocity": "velocity [m/s]", "distance": "distance [m]", "depth": "depth [m]", "heading": "heading [deg]"}
 RATE = 5.0
 
 
@@ -46,6 +47,8 @@ SLIPS = {
     "distances a hundredfold": Slip(SURGE, value=100.0, words=_SCALE),
     "depths a tenth": Slip(HEAVE, value=0.1, words=_SCALE),
     "distances a tenth": Slip(SURGE, value=0.1, words=_SCALE),
+    "depths in feet": Slip(HEAVE, value=FEET, words=r"\bft"),
+    "distances in feet": Slip(SURGE, value=FEET, words=r"\bft"),
     "radians under degrees": Slip(YAW, value=np.pi / 180.0, words=r"\brad|\bunit"),
     "degrees under radians": Slip(YAW, value=180.0 / np.pi, words=r"\bdeg|\brad|\bunit"),
     "fractions under percent": Slip(HEAVE, command=0.01, words=r"fraction|percent|%|\[1\]"),
@@ -132,7 +135,7 @@ def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]
     tests = load_tests(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
     known, recorded, rows = begin(tests)
     objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
-    found = slips(tests, known, objective, objective.mean)
+    found = slips(tests, known, objective, objective.mean, np.full(len(objective.mean), np.inf))
     assert all(one.evidence > 9.0 for one in found)
     return {(one.file, one.quantity): one.words for one in found}
 
@@ -144,6 +147,22 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     (log, *_), sensor = recordings(slip.axis), SENSOR[slip.axis.name]
     quantity = "surge distance" if slip.axis is SURGE else sensor
     assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
+
+
+@pytest.mark.parametrize(
+    ("axis", "quantity", "scale", "question"),
+    [(HEAVE, "depth", FEET, "is it in ft"), (SURGE, "velocity", KNOTS, "is it in knots")],
+)
+def test_feet_and_knots_are_asked_about_where_another_log_shows_them(
+    axis: Axis, quantity: str, scale: float, question: str, tmp_path: Path
+) -> None:
+    """The drag of the priors is right within a factor of e, which such a factor may be, too."""
+    random, plan = np.random.default_rng(0), PLANS[axis.name][0]
+    right, wrong = (
+        run(VIDEORAY, axis, plan, RATE).noisy(random, quantity, file=f"log_{axis.name}_{n}.csv") for n in "12"
+    )
+    found = asked(tmp_path, right, replace(wrong, values=scale * wrong.values), rov=KNOWN)
+    assert {file: words for (file, _), words in found.items()} == {wrong.file: question}
 
 
 @pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])

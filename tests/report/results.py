@@ -50,7 +50,7 @@ def prediction(
     deviation = 0.3 / (1.2 - coverage) * error * (0.5 + 1.0 * (TIME % min(span, 60.0)) / 60.0)
     unit = axis.position_unit if is_position else axis.unit
     noise, unchanged = 0.01, 0.7
-    errors = unchanged, noise, error, coverage
+    errors = unchanged, noise, error, coverage, -4.6
     data = TIME, measured, measured + off, deviation
     return Prediction(axis, file, quantity, unit, is_position, span, "the other log", *data, *errors)
 

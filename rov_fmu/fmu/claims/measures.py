@@ -18,6 +18,7 @@ from rov_fmu.fmu.evidence.check import check_evidence
 from rov_fmu.fmu.proof import SHARE_OF_NOMINAL, Finding, compare, nominal
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import brief, listed
+from rov_fmu.vehicle.description import VERDICT
 
 Result = Literal["holds", "fails", "measured", "not checked", "does not apply"]
 """`measured` is a fact without a promise: what a step costs, or what an FMU accepts that promised nothing."""
@@ -37,9 +38,6 @@ _LOSS = 1e-12
 
 _UNSEEN = re.compile("(?m)^Unseen data: (.*)")
 """A paragraph of the model card about a prediction."""
-_BAD = "do not use"
-_VERDICT = re.compile(rf"(?m)^([\w ]+): (good|usable|{_BAD})\. ?(.*)")
-"""A paragraph of the model card with the verdict of an axis and its reasons."""
 
 
 @dataclass(frozen=True)
@@ -338,15 +336,17 @@ def unseen(subject: Subject) -> Evidence:
     and says so itself. The evidence names the axis, with the reasons, and does not count as held.
     """
     paragraphs = card_of(subject).get("How far to trust it", [])
-    errors, verdicts = (kind.findall("\n".join(paragraphs)) for kind in (_UNSEEN, _VERDICT))
+    errors = _UNSEEN.findall("\n".join(paragraphs))
+    verdicts = [found.groups() for found in map(VERDICT.fullmatch, paragraphs) if found]
     if not (errors or verdicts):
         return Evidence("not checked", paragraphs[0] if paragraphs else "The FMU says nothing about unseen data.")
-    bad = {axis: reasons for axis, word, reasons in verdicts if word == _BAD}
+    bad = {axis: reasons for axis, word, reasons in verdicts if word == "do not use"}
     words = f"The model card has the errors of {len(errors)} predictions."
-    figure = f"{_BAD} {listed(bad)}" if bad else ""
+    figure = f"do not use {listed(bad)}" if bad else ""
     if verdicts:
         words += f" Its verdicts: {'; '.join(f'{axis}: {word}' for axis, word, _ in verdicts)}."
-        figure = figure or f"{len(verdicts)} of {len(verdicts)} axes"
+        identified = sum(word != "not identified" for _, word, _ in verdicts)
+        figure = figure or f"{identified} of {len(verdicts)} axes"
     words += "".join(f" Do not use {axis}: {reasons}" for axis, reasons in bad.items())
     rows = [tuple(one.rstrip(".").split(": ", 1)) for one in errors]
     return Evidence("holds" if verdicts and not bad else "measured", words, figure, ("Quantity", "Error"), rows)

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, way_formula
+from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, stopping_formula
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.equation.expression import ARRAYS, array_functions, compiled
 from rov_fmu.equation.layout import Curve, Layout, ThrustTable
@@ -140,7 +140,7 @@ def _column(commands: Array, vehicle: Vehicle) -> Array:
 
 
 _IN_ARRAYS = array_functions(np)
-_closed_form = compiled({**closed_form(), "way": way_formula()}, _IN_ARRAYS, ARRAYS)
+_closed_form = compiled({**closed_form(), "distance": stopping_formula()}, _IN_ARRAYS, ARRAYS)
 
 
 def _tables(tables: Iterable[ThrustTable]) -> dict[str, Callable[..., Any]]:
@@ -184,9 +184,9 @@ class Motions:
         found = self._closed_form(self.of["C"])
         return found["V_ss"], found["Tau"]
 
-    def stopping_way(self, v: Array, share: float) -> Array:
-        """Return the way from v until `share` of it without any force, m or rad."""
-        return self._closed_form(v, share)["way"]
+    def stopping_distance(self, v: Array, share: float) -> Array:
+        """Return the distance from v until `share` of it without any force, m or rad."""
+        return self._closed_form(v, share)["distance"]
 
     def _closed_form(self, v: Array, share: float = 1.0) -> dict[str, Array]:
         A, B = self.drag(v)

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.c.filter import DivergedError
+from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -47,12 +48,15 @@ class Fit:
     best: Minimum
     posterior: Posterior
     """With all effects, also those without evidence."""
-    averaged: Posterior
-    """Averaged over the presence of the effects without evidence: the intervals are wide enough for these."""
-    kept: Posterior
-    """Given that the effects without evidence are absent: the values of the vehicle."""
+    file: FileFit
+    """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
     """How much larger J is at the end of the second start."""
+
+    @property
+    def posteriors(self) -> tuple[Posterior, Posterior]:
+        """That of the vehicle file and that with all effects. An interval of the result contains those of both."""
+        return self.file.posterior, self.posterior
 
     @cached_property
     def command_range(self) -> tuple[float, float]:
@@ -117,9 +121,12 @@ def fit_all(
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
     if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
         difference = 0.0
-    kept = posterior.without(posterior.absent)
-    averaged = replace(posterior.averaged, z=kept.z)
-    return Fit(known, full, best, posterior, averaged, kept, float(difference))
+    file, least = full, best
+    if known.bent:
+        plain = replace(known, bent=frozenset[str]())
+        file = Objective(table_of(plain, logs, noises), logs, rows)
+        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.88, 0.9), most=_MOST)
+    return Fit(known, full, best, posterior, without_weak_effects(file, least), float(difference))
 
 
 def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:

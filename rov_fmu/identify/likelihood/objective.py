@@ -15,7 +15,7 @@ farther they are. The rows of the tables of tank tests are samples too: their in
 is the square of their noise.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field, replace
@@ -164,11 +164,11 @@ def cost(innovations: Array, variances: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """A part of the data: logs and rows by their indices, and the samples of each of these logs that count."""
+    """A part of the data: logs and rows by their indices, and the samples that count of logs of which not all do."""
 
     logs: Sequence[int]
     rows: Sequence[int]
-    chosen: slice = field(default_factory=lambda: slice(None))
+    chosen: Mapping[int, slice] = field(default_factory=dict)
 
 
 def in_threads(jobs: Sequence[Callable[[], _Result]]) -> list[_Result]:
@@ -201,8 +201,17 @@ class Objective:
         found = copy(self)
         found.logs, found.records = [self.logs[n] for n in part.logs], [self.records[n] for n in part.logs]
         found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
-        found.whole = Part(range(len(part.logs)), range(len(part.rows)), part.chosen)
+        chosen = {place: part.chosen[n] for place, n in enumerate(part.logs) if n in part.chosen}
+        found.whole = Part(range(len(part.logs)), range(len(part.rows)), chosen)
         found.__dict__.pop("_of_rows", None)
+        return found
+
+    def without(self, absent: Iterable[int]) -> "Objective":
+        """Return J where some effects are absent, by their places: their bounds are where they are absent."""
+        found = copy(self)
+        found.low, found.high = self.low.copy(), self.high.copy()
+        for n in absent:
+            found.low[n] = found.high[n] = self.table.parameters[n].null
         return found
 
     # ---- One log ----
@@ -270,12 +279,15 @@ class Objective:
     def value(self, z: Array, runs: Sequence[Run]) -> float:
         """Return J for the runs of some parameters."""
         found = [(run.innovations, run.variances) for run in runs]
-        return self._sum(z, [*found, self.row_values(z)] if self.rows else found, self.whole.chosen)
+        return self._sum(z, [*found, self.row_values(z)] if self.rows else found)
 
-    def _sum(self, z: Array, samples: Sequence[Samples], chosen: slice) -> float:
+    def chosen(self, n: int) -> slice:
+        """Return the samples of a log that count; all rows of tables, which follow the logs, do."""
+        return self.whole.chosen.get(n, slice(None))
+
+    def _sum(self, z: Array, samples: Sequence[Samples]) -> float:
         """Return J for the samples of each log, and then those of the rows."""
-        logs, rows = samples[: len(self.logs)], samples[len(self.logs) :]
-        costs = [cost(off[chosen], S[chosen]) for off, S in logs] + [cost(*some) for some in rows]
+        costs = [cost(off[self.chosen(n)], S[self.chosen(n)]) for n, (off, S) in enumerate(samples)]
         total = self.prior(z) + sum(costs)
         return total if np.isfinite(total) else np.inf
 
@@ -304,7 +316,7 @@ class Objective:
             samples = [(one.innovations, one.variances) for one in runs[k] if one]
             rows = [(off[[*part.rows], k], S[[*part.rows], k])] if part.rows else []
             is_whole = len(samples) == len(part.logs)
-            value = self.of(part)._sum(z[:, k], [*samples, *rows], part.chosen) if is_whole else np.inf
+            value = self.of(part)._sum(z[:, k], [*samples, *rows]) if is_whole else np.inf
             trials.append((value, [*samples, *rows]))
         return trials
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
-from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import CURVE, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -83,6 +83,9 @@ _MOTION_STEP = 3e-6
 less than a per cent."""
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
+
+_ABSENT = {"F_0": 0.0, "c_0": 0.0, "d": 0.0, "n_V": 0.0, "T": LEAST_LAG}
+"""The values of coefficients that a vehicle file may lack. Those astern are then equal to those ahead."""
 
 
 @dataclass(frozen=True)
@@ -254,6 +257,17 @@ class Table:
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
         return Shapes(found, bands, frozenset(reverse))
 
+    def of_vehicle(self, vehicle: Vehicle) -> "Table":
+        """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
+        values, places = dict(vehicle.with_(self.layout).coefficients), self.layout.keys_in_file
+        parts = {keys[:-1] for keys in vehicle.layout.keys_in_file.values()}
+        names = {keys: name for name, keys in places.items()}
+        for name, (*part, key) in places.items():  # a coefficient astern stands after that ahead
+            ahead = values.get(names.get((*part, key.removesuffix(REVERSE)), ""))
+            if name not in values and tuple(part) in parts and (value := _ABSENT.get(key, ahead)) is not None:
+                values[name] = value
+        return replace(self, base={**self.base, **values}, exact=frozenset(values), shape_deviation=0.0)
+
     def of_log(self, z: Array, one: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
@@ -328,8 +342,10 @@ class Beginning:
     """The names of the coefficients that no fit changes."""
     thrust_errors: Mapping[str, float] = field(default_factory=dict)
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
+    unseen: Sequence[Axis] = ()
+    """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
     bent: frozenset[str] = frozenset()
-    """The measured curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
+    """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
 
 def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
@@ -354,7 +370,10 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         if prior("dead_time"):
             yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
         if prior("voltage") and any("n_V" in c.keys for c in known.curves):
-            yield Parameter("voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=0.0, high=4.0, null=0.0)
+            low, high = CURVE["n_V"].minimum, CURVE["n_V"].maximum  # an effect that is absent is below
+            yield Parameter(
+                "voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=low, high=high, null=0.0
+            )
         yield from _of_sensors(logs, prior)
     yield from (p for p in found if p.deviation > 0.0)
     for number, one in enumerate(logs):
@@ -377,12 +396,11 @@ def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Para
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
             shapes = [Parameter("thrust shape", name, str(n + 1)) for n in range(COUNT)]
-            bends = not is_measured or name in known.bent
+            ends = ("", REVERSE) if is_told_astern else ("",)
+            linear = [_linear(curve, known.coefficients, end, _LINEAR if is_measured else shape) for end in ends]
+            bends = name in known.bent
             yield from shapes if bends else map(_held, shapes)
-            if is_measured:
-                ends = ("", REVERSE) if is_told_astern else ("",)
-                linear = [_linear(curve, known.coefficients, end) for end in ends]
-                yield from map(_held, linear) if bends else linear
+            yield from map(_held, linear) if bends else linear
         if has_reverse:
             ratio = 0.5 if is_measured else prior("thrust_reverse")
             # Forces that were measured astern are data, and not an effect that may be absent.
@@ -409,14 +427,14 @@ def _lost(curve: Curve, c: Mapping[str, float]) -> float:
     return c[curve.coefficient("d")] / (c[curve.coefficient("a_t")] + c[curve.coefficient("b_t")])
 
 
-def _linear(curve: Curve, c: Mapping[str, float], end: str) -> Parameter:
-    """Return the parameter of the linear share of a measured thrust.
+def _linear(curve: Curve, c: Mapping[str, float], end: str, deviation: float) -> Parameter:
+    """Return the parameter of the linear share of a thrust.
 
     It is not negative. A negative share would take the place of a dead band d, because a (c - d)^2 is almost
     a c^2 - 2 a d c.
     """
     a, b = (c[curve.name_of(f"{key}{end}")] for key in ("a_t", "b_t"))
-    return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=_LINEAR, low=-b / (a + b))
+    return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=deviation, low=-b / (a + b))
 
 
 def _held(p: Parameter) -> Parameter:
@@ -425,7 +443,7 @@ def _held(p: Parameter) -> Parameter:
 
 
 def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
-    for axis in known.fitted:
+    for axis in (*known.fitted, *known.unseen):
         name, c = axis.name, known.coefficients
         if axis.coefficient("beta") not in known.exact:
             yield Parameter("inertia", name, deviation=prior("inertia"), is_log=True)
@@ -436,7 +454,7 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
             if axis.coefficient(key) not in known.exact:
                 mean = log(max(c[axis.coefficient(key)], 1e-9))
                 yield Parameter(kind, name, mean=mean, deviation=width, is_log=True)
-        free = {*known.layout.coefficients} - known.exact
+        free = {*known.layout.coefficients} - known.exact if axis in known.fitted else ()
         if axis.coefficient(f"a_d{REVERSE}") in free:
             yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
         if (load := known.layout.kinds[name].coefficient("F_0")) in free:

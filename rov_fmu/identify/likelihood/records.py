@@ -11,7 +11,7 @@ from math import cos, sin
 import numpy as np
 
 from rov_fmu.c.filter import DRIFTS, MOST_SENSORS, Record, Sensor
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.tank.arrays import Array
@@ -134,6 +134,13 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
     return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings
+
+
+def shown_axes(log: Log, layout: Layout) -> list[Axis]:
+    """Return the axes of the layout that a log shows. A track shows the heading, too."""
+    read = [(axis, channel) for axis, channel in _channels(log, layout) if not _why_left_out(channel)]
+    has_track = any(axis in (SURGE, SWAY) and not channel.quantity.is_velocity for axis, channel in read)
+    return [*dict.fromkeys(axis for axis, _ in read), *[YAW] * has_track]
 
 
 def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:

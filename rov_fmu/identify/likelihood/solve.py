@@ -1,6 +1,6 @@
 """Minimise the objective by Fisher scoring, damped in units of the prior (Levenberg-Marquardt)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 
@@ -126,35 +126,38 @@ def _within_reach(objective: Objective, place: Minimum) -> tuple[float, Array]:
     return place.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
 
 
-def refits(objective: Objective, best: Minimum, parts: Sequence[Part]) -> list[Minimum]:
+def refits(
+    objective: Objective, best: Minimum, parts: Sequence[Part], absent: Sequence[Collection[int]] = ()
+) -> list[Minimum]:
     """Minimise J for some parts of the data, each from the minimum for all data, without the noise.
 
-    All fits take their damped steps together, so that the lanes of the filter are full. The derivatives are those at
-    the minimum for all data, which are exact, as long as a fit is near it. A fit to most of the data needs two steps.
+    If `absent` is given, it has the places of the effects that each fit is without. All fits take their damped steps
+    together, so that the lanes of the filter are full. The derivatives are those at the minimum for all data, which are
+    exact, as long as a fit is near it. A fit to most of the data needs two steps.
     """
-    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
-    fits = [_Refit(objective.of(part), part, best) for part in parts]
+    free = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    fits = [
+        _Refit(objective.of(part).without(gone), part, best, is_inside=not gone)
+        for part, gone in zip(parts, absent or [()] * len(parts), strict=True)
+    ]
     for _ in range(_REFIT_STEPS):
-        active = [fit for fit in fits if fit.proposes(of_motion) > _REFIT_ENOUGH]
+        active = [fit for fit in fits if fit.proposes(free) > _REFIT_ENOUGH or fit.value == np.inf]
         if not active:
             break
         moved = np.array([fit.moved for fit in active]).T
         for fit, trial in zip(active, objective.trials(moved, [fit.part for fit in active], best.runs), strict=True):
             fit.judge(*trial)
-    return [Minimum(fit.z, fit.value, fit.runs, fit.data, fit.information) for fit in fits]
+    return [Minimum(fit.z, fit.value, fit.runs, fit.data, total(fit.objective, fit.z, fit.data)[1]) for fit in fits]
 
 
 class _Refit:
     """A fit to a part of the data, between two steps."""
 
-    def __init__(self, objective: Objective, part: Part, best: Minimum) -> None:
+    def __init__(self, objective: Objective, part: Part, best: Minimum, *, is_inside: bool) -> None:
         self.objective, self.part, self.z = objective, part, best.z
         self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
-        self.data = [best.data[n] for n in part.logs]
-        if part.rows:
-            self.data.append(best.data[-1].part(part.rows))
-        self.value = objective.value(self.z, self.runs)
-        _, self.information = total(objective, self.z, self.data)
+        self.data = _data_of(part, best)
+        self.value = objective.value(self.z, self.runs) if is_inside else np.inf
         self.damping = 0.0
 
     def proposes(self, free: Chosen) -> float:
@@ -175,10 +178,21 @@ class _Refit:
             return
         gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
         self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
-        if gain > _REFIT_FAR:
+        if _REFIT_FAR < gain < np.inf:
             with suppress(DivergedError):
                 self.runs = self.objective.runs(self.z, self.runs)
                 self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
+
+
+def _data_of(part: Part, best: Minimum) -> list[Data]:
+    """Return the data of a minimum for a part of its logs and rows."""
+    rows = [best.data[-1].part(part.rows)] if part.rows else []
+    return [*(best.data[n] for n in part.logs), *rows]
+
+
+def information_of(objective: Objective, best: Minimum, part: Part) -> Array:
+    """Return the information of a part of the data at the minimum for all, with that of the prior."""
+    return total(objective.of(part), best.z, _data_of(part, best))[1]
 
 
 def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
@@ -187,7 +201,7 @@ def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, 
     size = len(z)
     gradient, information = np.zeros(size), np.zeros((size, size))
     for n, some in enumerate(data):
-        g, H = some.information(objective.whole.chosen if n < len(objective.logs) else slice(None))
+        g, H = some.information(objective.chosen(n))
         gradient, information = gradient + g, information + H
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)
@@ -217,8 +231,8 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
     """Return the end of a damped step. What would leave its bounds stays at them, and the others move on without it."""
     weight, moving = 2.0 / objective.deviation**2, free.copy()
     is_size = np.array([parameter.is_slow_size for parameter in objective.table.parameters])
-    moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0))
-    change = np.zeros(len(z))
+    change = np.clip(z, objective.low, objective.high) - z  # an effect that becomes absent is beyond
+    moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0)) & (change == 0.0)
     for _ in range(len(z)):
         part = np.flatnonzero(moving)
         H = information[np.ix_(part, part)] + damping * np.diag(weight[part])

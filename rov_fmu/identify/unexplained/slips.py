@@ -8,19 +8,23 @@ in a column of metres, or -1 for a depth that is positive upwards. Its evidence 
 for n such values: the density of the values in a file is 1/|k| times that of the true ones. Two vehicles explain a
 common scale of all data of an axis equally well, and only the priors of drag, inertia and thrust tell them apart.
 
+Added mass is never negative, so an inertia below the vehicle's own is as unlikely as its distance from it says. That
+distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s.
+
 Only few hypotheses are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
-only a channel that would agree with this motion for another k, but not for 1, is suspected. The scale of commands is
-checked where they are read.
+only a channel that would agree with this motion for another k, but not for 1, is suspected. The priors do not tell
+knots and feet from metres. These are suspected where the inertia is too small, or where two channels of an axis differ
+by such a factor. The scale of commands is checked where they are read.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import log, pi
 
 import numpy as np
 
 from rov_fmu.c.filter import DivergedError, Slow
-from rov_fmu.equation.catalogue import REVERSE
+from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.identify.beginning import Tests, begin
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
 from rov_fmu.identify.likelihood.objective import Objective
@@ -31,12 +35,19 @@ from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
+_CERTAIN = 2.0
+"""An inertia is too small if it is so many standard errors below the vehicle's own."""
 _CLEAR, _NEXT = 9.0, 6.0
 """The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
 """What the scales of lengths, of angles and of their rates mean, the most usual ones first; `{}` is the unit."""
+_KNOTS, _FEET = 3600.0 / 1852.0, 1.0 / 0.3048
+_CUSTOMARY = {_KNOTS: "in knots", _FEET: "in {}"}
+"""What the scales of other units of length and speed mean; `{}` is the unit with feet."""
+_SAME = 0.15
+"""The largest logarithm of the ratio of two channels to that of their units."""
 _NEAR = 0.5 * log(10.0)
 """The largest logarithm of the ratio of measured to simulated motion: the drag of the priors is right within a factor
 of 2.7, and thus the velocity within one of 1.6."""
@@ -73,18 +84,25 @@ Hypothesis = frozenset[tuple[_Compared, float]]
 """Channels with their scales."""
 
 
-def slips(tests: Tests, known: Beginning, objective: Objective, best: Array) -> tuple[Slip, ...]:
+def slips(tests: Tests, known: Beginning, objective: Objective, best: Array, errors: Array) -> tuple[Slip, ...]:
     """Return the mistakes that explain the logs much better. `best` is where J is least for the files as they stand.
 
-    Where several explanations are about as good, each is told for its files.
+    `errors` are the standard errors there. Where several explanations are about as good, each is told for its files.
     """
     compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
-    untried = {*_hypotheses({one: one.scales for one in compared if one.scales})}
+    inertias = {*_inertias(known, objective, best, errors)}
+    light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
+    suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
+    untried = {*_hypotheses(suspected)}
     if not untried:
         return ()
-    as_it_is, J = _least(tests, frozenset(), best), dict[Hypothesis, float]()
+
+    def least(hypothesis: Hypothesis, start: Array | None = None) -> float:
+        return _least(tests, hypothesis, start) + sum(_lightness(hypothesis, *one) for one in inertias)
+
+    as_it_is, J = least(frozenset(), best), dict[Hypothesis, float]()
     while untried:  # The best explanation may need fewer channels than it has.
-        J |= {one: _least(tests, one) for one in untried}
+        J |= {one: least(one) for one in untried}
         first = min(J, key=lambda one: J[one])
         untried = {first - {member} for member in first} - J.keys() - {frozenset()}
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
@@ -98,12 +116,40 @@ def slips(tests: Tests, known: Beginning, objective: Objective, best: Array) -> 
     )
 
 
+def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:
+    """Yield the translations that are fitted, with ln of their inertia relative to the mass, and its error."""
+    vehicle, _ = objective.table.model(z)
+    for axis in known.fitted:
+        place = objective.table.place("inertia", axis.name)
+        if place is not None and not axis.is_rotation:
+            inertia = vehicle.effective_inertia(vehicle.layout.kinds[axis.name])
+            yield axis, float(np.log(inertia / vehicle[axis.inertia])), float(errors[place])
+
+
+def _lightness(hypothesis: Hypothesis, axis: Axis, ratio: float, error: float) -> float:
+    """Return how unlikely an inertia is that is below the vehicle's own. With k, it is k times as large."""
+    scale = min((abs(scale) for one, scale in hypothesis if one.channel.quantity.axis is axis), default=1.0)
+    return max(-(ratio + log(scale)) / error, 0.0) ** 2
+
+
+def _customary(one: _Compared, compared: Sequence[_Compared], light: Collection[Axis]) -> Iterator[float]:
+    """Yield the scales of knots and feet, where something speaks for them."""
+    quantity = one.channel.quantity
+    others = [other for other in compared if other.channel.quantity.axis is quantity.axis and 1.0 in other.ratios]
+    for scale in _CUSTOMARY if quantity.axis and not quantity.axis.is_rotation and 1.0 in one.ratios else ():
+        differs = any(abs(log(one.ratios[1.0] / other.ratios[1.0] / scale)) < _SAME for other in others)
+        if (quantity.axis in light or differs) and (quantity.is_velocity or scale != _KNOTS):
+            yield scale
+
+
 def _words(channel: Channel, scale: float) -> str:
     """Return a mistake as a question."""
     unit, axis = channel.quantity.unit, channel.quantity.axis
     if scale < 0.0:
         assert axis
         return f"is its sign right ({axis.positive} is positive), and are the signs of the commands right"
+    if scale in _CUSTOMARY:
+        return f"is it {_CUSTOMARY[scale].format(unit.replace('m', 'ft'))}"
     meaning = (_ANGLES if unit.startswith("rad") else _LENGTHS)[scale].format(unit)
     return f"is it {meaning}" if meaning else f"are its numbers {1.0 / scale:g} times too small for its unit"
 

@@ -36,11 +36,12 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
 PRIORS = """
 lag: 0.05 ± 0.15, 0.02 to inf, absent at 0.02
 dead time: 0 ± 0.05, 0 to inf, absent at 0
-voltage: 1.5 ± 0.5, 0 to 4, absent at 0
+voltage: 1.5 ± 0.5, 1 to 4, absent at 0
 sensor lag of the depth sensor: 0 ± 0.3, 0 to inf, absent at 0
 sensor lag of the position sensor: 0 ± 0.3, 0 to inf, absent at 0
 thrust scale rear: ln 1 ± 0.1, 0 to inf
 thrust shape rear: 0 ± 1, -inf to inf
+linear thrust rear: 0 ± 0.001, 0 to 0
 reverse thrust rear: 0 ± 0.1, -inf to inf, absent at 0
 dead band rear: 0 ± 0.05, 0 to 0.5, absent at 0
 thrust scale top: ln 1 ± 1, 0 to inf
@@ -108,7 +109,7 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
         scale, astern = of("thrust scale", curve), exp(of("reverse thrust", curve))
         for end, ratio, part in (("", scale, ""), ("_reverse", scale * astern, "astern")):
             names = [f"{key}_{curve}{end}" for key in ("a_t", "b_t")]
-            full, more = sum(base[name] for name in names), of("linear thrust", curve, part)
+            full, more = sum(base[name] for name in names), of("linear thrust", curve, part if curve == "top" else "")
             linear = base[names[1]] + more * full
             assert [c[name] for name in names] == pytest.approx([ratio * (full - linear), ratio * linear])
         assert [c[f"{key}_{curve}"] for key in ("c_0", "T", "n_V", "d")] == [

@@ -23,6 +23,11 @@ def steady_name(command: float) -> str:
     return f"V_ss {100.0 * command:g} %"
 
 
+def answer_names(command: float) -> tuple[str, str, str]:
+    """Return the names of V_ss, the time to 63 % of it, and the stopping distance at a command."""
+    return steady_name(command), f"time {100.0 * command:g} %", f"way {100.0 * command:g} %"
+
+
 @dataclass(frozen=True)
 class Expected:
     """What the identification is held to in a scenario."""
@@ -40,9 +45,9 @@ class Expected:
     wider limits from both sides, and false effects by axis."""
     seconds: float = inf
     """The most processor time of an identification, s."""
-    wider_than_gate: float = 2.5
+    wider_than_gate: float = 4.0
     """The widest intervals, relative to those of the gate. The gate took the offset of the logger, the lag, a constant
-    load and the drag astern as 0 where it found none; now they are uncertain."""
+    load and the drag astern as 0 where it found none; now intervals contain those of the fit with all effects."""
 
 
 NOTHING_SPECIAL = Expected()

@@ -4,7 +4,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify import assess
+from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.beginning import Tests
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -31,7 +31,7 @@ class Identified:
 
     def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
-        own = self.found.averaged
+        own = self.found.posterior
         table = table_of(self.found.known, [recording.log], [])
         z = np.array([p.mean for p in table.parameters])
         covariance = np.diag([p.deviation**2 for p in table.parameters])
@@ -40,17 +40,17 @@ class Identified:
         z[here], covariance[np.ix_(here, here)] = own.z[there], own.covariance[np.ix_(there, there)]
         for n, p in enumerate(table.parameters):
             if p.kind == "current":
-                covariance[n, n] = assess.unseen_current(own.table, own.z, own.covariance, p.of)
+                covariance[n, n] = held_out.unseen_current(own.table, own.z, own.covariance, p.of)
         objective = Objective(table, [recording.log], [])
-        off, deviations = assess.ahead(objective, 0, assess.cautious(objective, z), covariance, begin, span)
+        off, deviations = held_out.ahead(objective, 0, held_out.cautious(objective, z), covariance, begin, span)
         return recording.log.record.value - off, deviations**2
 
     def coefficients(self, axis: Axis) -> Known:
         """Return the answers that `rov-fmu identify` gives, and the drag over the inertia with its posterior."""
-        own = self.found.averaged
+        own = self.found.posterior
         vehicle, _ = identified_vehicle(self.tests, self.found)
         known: dict[str, tuple[float, float, float]] = {}
-        for answer in assess.answers(own, axis, vehicle):
+        for answer in assess.answers(self.found.posteriors, axis, vehicle):
             if answer.command in assess.COMMANDS:
                 low, high = sorted(map(abs, answer.steady[1]))
                 known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high

@@ -1,0 +1,326 @@
+"""What is held out: parts of logs and rows of tables, which a fit to the other data predicts.
+
+Data that know nothing of an axis predict it with bands as wide as the prior, which contain everything. So a log is held
+out by the others only where these inform the axis, and otherwise each half of it by a fit that has the other half.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import inf, log
+
+import numpy as np
+
+from rov_fmu.c.filter import DivergedError, Run
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Curve
+from rov_fmu.identify.assess import logarithms
+from rov_fmu.identify.beginning import QUANTITIES, Tests
+from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, TableRow, cost, modelled
+from rov_fmu.identify.likelihood.parameters import Table
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
+from rov_fmu.identify.result import LEAST_NOISE, Point, Prediction
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.uncertainty import NORMAL
+from rov_fmu.vehicle.vehicle import Vehicle
+
+AHEAD, SETTLING = 10.0, 5.0
+"""Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
+INFORMED = 0.5
+"""The least share of what all data tell of an axis that a fit must know to hold out the rest."""
+_CENTRAL = (0.5,)
+"""The command whose answers tell what data know of an axis."""
+_LEAST_GAIN = 0.03
+"""Thrust is never predicted to better than 3 %: batteries and water differ from day to day."""
+_LEAST_CURRENT = 0.02
+"""The current of an unseen log is never known to better than this, m/s."""
+_LOST = 1.8
+"""The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
+
+Values = Mapping[tuple[str, str, float], float]
+"""The value of a row by a fit without it, by the quantity, the curve or axis, and the command."""
+
+
+# ---- Fits without a part of the data ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """A part of a log that is held out, and the fit to other data that predicts it."""
+
+    log: int
+    chosen: slice
+    by: str
+    """The data of the fit in words, such as `the other 2 logs` or `the first half`."""
+    axes: tuple[Axis, ...]
+    """The axes of which these data know enough."""
+    part: Part
+    fit: Posterior
+    """With all effects."""
+
+
+class Known:
+    """How much of what all data tell of some numbers a part of them tells."""
+
+    def __init__(self, objective: Objective, best: Minimum) -> None:
+        self.objective, self.best = objective, best
+        self._all = Posterior.of(objective.table, best.z, best.information)
+
+    def share(self, logarithms: Callable[[Array], Array], part: Part) -> Array:
+        """Return ln(s_prior / s_part) / ln(s_prior / s_all), with the standard deviations s of each of m logarithms.
+
+        The function returns m x n logarithms for p x n coordinates. The share is 0 where all data tell nothing.
+        """
+        information = information_of(self.objective, self.best, part)
+        of_part = Posterior.of(self.objective.table, self.best.z, information).covariance
+        with np.errstate(all="ignore"):
+            _, every, prior = self._all.numbers(logarithms)
+            _, some, _ = replace(self._all, covariance=of_part).numbers(logarithms)
+            nats = [np.nan_to_num(np.log(np.diag(prior) / np.diag(C))) for C in (some, every)]
+        return np.asarray(nats[0] / np.maximum(nats[1], 1e-9))
+
+    def informs(self, axis: Axis, part: Part) -> bool:
+        """Return True if a part of the data tells half of what all tell of the speed, time and way at half command."""
+        return float(np.mean(self.share(logarithms(self.objective.table, axis, _CENTRAL), part))) >= INFORMED
+
+
+def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
+    """Return what is held out, with the fits to other data.
+
+    An axis of a log is predicted by all other logs if these know enough of it, otherwise each half of the log by the
+    other logs and the other half. Where that does not know enough either, nothing is held out.
+    """
+    logs, rows = objective.whole.logs, objective.whole.rows
+    known, found = Known(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], Part]]()
+    for n in logs:
+        others = [m for m in logs if m != n]
+        words = "the other log" if len(others) == 1 else f"the other {len(others)} logs"
+        rest, middle = list({m.sensor.axis for m in objective.logs[n].measured}), len(objective.records[n].time) // 2
+        halves = slice(middle), slice(middle, None)
+        with_others = f" and {words}" if others else ""
+        parts = [(slice(None), words if others else "the tables", Part(others, rows))]
+        parts += [
+            (out, f"the {name} half{with_others}", Part(logs, rows, {n: used}))
+            for out, used, name in zip(halves[::-1], halves, ("first", "second"), strict=True)
+        ]
+        for out, by, part in parts:
+            if axes := tuple(axis for axis in rest if known.informs(axis, part)):
+                found.append((n, out, by, axes, part))
+                if part.logs is others:
+                    rest = [axis for axis in rest if axis not in axes]
+    ends = refits(objective, best, [part for *_, part in found])
+    fits = [Posterior.of(objective.table, end.z, end.information) for end in ends]
+    return [HeldOut(*one, fit) for one, fit in zip(found, fits, strict=True)]
+
+
+# ---- Predictions -----------------------------------------------------------------------------------------------------
+
+
+def predictions(
+    objective: Objective, best: Minimum, out: Sequence[HeldOut], against: Vehicle | None = None
+) -> Iterator[Prediction]:
+    """Yield the prediction of each quantity that is held out, and that by a vehicle to compare with.
+
+    That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
+    """
+    other = _other(objective.table, against)
+    for one in out:
+        covariance = one.fit.covariance
+        if one.log not in one.part.logs:
+            covariance = _with_currents(objective, best, covariance, one.log)
+        yield from _predicted(objective, one, cautious(objective, one.fit.z), covariance, other)
+
+
+def _other(table: Table, against: Vehicle | None) -> Table | None:
+    """Return a table whose coefficients are those of another vehicle, None where this table does not have them all."""
+    if not against or against.layout.gains != table.layout.gains:
+        return None
+    is_whole = len(against.with_(table.layout).coefficients) == len(against.coefficients)
+    return table.of_vehicle(against) if is_whole else None
+
+
+def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
+    """Return the covariance with the variance of the current of an unseen log: about as large as in the other logs."""
+    found = covariance.copy()
+    for n, p in enumerate(objective.table.parameters):
+        if p.kind == "current" and p.log == number:
+            found[n], found[:, n] = 0.0, 0.0
+            found[n, n] = unseen_current(objective.table, best.z, covariance, p.of)
+    return found
+
+
+def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> float:
+    """Return the variance of the current of an unseen log: about as large as in the other logs of a table."""
+    currents = [n for n, p in enumerate(table.parameters) if p.kind == "current" and p.of != file]
+    return _LEAST_CURRENT**2 + float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
+
+
+def cautious(objective: Objective, z: Array) -> Array:
+    """Return the parameters with at least the least change of thrust."""
+    moved = z.copy()
+    place = objective.table.place("slow gain")
+    if place is not None:
+        moved[place] = max(moved[place], log(_LEAST_GAIN))
+    return moved
+
+
+def _predicted(
+    objective: Objective, out: HeldOut, z: Array, covariance: Array, other: Table | None
+) -> Iterator[Prediction]:
+    """Yield the predictions of what is held out over its whole length, and of its positions over a shorter time."""
+    one, record = objective.logs[out.log], objective.records[out.log]
+    inside = np.zeros(len(record.time), bool)
+    inside[out.chosen] = True
+    begin = max(float(record.time[inside][0] - record.time[0]), 0.0) + SETTLING
+    for span in (inf, AHEAD):
+        try:
+            off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
+            usual = _usual_noise(objective, z)
+            compared = objective.run(usual, out.log, table=other, begin=begin, span=span) if other else None
+        except DivergedError:
+            continue
+        later = inside & (record.time >= record.time[0] + begin)
+        for number, m in enumerate(one.measured):
+            at = later & (record.sensor == number)
+            if at.sum() < 10 or (span < inf and m.sensor.is_velocity) or m.sensor.axis not in out.axes:
+                continue
+            off, deviation = off_all[at], deviations[at]
+            measured = record.value[at]
+            yield Prediction(
+                axis=m.sensor.axis,
+                file=one.log.file,
+                quantity=m.channel.quantity.name,
+                unit=m.channel.quantity.unit,
+                is_position=not m.sensor.is_velocity,
+                span=span,
+                by=out.by,
+                time=record.time[at],
+                measured=measured,
+                predicted=measured - off,
+                deviation=deviation,
+                unchanged=_unchanged(record.time[at], measured, span),
+                noise=objective.table.get(z, "white noise", m.channel.quantity.name),
+                error=float(np.sqrt(np.mean(off**2))),
+                coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
+                loss=cost(off, deviation**2) / len(off),
+                compared=measured - compared.innovations[at] if compared else None,
+            )
+
+
+def _usual_noise(objective: Objective, z: Array) -> Array:
+    """Return the parameters with the means of the priors of the noise, for a vehicle that was not fitted.
+
+    The noise of a fit is too small for it: the filter would explain its errors by a thrust that fades to 0.
+    """
+    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    return np.where(of_motion, z, objective.mean)
+
+
+def ahead(
+    objective: Objective, number: int, z: Array, covariance: Array, begin: float, span: float
+) -> tuple[Array, Array]:
+    """Return measured minus predicted for each sample of a log, and the standard deviation of each prediction.
+
+    The predictions start anew at `begin` (s after the first sample) and after each `span`. The deviations contain the
+    noise and the uncertainty of the parameters. Raises DivergedError.
+    """
+    run = objective.run(z, number, begin=begin, span=span)
+    slopes = _slopes(objective, number, z, covariance, run, begin, span)
+    deviations = np.sqrt(run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+    wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
+    lost = wraps[objective.records[number].sensor]
+    return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
+
+
+def _slopes(
+    objective: Objective, number: int, z: Array, covariance: Array, run: Run, begin: float, span: float
+) -> Array:
+    """Return the derivatives of the predictions of a log with respect to the parameters of the motion, n x p."""
+    found = np.zeros((len(objective.records[number].time), len(z)))
+    parameters = enumerate(objective.table.parameters)
+    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
+    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
+    found[:, places] = objective.changes(z, number, places, steps, run, begin, span)
+    return found
+
+
+def _unchanged(time: Array, values: Array, span: float) -> float:
+    """Return the RMS change of a quantity since the start of its prediction."""
+    if span == inf:
+        return float(np.sqrt(np.mean((values - values[0]) ** 2)))
+    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
+    return float(np.sqrt(np.mean((values - values[first]) ** 2)))
+
+
+def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
+    """Return the largest error of the predictions over 10 s along each axis, relative to the noise of the sensor.
+
+    The fit has seen these data, so only its structure can be wrong. It is near 1 where it is right, even where noise
+    explains each next sample. Outliers do not count, and the noise is at least 1 % of the motion.
+    """
+    found: dict[Axis, float] = {}
+    for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
+        try:
+            off = objective.run(best.z, n, begin=SETTLING, span=AHEAD).innovations
+        except DivergedError:
+            off = np.full(len(record.time), inf)
+        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
+        for number, m in enumerate(one.measured):
+            at = usual & (record.sensor == number)
+            if at.sum() < 10:
+                continue
+            unchanged = _unchanged(record.time[at], record.value[at], AHEAD)
+            ratio = float(np.sqrt(np.mean(off[at] ** 2))) / max(m.noise, LEAST_NOISE * unchanged)
+            found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), ratio)
+    return found
+
+
+# ---- Rows of tables --------------------------------------------------------------------------------------------------
+
+
+def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
+    """Yield the rows of tables with what the vehicle says about them, also held out."""
+    quantity = QUANTITIES[kind]
+    for subject, rows in tests.rows(kind):
+        if only and subject != only:
+            continue
+        for row in rows:
+            of: Curve | Axis = (
+                next(c for c in vehicle.layout.curves if c.name == subject)
+                if kind == "thrust"
+                else vehicle.layout.kinds[subject].axis
+            )
+            one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
+            unit = (
+                "N" if kind == "thrust" else "s" if kind == "time_constant" else vehicle.layout.kinds[subject].axis.unit
+            )
+            out = values.get((quantity, subject, row.command), np.nan)
+            counts = tests.counts(kind, subject, row.command)
+            numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
+            yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+
+
+def held_out_rows(objective: Objective, best: Minimum) -> Values:
+    """Return the value of each row of the tables by a fit without all rows of the same size of the command.
+
+    It is NaN where the other data do not know enough of it.
+    """
+    rows, known = objective.rows, Known(objective, best)
+    found: dict[tuple[str, str, float], float] = {}
+    groups: dict[tuple[str, str, float], list[int]] = {}
+    for n, row in enumerate(rows):
+        kind = "force" if row.quantity == "force" else "motion"
+        groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
+    parts = [Part(objective.whole.logs, [n for n in objective.whole.rows if n not in out]) for out in groups.values()]
+    for members, part, without in zip(groups.values(), parts, refits(objective, best, parts), strict=True):
+        some = [rows[n] for n in members]
+
+        def logarithms(z: Array, some: Sequence[TableRow] = some) -> Array:
+            with np.errstate(divide="ignore"):
+                return np.log(np.abs(modelled(some, *objective.table.model(z))))
+
+        values = modelled(some, *objective.table.model(without.z))
+        values = np.where(known.share(logarithms, part) < INFORMED, np.nan, values)
+        found |= zip([(row.quantity, row.subject.name, row.command) for row in some], values.tolist(), strict=True)
+    return found

@@ -1,0 +1,67 @@
+"""The fit of the vehicle file, which says less than the model of the fit to all data.
+
+A file has no shapes of thrust curves, and effects that the data hardly show are left out. Both are fits again: J is
+minimised with quadratic curves, and then without the weakest effects while it rises by at most MOST_RISE in total. So
+the file has the numbers of a minimum of J, and not those of another vehicle that is extrapolated from it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import Minimum, minimise, refits
+
+MOST_RISE = 2.0
+"""The largest rise of J, twice a log likelihood, by all effects that are left out."""
+_EXPECTED = 1.5
+"""Effects are tried while J is expected to rise by at most so many times MOST_RISE: it is only nearly quadratic."""
+_STEPS = 2
+"""The most derivatives of a fit without effects, from the end of its refit."""
+
+
+@dataclass(frozen=True, eq=False)
+class FileFit:
+    """J where a vehicle file can be, at its minimum without weak effects."""
+
+    objective: Objective
+    minimum: Minimum
+    posterior: Posterior
+
+
+def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
+    """Leave out the weakest effects, each time with a refit, while J rises by at most MOST_RISE.
+
+    The effect that is left out next is the one without which J is expected to rise least, given that those before it
+    are absent: two effects of which either explains the data are not both left out. Many refits run together, and those
+    that hold tell anew what to expect of the next ones.
+    """
+    least, absent = best, frozenset[int]()
+    while True:
+        posterior = Posterior.of(objective.table, least.z, least.information, absent)
+        order = [*_weakest(posterior, least.value - best.value)]
+        tried = [absent.union(order[: n + 1]) for n in range(len(order))]
+        found = refits(objective, least, [objective.whole] * len(tried), tried)
+        within = [n for n, one in enumerate(found) if one.value - best.value <= MOST_RISE]
+        if not within:
+            return FileFit(objective.without(absent), least, posterior)
+        absent = tried[within[-1]]
+        least = minimise(objective.without(absent), found[within[-1]].z, most=_STEPS)
+
+
+def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
+    """Yield the places of effects in the order in which they are left out, for a normal posterior after a rise of J."""
+    z, C, parameters = posterior.z, posterior.covariance, enumerate(posterior.table.parameters)
+    null = {n: p.null for n, p in parameters if p.null is not None and n not in posterior.absent}
+    while null:
+        rises = {n: (z[n] - end) ** 2 / max(C[n, n], 1e-300) for n, end in null.items()}
+        least = min(rises, key=lambda n: rises[n])
+        rise += rises[least]
+        if rise > _EXPECTED * MOST_RISE:
+            return
+        yield least
+        column = C[:, least] / C[least, least]
+        z = z - column * (z[least] - null.pop(least))
+        C = C - np.outer(column, C[least])

@@ -1,0 +1,276 @@
+"""Whether the model of an axis may be trusted: one table of rules, which the documentation has, too."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from math import inf, isfinite, nan
+
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify.result import (
+    DISAGREEMENT,
+    MOST_UNKNOWN,
+    Answer,
+    Coefficient,
+    Disturbance,
+    Effect,
+    Point,
+    Prediction,
+    Slip,
+    Verdict,
+    coverage_of,
+    relative_error,
+    score_of,
+)
+from rov_fmu.io.messages import listed
+from rov_fmu.vehicle.description import Word
+from rov_fmu.vehicle.vehicle import Vehicle
+
+MOST_GAIN = 0.3
+"""No answers are given where the thrust changes by more than this share: nobody knows for which thrust they are."""
+WORDS: tuple[Word, ...] = ("good", "usable", "do not use")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that a verdict about an axis rests on."""
+
+    predictions: Sequence[Prediction] = ()
+    answers: Sequence[Answer] = ()
+    strongest: float = 1.0
+    """The strongest command of the tests. Answers to stronger ones are extrapolated, and do not count."""
+    steady: Sequence[Point] = ()
+    """The steady velocities of the tables of the axis."""
+    disturbances: Sequence[Disturbance] = ()
+    effects: Sequence[Effect] = ()
+    slips: Sequence[Slip] = ()
+    misfits: Sequence[str] = ()
+    """The logs whose motors are not the thrusters along the axis."""
+    structure: float = 0.0
+    """The error over 10 s of predictions by the fit to all data, relative to the noise of the sensor."""
+    inertia: float = inf
+    """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
+    difference: float = 0.0
+    """How much larger J is at the end of the second start."""
+
+    @property
+    def moving(self) -> list[Prediction]:
+        """The predictions that are judged of quantities that move."""
+        return [p for p in self.predictions if p.is_judged and p.moves]
+
+    @property
+    def worse(self) -> list[Prediction]:
+        """Those that a prediction of no change would be better than."""
+        return [p for p in self.moving if p.error > p.unchanged]
+
+    @property
+    def unknown(self) -> list[Disturbance]:
+        """What is unknown: the disturbances without a cause."""
+        return [d for d in self.disturbances if d.kept and not d.cause]
+
+    @property
+    def unusual(self) -> list[Effect]:
+        return [effect for effect in self.effects if effect.is_unusual]
+
+    @property
+    def error_of_tables(self) -> float:
+        """The RMS of the relative errors of the steady velocities of the tables that are held out; NaN without any."""
+        return relative_error(self.steady, "held_out")
+
+    def half_width(self, *of: str) -> float:
+        """Return the largest relative half-width of some answers within the tests; NaN without any."""
+        within = [a for a in self.answers if abs(a.command) <= max(self.strongest, 0.5)]
+        known = [getattr(a, key) for a in within for key in of]
+        return max((0.5 * (high - low) / abs(value) for value, (low, high) in known), default=nan)
+
+
+@dataclass(frozen=True)
+class Rule:
+    """What lowers a verdict: a value of the evidence beyond a limit."""
+
+    of: str
+    """What the value is, in words."""
+    value: Callable[[Evidence], float]
+    """NaN where nothing can be judged."""
+    usable: float | None
+    """The limit beyond which a model is at most *usable*."""
+    bad: float | None
+    """The limit beyond which it is *do not use*."""
+    sentence: str
+    """The reason, with the value, and with what `names` tells."""
+    names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
+    unit: str = "%"
+    is_least: bool = False
+    """True if a value below the limit is beyond it."""
+    is_told: bool = False
+    """True if the reason is told even of a good model, as what it rests on."""
+
+    def word(self, value: float) -> Word:
+        """Return the best verdict that a value allows."""
+        sign = -1.0 if self.is_least else 1.0
+        beyond = [limit is not None and sign * value > sign * limit for limit in (self.usable, self.bad)]
+        return "do not use" if beyond[1] else "usable" if beyond[0] else "good"
+
+    @property
+    def row(self) -> tuple[str, str, str]:
+        """Return the row of the documentation: what is judged, and when it is *usable* and *do not use*."""
+        side = "below" if self.is_least else "above"
+        factor, unit = (100.0, " %") if self.unit == "%" else (1.0, "")
+        told = ["" if limit is None else f"{side} {factor * limit:g}{unit}" for limit in (self.usable, self.bad)]
+        return self.of, told[0], told[1]
+
+
+def _largest(e: Evidence) -> dict[str, str]:
+    """Return what the largest unknown disturbance is, as a sentence without its size."""
+    largest = max(e.unknown, key=lambda d: d.share)
+    is_turn = largest.axis is not None and largest.axis.is_rotation
+    what = {
+        "gain": "The thrust changes for an unknown reason by {:.0%}",
+        "force": f"An unknown slow {'torque' if is_turn else 'force'} is as large as {{:.0%}} of the thrusters'",
+        "velocity": "An unknown slow velocity over ground is as large as {:.0%} of the vehicle's",
+    }
+    return {"what": what[largest.kind].format(largest.share), "file": largest.file}
+
+
+RULES = (
+    Rule(
+        "logs whose motors are not the thrusters",
+        lambda e: len(e.misfits),
+        None,
+        0.0,
+        "The motors of {file} are not the thrusters of the vehicle.",
+        lambda e: {"file": listed(e.misfits)},
+        "1",
+    ),
+    Rule(
+        "share of unseen samples in the 95 % bands",
+        lambda e: coverage_of(e.predictions),
+        0.8,
+        0.6,
+        "The 95% bands contain {value:.0%} of the unseen samples.",
+        is_least=True,
+        is_told=True,
+    ),
+    Rule(
+        "the score G of the predictions",
+        lambda e: score_of(e.moving),
+        0.5,
+        0.25,
+        "The predictions reach {value:.0%} of the way from no change (0%) to the noise of the sensors (100%).",
+        is_least=True,
+    ),
+    Rule(
+        "moving quantities for which a prediction of no change is better",
+        lambda e: len(e.worse) / len(e.moving) if e.moving else nan,
+        0.0,
+        0.5,
+        "A prediction of no change is better for the {quantity} in {file}.",
+        lambda e: {"quantity": e.worse[0].quantity, "file": e.worse[0].file},
+    ),
+    Rule(
+        "nothing that moves and was predicted unseen",
+        lambda e: not e.moving and not isfinite(e.error_of_tables),
+        0.0,
+        None,
+        "Nothing of this axis was checked on unseen data.",
+        unit="1",
+    ),
+    Rule(
+        "errors over 10 s of the fit to all data, relative to the noise of the sensor",
+        lambda e: e.structure,
+        2.0,
+        None,
+        "Predictions over 10 s are off by {value:.1f} times the noise of the sensor, so the model lacks something.",
+        unit="1",
+    ),
+    Rule(
+        "unknown slow forces and changes of thrust relative to the thrust, and velocities relative to the velocity",
+        lambda e: sum(d.share for d in e.unknown),
+        None,
+        MOST_UNKNOWN,
+        "{what} in {file}.",
+        _largest,
+    ),
+    Rule(
+        "no answers",
+        lambda e: not e.answers,
+        None,
+        0.0,
+        "No steady velocity is determined.",
+        unit="1",
+    ),
+    Rule(
+        "half-width of the widest V_ss",
+        lambda e: e.half_width("steady"),
+        0.15,
+        0.3,
+        "A steady velocity is known to no better than {value:.0%}.",
+    ),
+    Rule(
+        "half-width of the widest time or stopping distance",
+        lambda e: e.half_width("rise", "stop"),
+        0.3,
+        None,
+        "A time or a stopping distance is known to no better than {value:.0%}.",
+    ),
+    Rule(
+        "error (RMS) of V_ss of the tables, predicted from the other commands",
+        lambda e: e.error_of_tables,
+        0.2,
+        0.4,
+        "The other commands predict a V_ss of the tables with an error of {value:.0%} (RMS).",
+        is_told=True,
+    ),
+    Rule(
+        "the largest effective inertia of the interval, relative to the inertia in air",
+        lambda e: e.inertia,
+        None,
+        1.0,
+        "The inertia is at most {value:.0%} of that of the vehicle in air, which cannot be.",
+        is_least=True,
+    ),
+    Rule(
+        "effects of unusual size",
+        lambda e: len(e.unusual),
+        0.0,
+        None,
+        "The {name} is unusual.",
+        lambda e: {"name": listed([effect.name for effect in e.unusual])},
+        "1",
+    ),
+    Rule(
+        "slips of unit or sign",
+        lambda e: len(e.slips),
+        None,
+        0.0,
+        "The {quantity} in {file} seems to have another unit or sign, and all axes are fitted to this log.",
+        lambda e: {"quantity": e.slips[0].quantity, "file": e.slips[0].file},
+        "1",
+    ),
+    Rule(
+        "difference of J to a second start that ends at different coefficients",
+        lambda e: e.difference,
+        None,
+        DISAGREEMENT,
+        "Two starts of the fit led to different vehicles.",
+        unit="1",
+    ),
+)
+"""All rules, in the order in which their reasons are told."""
+
+
+def verdict(e: Evidence) -> Verdict:
+    """Return the worst word of all rules, with a reason for each doubt."""
+    values = [(rule, rule.value(e)) for rule in RULES]
+    reasons = [
+        rule.sentence.format(value=value, **rule.names(e))
+        for rule, value in values
+        if rule.word(value) != "good" or (rule.is_told and isfinite(value))
+    ]
+    return Verdict(max((rule.word(value) for rule, value in values), key=WORDS.index), tuple(reasons))
+
+
+def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> float:
+    """Return the largest effective inertia by the interval of β, relative to the inertia in air; inf if unknown."""
+    if beta is None or beta.interval is None:
+        return inf
+    effective = vehicle.effective_inertia(vehicle.layout.kinds[axis.name])
+    return effective * beta.value / beta.interval[0] / vehicle[axis.inertia]

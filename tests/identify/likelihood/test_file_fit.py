@@ -1,0 +1,62 @@
+"""The vehicle file is a fit: J of its numbers, and intervals whatever the size of an effect."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import binom
+
+from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.identify import assess
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.identified_vehicle import identified_vehicle, written
+from rov_fmu.identify.likelihood.file_fit import MOST_RISE
+from rov_fmu.identify.likelihood.fit import Fit, fit_all
+from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.folders import folder_of
+from tests.identify.conftest import FORCES, KNOWN, TRUTH
+from tests.recordings import run, with_more, write_log
+
+PLAN = ((0.0, 2.0), (0.3, 10.0), (-0.3, 10.0), (0.5, 8.0), (-0.5, 8.0))
+
+
+def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehicle, Vehicle]:
+    """Return the fit to a log of a vehicle with a load (N), its file, and the true vehicle."""
+    truth = with_more(TRUTH, F_0_w=load)
+    path = folder_of(folder, KNOWN, FORCES)
+    write_log(path, "a", run(truth, HEAVE, PLAN, 10.0).noisy(np.random.default_rng(seed), noise=noise))
+    tests = load_tests(path)
+    fit = fit_all(path, *begin(tests))
+    return fit, written(fit, identified_vehicle(tests, fit)[0], path), truth
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
+    """`written` compares J of the numbers of the file with that of the fit, and a fit from elsewhere is not better."""
+    fit, vehicle, _ = drawn(tmp_path, 0.05, 0.02, seed)
+    file, parameters = fit.file, fit.file.posterior.table.parameters
+    assert file.posterior.absent
+    assert file.minimum.value - fit.best.value <= MOST_RISE
+    for n in file.posterior.absent:
+        assert file.minimum.z[n] == parameters[n].null, parameters[n]
+    assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
+    with pytest.raises(RuntimeError, match="differs by"):
+        written(fit, vehicle.with_(a_d_w=1.1 * vehicle["a_d_w"]), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("load", "seeds"),
+    [(0.05, 2), *(pytest.param(load, 10, marks=pytest.mark.long) for load in (0.0, 0.01, 0.02, 0.05, 0.1))],
+)
+def test_intervals_contain_the_truth_whatever_the_size_of_a_load(load: float, seeds: int, tmp_path: Path) -> None:
+    """A load of 0 to 2 % of the thrust, which is in the file or not."""
+    covered = []
+    for seed in range(seeds):
+        fit, vehicle, truth = drawn(tmp_path / str(seed), load, 0.02, seed)
+        for answer in assess.answers(fit.posteriors, HEAVE, vehicle, strongest=0.5):
+            if answer.command in assess.COMMANDS:
+                V, Tau = truth.response(HEAVE, answer.command)
+                for number, (_, (low, high)) in ((V, answer.steady), (Tau, answer.rise)):
+                    covered.append(low <= number <= high)
+    assert sum(covered) >= binom.ppf(0.001, len(covered), 0.9), covered

@@ -1,0 +1,147 @@
+"""Axes of the base that no test shows: they do not decide about the others, and every surface says so."""
+
+from collections.abc import Iterator, Mapping
+from io import StringIO
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import html
+
+from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.fmu.card import card_text
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.findings import next_tests
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.result import Identification
+from rov_fmu.report.console import _Console
+from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.report import report_page
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.description import VERDICT
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.writer import vehicle_text
+from tests.folders import HEAD, folder_of, read, responses
+from tests.report.pages import text_of
+from tests.report.test_report import leave_plots_out
+from tests.vehicles import VIDEORAY
+
+# ---- What a dive concerns --------------------------------------------------------------------------------------------
+
+SENSORS: dict[Axis, str] = {
+    SURGE: "surge velocity [m/s]",
+    SWAY: "sway velocity [m/s]",
+    HEAVE: "depth [m]",
+    ROLL: "roll angle [rad]",
+    PITCH: "pitch angle [rad]",
+    YAW: "heading [rad]",
+}
+"""A column for each axis that a dive may show."""
+NORTH = "surge distance [m]"
+DRAG = {"a_d": "N.s2/m2", "b_d": "N.s/m"}
+BASES = {"bluerov2": (SURGE, SWAY, HEAVE, YAW), "bluerov2_heavy": tuple(AXES.values())}
+
+
+def write_dive(path: Path, time: Array, columns: Mapping[str, Array]) -> None:
+    rows = np.column_stack([time, *columns.values()]).tolist()
+    lines = [",".join(["time [s]", *columns]), *(",".join(f"{x:.6f}" for x in row) for row in rows), ""]
+    path.write_text("\n".join(lines), encoding="utf-8")
+
+
+def drawn(base: str, *columns: str) -> tuple[Array, dict[str, Array]]:
+    """Return 10 s in which all commands of a vehicle and some measurements change."""
+    time, random = np.arange(0.0, 10.0, 0.1), np.random.default_rng(0)
+    thrusters = load_vehicle(SHIPPED[base]).layout.thrusters
+    commands = {f"u_{one.name} [1]": np.repeat(random.uniform(-0.5, 0.5, 10), 10) for one in thrusters}
+    return time, commands | {name: np.sin((1.0 + 0.1 * n) * time) for n, name in enumerate(columns)}
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_a_dive_that_shows_no_turn_concerns_only_the_axes_that_it_shows(base: str, tmp_path: Path) -> None:
+    """With a heading, the other axes stay, and only their drag and inertia are uncertain beside those of the tests."""
+    folder = folder_of(tmp_path, f'base = "{base}"\n{HEAD}', {})
+    axes = BASES[base]
+    shown = [some for count in (1, 2, len(axes) - 1, len(axes)) for some in combinations(axes, count)]
+    for some in shown:
+        write_dive(folder / f"dive_{''.join(a.velocity for a in some)}.csv", *drawn(base, *(SENSORS[a] for a in some)))
+    write_dive(folder / "dive_track.csv", *drawn(base, NORTH, SENSORS[HEAVE]))
+    known, logs, _ = begin(load_tests(folder))
+    concerned = {one.log.file: {form.axis for form in one.layout.axes} for one in logs}
+    assert concerned.pop("dive_track.csv") == {*axes}
+    expected = {f"dive_{''.join(a.velocity for a in some)}.csv": {*(axes if YAW in some else some)} for some in shown}
+    assert concerned == expected
+    assert {*known.fitted} == {*axes}
+    assert not known.unseen
+
+
+@pytest.mark.parametrize("base", BASES)
+def test_the_drag_and_the_inertia_of_what_a_dive_with_a_heading_does_not_show_are_uncertain(
+    base: str, tmp_path: Path
+) -> None:
+    folder = folder_of(tmp_path, f'base = "{base}"\n{HEAD}', {})
+    write_dive(folder / "dive.csv", *drawn(base, SENSORS[HEAVE], SENSORS[YAW]))
+    known, _, _ = begin(load_tests(folder))
+    assert {*known.unseen} == {*BASES[base]} - {HEAVE, YAW}
+    assert not {a.coefficient(key) for a in known.unseen for key in ("a_d", "b_d", "beta")} & known.exact
+    own = "".join(f'{n}_u = {{ value = 9.0, unit = "{u}", source = "s" }}\n' for n, u in DRAG.items())
+    exact, _, _ = begin(load_tests(folder_of(tmp_path, f'base = "{base}"\n{HEAD}[known]\n{own}', {})))
+    assert {"a_d_u", "b_d_u"} <= exact.exact
+
+
+# ---- What every surface says -----------------------------------------------------------------------------------------
+
+
+def surfaces(result: Identification, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, str]]:
+    """Yield all texts that an owner reads, by their names."""
+    leave_plots_out(monkeypatch)
+    file = StringIO()
+    monkeypatch.setattr("rov_fmu.report.console_results.console", lambda: _Console(file=file, width=10_000))
+    print_identification(result)
+    yield "terminal", file.getvalue()
+    yield "report", text_of(report_page(result))
+    yield "file", vehicle_text(result.vehicle)
+    yield "card", card_text(result.vehicle)
+    yield "page of the FMU", text_of(documentation_page(result.vehicle))
+
+
+@pytest.mark.parametrize("tested", [(HEAVE, YAW), (YAW,)])
+def test_every_surface_has_the_same_word_for_every_axis(
+    tested: tuple[Axis, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    tables = {name: text for axis in tested for name, text in responses(VIDEORAY, axis).items()}
+    result = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}', tables))
+    assert {axis for axis, one in result.verdicts.items() if one.word != "not identified"} == {*tested}
+    assert result.verdicts.keys() == {form.axis for form in result.vehicle.layout.axes}
+    for name, text in surfaces(result, monkeypatch):
+        said = " ".join(text.split()).casefold()
+        for axis, verdict in result.verdicts.items():
+            assert f"{axis.name}: {verdict.word}" in said, (name, axis.name)
+            others = {word for word in ("good", "usable", "do not use", "not identified") if word != verdict.word}
+            assert not any(f"{axis.name}: {word}" in said for word in others), (name, axis.name)
+            if verdict.word == "not identified":
+                assert "from videoray_refit (no test shows it)" in said
+    made = result.vehicle.provenance
+    assert made
+    assert made.words == {axis.name: verdict.word for axis, verdict in result.verdicts.items()}
+    assert all(map(VERDICT.fullmatch, made.verdicts))
+
+
+def test_no_answer_of_an_axis_of_the_base_is_told_but_how_to_identify_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    result = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}', responses(VIDEORAY, YAW)))
+    texts = dict(surfaces(result, monkeypatch))
+    assert "(yaw)" in texts["terminal"]
+    for axis in (SURGE, HEAVE):
+        assert f"({axis.name})" not in texts["terminal"]
+        (test,) = (one for one in next_tests(result) if one.startswith(f"{axis.name}: "))
+        assert test in texts["terminal"]
+        assert test.casefold() in texts["report"].casefold()
+    assert "depth" in test
+    heads = html.fromstring(report_page(result)).xpath("//th[@scope='row']")
+    assert {f"{SURGE.positive}{SURGE.name}", f"{HEAVE.positive}{HEAVE.name}"}.isdisjoint(
+        one.text_content().casefold() for one in heads
+    )

@@ -1,0 +1,149 @@
+"""Whether a model may be trusted: every rule lowers a verdict beyond its limits, and says why."""
+
+from dataclasses import replace
+from math import log
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.identify.result import Disturbance, Effect, Point, Slip, score_of
+from rov_fmu.identify.verdict import RULES, WORDS, Evidence, verdict
+from tests.report import results
+
+DEPTH = results.prediction(HEAVE, "depth", span=10.0)
+WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
+SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
+FORCE = Disturbance("force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
+
+
+def point(off: float) -> Point:
+    """A row of a table that is predicted without itself with this relative error."""
+    return Point("heave", "V_ss", "m/s", "steady_heave.csv", 0.3, 0.2, 0.2, 0.2 * (1.0 + off), counts=True)
+
+
+def scored(score: float) -> list[Any]:
+    """A prediction with this score."""
+    all_ = 2.0 * log(DEPTH.unchanged / DEPTH.least)
+    return [replace(DEPTH, loss=1.0 + 2.0 * log(DEPTH.unchanged) - score * all_)]
+
+
+USUAL: dict[str, Any] = {"predictions": [DEPTH], "answers": results.answers(1.0, 0.02)}
+COVERED = "The 95% bands contain 95% of the unseen samples."
+NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
+
+
+@pytest.mark.parametrize(
+    ("changes", "word", "reason"),
+    [
+        ({}, "good", ""),
+        ({"predictions": [WORSE, replace(WORSE, file="log_3.csv"), DEPTH]}, "do not use", NO_CHANGE),
+        ({"predictions": [WORSE, replace(WORSE, file="log_3.csv"), DEPTH, DEPTH]}, "usable", NO_CHANGE),
+        ({"predictions": [replace(WORSE, noise=0.23)]}, "do not use", NO_CHANGE),
+        ({"predictions": [replace(WORSE, noise=0.24)]}, "usable", "Nothing of this axis was checked on unseen data."),
+        (
+            {"disturbances": [FORCE]},
+            "do not use",
+            "An unknown slow force is as large as 6% of the thrusters' in log.csv.",
+        ),
+        ({"disturbances": [replace(FORCE, evidence=5.0)]}, "good", ""),
+        ({"disturbances": [replace(FORCE, cause="the distance")]}, "good", ""),
+        (
+            {"disturbances": [replace(FORCE, share=0.02), replace(FORCE, axis=YAW, share=0.04)]},
+            "do not use",
+            "An unknown slow torque is as large as 4% of the thrusters' in log.csv.",
+        ),
+        (
+            {"disturbances": [replace(FORCE, kind="gain", axis=None)]},
+            "do not use",
+            "The thrust changes for an unknown reason by 6% in log.csv.",
+        ),
+        (
+            {"disturbances": [replace(FORCE, kind="velocity")]},
+            "do not use",
+            "An unknown slow velocity over ground is as large as 6% of the vehicle's in log.csv.",
+        ),
+        ({"answers": results.answers(1.0, 0.2)}, "usable", "A steady velocity is known to no better than 20%."),
+        ({"answers": ()}, "do not use", "No steady velocity is determined."),
+        (
+            {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
+            "do not use",
+            "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
+        ),
+        ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
+        ({"effects": [replace(SLOW, beyond=2.4)]}, "good", ""),
+        ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
+        (
+            {"structure": 4.2},
+            "usable",
+            "Predictions over 10 s are off by 4.2 times the noise of the sensor, so the model lacks something.",
+        ),
+        (
+            {"inertia": 0.8},
+            "do not use",
+            "The inertia is at most 80% of that of the vehicle in air, which cannot be.",
+        ),
+    ],
+)
+def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
+    judged = verdict(Evidence(**(USUAL | changes)))
+    assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
+
+
+def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
+    judged = verdict(Evidence(**USUAL, misfits=["dive.tlog"]))
+    words = "The motors of dive.tlog are not the thrusters of the vehicle."
+    assert (judged.word, judged.reasons) == ("do not use", (words, COVERED))
+
+
+MADE: dict[str, Any] = {
+    "logs whose motors": lambda x: {"misfits": ["a.tlog"] * round(x)},
+    "share of unseen": lambda x: {"predictions": [replace(DEPTH, coverage=x)]},
+    "the score G": lambda x: {"predictions": scored(x)},
+    "moving quantities": lambda x: {"predictions": [replace(DEPTH, error=2.0 * (n < 1000 * x)) for n in range(1000)]},
+    "nothing that moves": lambda x: {"predictions": [DEPTH] * (x < 0.5)},
+    "errors over 10 s": lambda x: {"structure": x},
+    "unknown slow": lambda x: {"disturbances": [replace(FORCE, share=x)]},
+    "no answers": lambda x: {"answers": results.answers(1.0, 0.02) * (x < 0.5)},
+    "half-width of the widest V_ss": lambda x: {"answers": results.answers(1.0, x)},
+    "half-width of the widest time": lambda x: {
+        "answers": [
+            replace(a, steady=b.steady)
+            for a, b in zip(results.answers(1.0, x), results.answers(1.0, 0.02), strict=True)
+        ]
+    },
+    "error (RMS) of V_ss": lambda x: {"steady": [point(x)]},
+    "the largest effective": lambda x: {"inertia": x},
+    "effects of unusual": lambda x: {"effects": [SLOW] * round(x)},
+    "slips": lambda x: {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)] * round(x)},
+    "difference of J": lambda x: {"difference": x},
+}
+"""How to make evidence of a value, by the beginning of the words of its rule."""
+
+
+@pytest.mark.parametrize("rule", RULES, ids=[rule.of[:20] for rule in RULES])
+def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
+    made = next(make for words, make in MADE.items() if rule.of.startswith(words))
+    for limit, word in ((rule.usable, "usable"), (rule.bad, "do not use")):
+        if limit is None:
+            continue
+        step = (0.6 if rule.unit == "1" else 2e-3) * (-1.0 if rule.is_least else 1.0)
+        inside, outside = (verdict(Evidence(**(USUAL | made(x)))).word for x in (limit - 0.01 * step, limit + step))
+        assert outside == word
+        assert WORDS.index(inside) < WORDS.index(outside)
+
+
+def test_the_score_is_0_for_no_change_and_1_for_the_noise() -> None:
+    """Also a prediction by a right model scores more than one whose bands are 20 times too wide."""
+    random, n = np.random.default_rng(0), 20_000
+    e0, noise = random.standard_normal(n), 0.01 * random.standard_normal(n)
+
+    def score(error: np.ndarray, deviation: float) -> float:
+        loss = float(np.mean(np.log(deviation**2) + (error / deviation) ** 2))
+        return score_of([replace(DEPTH, unchanged=1.0, noise=0.01, loss=loss)])
+
+    assert score(e0, 1.0) == pytest.approx(0.0, abs=0.01)
+    assert score(noise, 0.01) == pytest.approx(1.0, abs=0.01)
+    assert score(0.95 * e0, 20.0) < 0.0
+    assert 0.5 < score(3.0 * noise, 0.03) < 1.0
