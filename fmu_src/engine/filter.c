@@ -1,4 +1,4 @@
-/* An extended Kalman filter for the identification (rov_fmu/c/filter.py): it runs through the samples of one log.
+/* An extended Kalman filter for the identification (rov_fmu/identify/likelihood/filter.py): it runs through the samples of one log.
  *
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *

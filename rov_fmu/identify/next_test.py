@@ -6,11 +6,11 @@ from math import inf, isfinite
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Record
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.curves import Motions
+from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import Answer, NextTest

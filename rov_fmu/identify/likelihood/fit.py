@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, exact_minimum, minimise
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
@@ -100,7 +100,7 @@ def fit_all(
     ends.sort(key=lambda end: end.value)
 
     show = moving(on_progress, "all samples", 0.3, 0.7)
-    near = minimise(full, _scaled(full, ends[0].z), show)
+    near = minimise(full, _scaled(full, ends[0].z), show, last=False)
     for n, curve in enumerate(known.measured_curves):
         other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
@@ -110,12 +110,12 @@ def fit_all(
 
         low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
         show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
-        found = minimise(objective, near.z, show, enough=_QUICK, promises=bends)
+        found = minimise(objective, near.z, show, enough=_QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
-            known, full, near = other, objective, minimise(objective, found.z)
+            known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     on_progress("exact derivatives", 0.8)
-    best = exact_minimum(full, _scaled(full, near.z))
+    best = minimise(full, _scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
@@ -125,7 +125,7 @@ def fit_all(
     if known.bent:
         plain = replace(known, bent=frozenset[str]())
         file = Objective(table_of(plain, logs, noises), logs, rows)
-        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.88, 0.9), most=_MOST)
+        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.88, 0.9))
     return Fit(known, full, best, posterior, without_weak_effects(file, least), float(difference))
 
 
@@ -135,7 +135,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     For a measured curve, a linear share of 2 d almost makes up for a dead band d, as a (c - d)^2 is almost
     a c^2 - 2 a d c. In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
-    end = minimise(objective, start, on_step=on_step, enough=enough)
+    end = minimise(objective, start, on_step=on_step, enough=enough, last=False)
     larger = end.z.copy()
     for n, p in enumerate(objective.table.parameters):
         band = objective.table.place("dead band", p.of)
@@ -144,7 +144,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
     return min(end, other, key=lambda found: found.value)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from rov_fmu.c.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples
 from rov_fmu.tank.arrays import Array
 
@@ -50,17 +50,22 @@ def minimise(
     start: Array,
     on_step: Callable[[int], None] = lambda _: None,
     *,
+    most: int = MOST_STEPS,
     enough: float = ENOUGH,
+    last: bool = True,
     promises: Callable[[float, Array], bool] | None = None,
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
     All runs take the steps of the first ones: J jumps by a few units where other parameters need other steps. The fit
     ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the information,
-    promises nothing. The data and the information are those before the last step, and not exact.
+    promises nothing. The `last` fit takes one more step with exact derivatives. These are then its data and
+    information; those of others are of the step before.
     """
-    now = _beginning(objective, start)
-    for count in range(1, MOST_STEPS + 1):
+    z = np.clip(start, objective.low, objective.high)
+    runs = objective.runs(z)
+    now = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
+    for count in range(1, most + 1):
         on_step(count)
         try:
             data = objective.data(now.z, now.runs, exact=False)
@@ -74,21 +79,10 @@ def minimise(
         now = _descended(objective, now)
         if before - now.value < enough:
             break
+    if last:
+        now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
+        now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
     return now
-
-
-def exact_minimum(objective: Objective, start: Array) -> Minimum:
-    """Return the minimum next to a start, with exact data and information. Raises DivergedError."""
-    now = _beginning(objective, start)
-    now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
-    runs = objective.runs(now.z, now.runs)  # with the gains of the filter
-    return replace(now, runs=runs, information=total(objective, now.z, now.data)[1])
-
-
-def _beginning(objective: Objective, start: Array) -> Minimum:
-    z = np.clip(start, objective.low, objective.high)
-    runs = objective.runs(z)
-    return Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
 
 
 def _descended(objective: Objective, start: Minimum) -> Minimum:

@@ -23,9 +23,9 @@ from math import log, pi
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Slow
 from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.identify.beginning import Tests, begin
+from rov_fmu.identify.likelihood.filter import DivergedError, Slow
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Beginning, table_of
@@ -169,7 +169,7 @@ def _least(tests: Tests, hypothesis: Hypothesis, start: Array | None = None) -> 
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
     quick = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows, thinned=True)
     try:
-        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start).value
+        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
     except DivergedError:
         return np.inf
     return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in hypothesis)

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.c.filter import Filter, Parameters, Record, Run
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.filter import Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, refits, total
 from rov_fmu.tank.arrays import Array
-from tests.c.sets import one_set
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
+from tests.identify.likelihood.sets import one_set
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 

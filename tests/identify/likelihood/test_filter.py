@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from rov_fmu.c.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axes_alone
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.c.sets import one_set
+from tests.identify.likelihood.sets import one_set
 from tests.vehicles import VIDEORAY, extended
 from verification.references.kalman import Belief, Sample, run
 
