@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import AXES, PITCH, REVERSE, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout
 from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.objective import TableRow
@@ -221,7 +221,9 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     given = tests.given
     deviations = given.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
-    vehicle = _extended(given.vehicle, measured, tests)
+    dives = [log for log in tests.folder.logs if not log.axis]
+    shown = {axis for log in dives for axis in shown_axes(log, given.vehicle.layout)}
+    vehicle = _extended(given.vehicle, measured, tests, shown)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.drivers(axis)}
@@ -246,7 +248,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
             values |= _rough_drag(vehicle, axis, tests, logs)
     has_lag = any(name.startswith("T_") for name in given.base)
     moved = {form.axis for one in logs for form in one.layout.axes}
-    exact = _exact(given, vehicle.layout, measured, moved)
+    exact = _exact(given, vehicle.layout, measured, moved, shown)
     errors = _thrust_errors(given, curves)
     bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
@@ -257,15 +259,25 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
-def _exact(given: GivenVehicle, layout: Layout, measured: Collection[str], moved: Collection[Axis]) -> frozenset[str]:
+def _exact(
+    given: GivenVehicle, layout: Layout, measured: Collection[str], moved: Collection[Axis], shown: Collection[Axis]
+) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
-    leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, and the
-    drag and the inertia of all axes along which a log moves: by the coupling, they decide about the other axes."""
+    leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, the drag
+    and the inertia of all axes along which a log moves, which by the coupling decide about the other axes, and what
+    loads the axes that a dive shows."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
     keys = ("beta", *(f"{key}{end}" for key in ("a_d", "b_d") for end in ("", REVERSE)))
     uncertain |= {axis.coefficient(key) for axis in moved for key in keys}
+    uncertain |= {axis.coefficient("F_0") for axis in shown} | {*_centres(layout, shown)}
     own = given.description.known
     return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
+
+
+def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
+    """Return the coordinates of the centre of buoyancy about which the attitude in a dive tells."""
+    needed = {"x_B": {PITCH}, "y_B": {ROLL}, "z_B": {ROLL, PITCH}}
+    return [key for key, axes in needed.items() if layout.restoring and axes & {*shown}]
 
 
 def _thrust_errors(given: GivenVehicle, curves: Sequence[Curve]) -> dict[str, float]:
@@ -284,23 +296,29 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests) -> Vehicle:
+def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, shown: Collection[Axis]) -> Vehicle:
     """Return the vehicle with every coefficient that a parameter may change, where each effect is absent.
 
-    `measured` has the curves whose forces were measured, and whether astern, too.
+    `measured` has the curves whose forces were measured, and whether astern, too. `shown` has the axes that dives show:
+    a load along them stays from dive to dive. About roll and pitch, it is that of the centre of buoyancy.
     """
     base, deviations = tests.given.base, tests.given.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
     vehicle = Vehicle(
         replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
     )  # a log tells thrusters' commands
-    layout = vehicle.layout
+    centres = dict.fromkeys(_centres(vehicle.layout, shown), 0.0)
+    restoring = tuple(key for key in RESTORING if key in {*vehicle.layout.restoring, *centres})
+    layout = replace(vehicle.layout, restoring=restoring)
+    vehicle, values = Vehicle(layout, {**centres, **vehicle.coefficients}), {**centres, **values}
     more: dict[str, float] = {}
     logged = {*tests.tested.logs}
     for form in layout.axes:
         axis = form.axis
         if axis.name in logged or tests.tested.steady.get(axis.name):
             more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
+        is_loaded = axis.name in logged or tests.tested.steady.get(axis.name) or axis in shown
+        if is_loaded and not (centres and axis in (ROLL, PITCH)):
             more[form.name_of("F_0")] = 0.0
     vehicle = _with_voltage(vehicle, base, tests)
     layout = vehicle.layout

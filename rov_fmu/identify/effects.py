@@ -7,6 +7,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.parameters import CENTRE
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import PLACED, Effect, Logging, Sensor
@@ -28,6 +29,8 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.kind == "load":
             full = fit.known.full[p.of]
             value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
+        if p.kind == "centre of buoyancy":
+            value += file.table.base[CENTRE[p.part]]
         low, high = around(value, error)
         if p.kind in ("reverse thrust", "dead band astern", "drag astern"):
             value, low, high = np.exp([value, low, high]).tolist()
@@ -45,6 +48,7 @@ _WORDS = {
     "dead time": "dead time of the commands",
     "drag astern": "drag astern relative to drag ahead",
     "load": "constant load",
+    "centre of buoyancy": "centre of buoyancy",
     "current": "current",
     **{kind: f"place of the {kind}" for kind in PLACED.values()},
     "sensor lag": "time constant",

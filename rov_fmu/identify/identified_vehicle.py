@@ -295,6 +295,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     with_voltage = tests.given.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     return replace(
         layout.with_keys(has),
+        restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=tests.given.vehicle.layout.mix,
         pulse=tests.given.vehicle.layout.pulse,

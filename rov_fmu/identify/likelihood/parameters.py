@@ -46,6 +46,7 @@ PRIORS = {
     "quadratic_drag": Prior(1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"),
     "linear_drag": Prior(1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"),
     "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
+    "buoyancy": Prior(0.02, "each coordinate of the centre of buoyancy, m", "floats and ballast are moved so far"),
     "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
     "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
     "sensor_lag": Prior(0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
@@ -74,6 +75,8 @@ CURRENT = ("to the north", "to the east")
 """The parts of a current."""
 _PLACES = ("forward", "to starboard", "down")
 """The parts of the place of a sensor."""
+CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
+"""The coordinates of the centre of buoyancy."""
 USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage."""
 _USUAL_LAG = 0.05
@@ -184,6 +187,9 @@ class Table:
             self._axis(found, z, form)
         for curve in self.layout.curves:
             self._curve(found, z, curve)
+        for part, key in CENTRE.items():
+            if key in found:
+                found[key] = found[key] + self.get(z, "centre of buoyancy", "", part)
         return found | {name: self.base[name] for name in self.exact}
 
     def _axis(self, found: dict[str, Any], z: Array, form: VehicleAxis) -> None:
@@ -367,6 +373,9 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
             T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
             mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
             yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
+        for part, key in CENTRE.items():
+            if prior("buoyancy") and key in {*known.layout.restoring} - known.exact:
+                yield Parameter("centre of buoyancy", "", part, deviation=prior("buoyancy"), null=0.0, unit="m")
         if prior("dead_time"):
             yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
         if prior("voltage") and any("n_V" in c.keys for c in known.curves):
@@ -454,10 +463,10 @@ def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parame
             if axis.coefficient(key) not in known.exact:
                 mean = log(max(c[axis.coefficient(key)], 1e-9))
                 yield Parameter(kind, name, mean=mean, deviation=width, is_log=True)
-        free = {*known.layout.coefficients} - known.exact if axis in known.fitted else ()
-        if axis.coefficient(f"a_d{REVERSE}") in free:
+        free = {*known.layout.coefficients} - known.exact
+        if axis in known.fitted and axis.coefficient(f"a_d{REVERSE}") in free:
             yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
-        if (load := known.layout.kinds[name].coefficient("F_0")) in free:
+        if (load := known.layout.kinds[name].coefficient("F_0")) in free and known.full[name]:
             null = -c[load] / known.full[name]
             yield Parameter("load", name, deviation=prior("load"), null=null)
 
