@@ -121,6 +121,19 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     check_gradient(objective, z)
 
 
+@pytest.mark.parametrize("threads", [2, 4])
+def test_the_number_of_threads_changes_no_bit(
+    objective: Objective, place: Array, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def found(cores: int) -> bytes:
+        monkeypatch.setattr("rov_fmu.identify.likelihood.objective.usable_cores", lambda: cores)
+        best = minimise(objective, place, most=1)
+        arrays = [best.z, best.information, *(one.gains for one in best.runs), *(one.slopes for one in best.data)]
+        return b"".join(array.tobytes() for array in arrays)
+
+    assert found(threads) == found(1)
+
+
 def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
     """The prior, each sample of each log, and each row of a table, by the formula."""
     runs, parameters = objective.runs(place), objective.table.parameters
