@@ -133,7 +133,9 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
     steps = np.array([objective.table.parameters[k].step for k in concerned])
     # Where all innovations are 0, it does not matter that the gains of the filter would change, too.
-    slopes = proposed.changes(z, number, concerned, steps, run, begin=-1.0, span=inf)
+    inside = z.copy()
+    inside[concerned] = np.maximum(z[concerned], objective.low[concerned] + steps)
+    slopes = proposed.changes(inside, number, concerned, steps, run, begin=-1.0, span=inf)
     data = Data(run.innovations, run.variances, slopes, np.zeros_like(slopes), concerned, len(z))
     return data.information(slice(None))[1]
 
