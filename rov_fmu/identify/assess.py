@@ -29,6 +29,8 @@ _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %."""
+ROCKING = 0.03
+"""Nor is a V_ss to better than 3 % where the vehicle may have rocked unseen, which raises its drag by 3 to 7 %."""
 _STOPPED = 0.1
 _DRAWS = 256
 """The number of vehicles that are drawn from the estimates of a vehicle file."""
@@ -69,20 +71,22 @@ def answers(
     pushes: Sequence[float] = (),
     strongest: float = 1.0,
     fits: Sequence[Posterior] = (),
+    least: float = EXACT,
 ) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
-    those of the vehicle file, and each interval contains those of all posteriors. They are wider for commands beyond
-    the strongest one of the tests, and contain the answers of those of `fits`, which lack a part of the data, that
-    disagree with the last posterior: the difference of a fit to all data and of one to a part has the variance by which
-    theirs differ (Hausman 1978, doi:10.2307/1913827).
+    those of the vehicle file, and each interval contains those of all posteriors; that of V_ss is never narrower than
+    `least`. They are wider for commands beyond the strongest one of the tests, and contain the answers of those of
+    `fits`, which lack a part of the data, that disagree with the last posterior: the difference of a fit to all data
+    and of one to a part has the variance by which theirs differ (Hausman 1978, doi:10.2307/1913827).
     """
     sizes = np.abs(pushes or ANSWERED)
     of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-    ends = [own - EXACT, own + EXACT]
+    narrowest = np.array([least, EXACT, EXACT])
+    ends = [own - narrowest, own + narrowest]
     for posterior in posteriors:
         fitted = logarithms(posterior.table, axis, pushes=pushes)
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
@@ -92,7 +96,7 @@ def answers(
         # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
         variances[:, :2] += (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2
         variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
-        half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), EXACT), _WIDEST_HALF)
+        half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
         ends += [middle - half, middle + half]
     for fit in fits:

@@ -255,7 +255,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
         vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
     )
     unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
-    known = replace(known, unseen=unseen, bent=bent)
+    known = replace(known, unseen=unseen, bent=bent, has_times=bool(tests.tested.time_constants))
     return known, logs, [*_table_rows(tests, vehicle)]
 
 
@@ -332,16 +332,19 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
                 more[curve.coefficient("c_0")] = 0.0
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
-        if logged:
+        if logged or tests.tested.time_constants:
             more[curve.coefficient("T")] = LEAST_LAG
-            if not (layout.has_wrench or curve.tables):
-                more[curve.coefficient("d")] = 0.0
+        if logged and not (layout.has_wrench or curve.tables):
+            more[curve.coefficient("d")] = 0.0
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 
 
 def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
-    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it."""
+    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it.
+
+    Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
+    """
     requests = tests.given.requests
     values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
     if not values or vehicle.layout.voltage is not None:
@@ -351,12 +354,14 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
         return vehicle
     more = {}
     is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
-    for curve in vehicle.layout.curves:
-        if len(curve.tables) < 2:
-            measured_at = tests.given.description.measured_at.get(curve.name, mean)
-            more[curve.name_of("V_0")] = base.get(curve.name_of("V_0"), measured_at)
-            more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
-    layout = replace(vehicle.layout, voltage=round(mean, 3), voltage_source="Mean voltage of the logs")
+    curves = [curve for curve in vehicle.layout.curves if len(curve.tables) < 2]
+    told = {c.name: base[c.name_of("V_0")] for c in curves if c.name_of("V_0") in base}
+    known = {**tests.given.description.measured_at, **told}
+    for curve in curves:
+        more[curve.name_of("V_0")] = known.get(curve.name, mean)
+        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
+    source = "Voltage of the measured thrust" if known else "Mean voltage of the logs"
+    layout = replace(vehicle.layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
     return _with(layout, vehicle.coefficients, more)
 
 

@@ -5,17 +5,20 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from math import inf, isfinite, log
+from math import floor, inf, isfinite, log, log10
 from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.layout import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
     PLACED,
+    RATIOS,
     Answer,
     AxisOfBase,
     AxisResult,
@@ -34,6 +37,7 @@ from rov_fmu.tank import findings
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
+from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.uncertainty import significant, with_interval
@@ -145,6 +149,10 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
+        "rocking": (
+            "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
+            "better than 3 %"
+        ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
         ),
@@ -276,7 +284,9 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     found = [*identification.folder.findings]
     for result in identification.axes:
         found += [*_on_predictions(result), *_on_coefficients(identification, result)]
-        found += _on_points(result)
+        found += [*_on_points(result)]
+        if may_rock(identification.folder, result.axis):
+            found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
     found += [*_on_forces(identification), *_on_scale(identification)]
@@ -421,6 +431,22 @@ def extrapolated(vehicle: Vehicle) -> list[str]:
     return [words] if SHARES[-1] > high else []
 
 
+def with_lag(identification: Identification) -> list[str]:
+    """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
+    vehicle, told = identification.vehicle, []
+    for result in identification.axes:
+        axis, half = result.axis, answer_at(result, 0.5)
+        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.drivers(axis)}
+        T = max(({*lags} & vehicle.coefficients.keys()), key=lambda name: vehicle[name], default="")
+        if half and T:
+            row = TableRow("", axis, "Tau", half.command, half.rise[0], 1.0)
+            time = float(modelled([row], vehicle, NO_SHAPES)[0])
+            ends = zip(half.rise[1], vehicle.intervals.get(T, (vehicle[T],) * 2), strict=True)
+            low, high = (time + end - half.rise[0] + lag - vehicle[T] for end, lag in ends)
+            told.append(f"{with_error((time, (low, high)), 's')} ({axis.name})")
+    return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
+
+
 def with_error(known: tuple[float, Interval], unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
     value, interval = known
@@ -467,6 +493,13 @@ def size_in_words(value: float, unit: str) -> str:
     """Return a size with two digits and its unit; angles are in degrees."""
     factor, shown = in_degrees(unit)
     return f"{significant(factor * value, 2)}{unit_after(shown)}"
+
+
+def effect_in_words(effect: Effect) -> str:
+    """Return the size of an effect; a ratio has two digits of how far it is from 1."""
+    if effect.kind not in RATIOS or effect.value == 1.0:
+        return size_in_words(effect.value, effect.unit)
+    return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
 
 def in_words(value: float, interval: Interval, unit: str) -> str:
@@ -547,6 +580,13 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+
+
+def may_rock(folder: Folder, axis: Axis) -> bool:
+    """Return True if only dives tell how fast an axis is, and none of them shows roll and pitch."""
+    logs = [log for log in folder.logs if log.axis in (None, axis)]
+    are_level = (log.axis or (log.used("roll angle") and log.used("pitch angle")) for log in logs)
+    return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 
 def _on_scale(identification: Identification) -> Iterator[Finding]:

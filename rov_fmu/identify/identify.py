@@ -13,7 +13,7 @@ from rov_fmu.equation.layout import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import Tests, begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
-from rov_fmu.identify.findings import beyond_thrusters, told
+from rov_fmu.identify.findings import beyond_thrusters, may_rock, told
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions, structure
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -129,7 +129,9 @@ def _axis(
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
-    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, strongest, fits) if is_told and is_steady else ()
+    least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
+    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, strongest, fits, least)
+    answers = answers if is_told and is_steady else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]

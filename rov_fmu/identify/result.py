@@ -23,6 +23,8 @@ KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
+RATIOS = ("reverse thrust", "dead band astern", "drag astern")
+"""The effects whose value is a ratio of astern to ahead."""
 _UNUSUAL = 2.5
 """An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 

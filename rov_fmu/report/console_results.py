@@ -11,6 +11,7 @@ from rov_fmu.identify.findings import (
     assumed_thrust,
     by_heading,
     driven_aside,
+    effect_in_words,
     extrapolated,
     name_of,
     next_tests,
@@ -18,6 +19,7 @@ from rov_fmu.identify.findings import (
     repairs,
     size_in_words,
     with_error,
+    with_lag,
 )
 from rov_fmu.identify.result import Answer, AxisResult, Identification, relative_error
 from rov_fmu.identify.tuning import Tuning
@@ -37,7 +39,7 @@ def print_identification(identification: Identification) -> None:
         paragraph(out, f"First: {words}")
     for axis, verdict in identification.verdicts.items():
         paragraph(out, f"- {verdict.of(axis)}")
-    asides = [*driven_aside(identification), *extrapolated(vehicle)]
+    asides = [*with_lag(identification), *driven_aside(identification), *extrapolated(vehicle)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
             out.print()
@@ -83,7 +85,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     """Yield the paragraphs about other effects, warnings, unread files, how many other findings there are, and the next
     test."""
     if kept := [effect for effect in identification.effects if effect.kept]:
-        words = (f"{e.name} ({f'{e.of} {size_in_words(e.value, e.unit)}'.strip()})" for e in kept)
+        words = (f"{e.name} ({f'{e.of} {effect_in_words(e)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
     yield from (f"{sentence}." for sentence in assumed_thrust(identification))
     groups = by_heading(identification.findings)

@@ -110,7 +110,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
 
 
 def test_every_reason_of_a_verdict_is_told_with_what_to_do() -> None:
-    table = USE.read_text("utf-8").partition("## When the verdict is not good")[2]
+    table = (DOCS / "identify-verdicts.md").read_text("utf-8")
     told = [row.split(" …")[0] for row in re.findall(r"^\| ([A-Z].*?) \|", table, re.MULTILINE)]
     _, *of_disturbances = re.findall(r'"([A-Z][^"]*)', getsource(_largest))  # without the docstring
     reasons = [*(rule.sentence for rule in RULES if rule.sentence[0] != "{"), *of_disturbances]

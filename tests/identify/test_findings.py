@@ -202,6 +202,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         disturbance(share=0.009),
     ),
     (
+        "rocking",
+        quiet(folder=replace(quiet().folder, rows={})),
+        "surge: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to",
+        quiet(),
+    ),
+    (
         "logging",
         quiet(logging=(LATE,)),
         "log_1.csv: the commands act 0.08 s before their rows. This belongs to the logger, not to the vehicle",

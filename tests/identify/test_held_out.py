@@ -1,10 +1,21 @@
 """What is held out, by which data, and how uncertain its prediction is."""
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from rov_fmu.identify.held_out import unseen_current
+from rov_fmu.equation.catalogue import HEAVE, YAW
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.held_out import Known, held_out, predictions, structure, unseen_current
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.result import score_of
+from tests.folders import DOWN, SPEED, folder_of, pulled
 from tests.vehicles import VIDEORAY
 
 
@@ -18,3 +29,59 @@ def test_the_current_of_an_unseen_log_is_about_that_of_the_others() -> None:
     assert unseen_current(table, np.array([5.0, 0.3, -0.4]), covariance, "a") == pytest.approx(
         0.02**2 + (0.3**2 + 0.01**2 + 0.4**2 + 0.02**2) / 2.0
     )
+
+
+def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit) -> None:
+    """A log of heave and one of yaw: neither knows anything of the other's axis (e12 and e13 of the experience)."""
+    objective, best = fit.objective, fit.best
+    known = Known(objective, best)
+    for n, (axis, other) in enumerate(((HEAVE, YAW), (YAW, HEAVE))):
+        alone = Part([n], objective.whole.rows)
+        assert known.informs(axis, alone)
+        assert not known.informs(other, alone)
+    out = held_out(objective, best)
+    assert {one.axes for one in out} == {(HEAVE,), (YAW,)}
+    assert [(one.log, one.by) for one in out] == [
+        (n, f"the {half} half and the other log") for n in (0, 1) for half in ("first", "second")
+    ]
+    own = [p for p in predictions(objective, best, out) if p.is_judged]
+    assert [(p.axis, p.by) for p in own] == [(axis, one.by) for one in out for axis in one.axes]
+    assert all(p.coverage > 0.8 for p in own)
+    assert score_of(own) > 0.5
+
+
+def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:
+    """J of the part, with the noise of the fit to all data, cannot be made clearly smaller."""
+    objective, best = fit.objective, fit.best
+    table = objective.table
+    fixed = tuple(
+        p if p.of_motion else replace(p, low=z, high=z) for p, z in zip(table.parameters, best.z.tolist(), strict=True)
+    )
+    still = Objective(replace(table, parameters=fixed), objective.logs, objective.rows)
+    for one in held_out(objective, best)[:2]:
+        part = still.of(one.part)
+        reached = part.value(one.fit.z, part.runs(one.fit.z))
+        assert minimise(part, one.fit.z).value == pytest.approx(reached, abs=0.5)
+
+
+def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:
+    ratios = structure(fit.objective, fit.best)
+    assert {*ratios} == {HEAVE, YAW}
+    assert max(ratios.values()) < 1.3
+
+
+@pytest.mark.parametrize(
+    ("rows", "finite"),
+    [
+        ("0.5,0.62\n", 0),
+        ("0.5,0.62\n-0.5,-0.60\n", 0),
+        ("0.2,0.22\n0.3,0.36\n0.4,0.48\n0.5,0.62\n0.6,0.74\n", 5),
+    ],
+)
+def test_a_row_that_the_others_do_not_determine_is_not_predicted(rows: str, finite: int, tmp_path: Path) -> None:
+    """The centre of a prior has seen the row (e9 of the experience)."""
+    tables = {"thrust_t200.csv": pulled(40.0, 2.0), "steady_heave.csv": f"{SPEED}\n{rows}"}
+    (axis,) = identify(load_tests(folder_of(tmp_path, DOWN, tables))).axes
+    assert sum(np.isfinite(p.held_out) for p in axis.points) == finite
+    assert ("Nothing of this axis was checked on unseen data." in axis.verdict.reasons) == (finite == 0)
+    assert axis.verdict.word != "good"

@@ -96,7 +96,7 @@ def test_tables_of_a_vehicle_give_the_vehicle(of_tables: Identification) -> None
     assert {(p.quantity, p.unit) for p in used} == {("V_ss", "m/s"), ("Tau", "s"), ("force", "N")}
     for p in used:
         assert p.model == pytest.approx(p.measured, rel=1e-3)
-        assert p.held_out == pytest.approx(p.measured, rel=0.01)
+        assert p.held_out == pytest.approx(p.measured, rel=0.03)
     (outside,) = (p for p in heave.points if not p.counts)
     assert (outside.command, outside.measured, np.isnan(outside.held_out)) == (0.9, 2.5, True)
 

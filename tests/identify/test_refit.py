@@ -15,15 +15,14 @@ from tests.identify.conftest import Identified
 
 HELD_OUT = {
     ("surge", "V_ss"): 0.061,
-    ("heave", "V_ss"): 0.122,
-    ("heave", "Tau"): 0.103,
-    ("yaw", "V_ss"): 0.151,
-    ("yaw", "Tau"): 0.133,
+    ("heave", "V_ss"): 0.108,
+    ("heave", "Tau"): 0.091,
+    ("yaw", "V_ss"): 0.141,
+    ("yaw", "Tau"): 0.125,
 }
 """The largest RMS relative errors of predictions by a fit without the rows of the same thrust: as measured, plus 3 %.
 
-Promised were 0.097 in surge, 0.108 and 0.170 in heave, and 0.127 and 0.094 in yaw: V_ss of heave and both of yaw miss
-that.
+Promised were 0.097 in surge, 0.108 and 0.170 in heave, and 0.127 and 0.094 in yaw: both of yaw miss that.
 """
 
 

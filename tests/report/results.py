@@ -32,6 +32,7 @@ from rov_fmu.tank.description import NO_ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Channel, Commands, Log, Source
+from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -137,9 +138,10 @@ def without_findings() -> Identification:
     correlation = np.eye(len(names))
     correlation[0, 1] = correlation[1, 0] = -0.9
     findings = [Finding("rows sorted", file=FILES[0], numbers={"count": 3.0})]
+    rows: dict[tuple[str, str], list[Row]] = {("steady", result.axis.name): [] for result in axes}
     inputs = {"rov.toml": "0" * 64, FILES[0]: "1" * 64, FILES[1]: "2" * 64, "thrust_top.csv": "3" * 64}
     return Identification(
-        folder=Folder(Path("pond"), NO_ROV_FILE, logs=[*map(log, FILES)], inputs=inputs, findings=findings),
+        folder=Folder(Path("pond"), NO_ROV_FILE, logs=[*map(log, FILES)], inputs=inputs, findings=findings, rows=rows),
         inputs=inputs,
         vehicle=vehicle,
         against=None,

@@ -32,9 +32,9 @@ STARTS: tuple[Mapping[str, float], ...] = (
 
 With much noise, J has few minima far from the data.
 """
-_LOUD = 1.0
-"""The second start is tried if a slow process ends so many deviations of its prior above its usual size. The motion is
-then hardly explained by the model, and another minimum may explain it."""
+_LOUD = 2.3
+"""The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
+the model, and another minimum may explain it."""
 _CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
 """The start if the motion diverges from both others: a heavier vehicle with less drag."""
 
@@ -157,7 +157,7 @@ def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
 
 def _is_loud(table: Table, z: Array) -> bool:
     """Return True if a slow process is much larger than usual."""
-    return any(p.is_slow_size and z[n] - p.mean > _LOUD * p.deviation for n, p in enumerate(table.parameters))
+    return any(p.is_slow_size and z[n] - p.mean > _LOUD for n, p in enumerate(table.parameters))
 
 
 def _evidence(objective: Objective, value: float, information: Array) -> float:

@@ -266,7 +266,7 @@ class Objective:
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
         rows = self.rows if rows is None else rows
-        least_lag = LEAST_LAG if self.logs else 0.0
+        least_lag = LEAST_LAG if self.table.place("lag") is not None else 0.0
         measured = np.array([row.measured for row in rows])
         off = (measured - modelled(rows, *self.table.model(z), least_lag).T).T
         noise = np.array([self.table.get(z, "row noise", row.noise) * row.scale for row in rows])

@@ -53,7 +53,9 @@ PRIORS = {
     "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
     "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
     "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
-    "slow_gain": Prior(2.0, "ln of the size of a slow change of thrust", "1 %, within a factor of 7"),
+    "slow_gain": Prior(
+        0.35, "ln of the size of a slow change of thrust", "1 %, to a factor of 2, or it acts as thrust"
+    ),
     "slow_velocity": Prior(2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"),
     "white_noise": Prior(0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
     "coloured_noise": Prior(1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"),
@@ -116,6 +118,11 @@ class Parameter:
     log: int | None = None
     """The index of the log that alone has it."""
     unit: str = "1"
+
+    @property
+    def is_effect(self) -> bool:
+        """True for an effect of the motion, which may be absent from the vehicle."""
+        return self.null is not None and self.of_motion
 
     @property
     def is_slow_size(self) -> bool:
@@ -350,6 +357,8 @@ class Beginning:
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
     unseen: Sequence[Axis] = ()
     """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
+    has_times: bool = False
+    """True if there are tables of time constants, which contain the lag."""
     bent: frozenset[str] = frozenset()
     """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
@@ -368,11 +377,11 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
     found = [*_of_curves(known, prior), *_advance(known, prior("advance")), *_of_axes(known, prior)]
+    if (logs or known.has_times) and prior("lag"):
+        T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
+        mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
+        yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
     if logs:
-        if prior("lag"):
-            T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
-            mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
-            yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
         for part, key in CENTRE.items():
             if prior("buoyancy") and key in {*known.layout.restoring} - known.exact:
                 yield Parameter("centre of buoyancy", "", part, deviation=prior("buoyancy"), null=0.0, unit="m")
@@ -504,7 +513,7 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
         usual, least, largest = _SIZES[key]
         if deviation := prior(f"slow_{key}"):
             mean, low, high = log(usual), log(least), log(largest)
-            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high)
+            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high, null=low)
 
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in (form.axis for form in known.layout.axes):

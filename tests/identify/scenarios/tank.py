@@ -18,7 +18,6 @@ from tests.identify.scenarios.scenario import (
     Expected,
     Given,
     Truths,
-    sagging,
     steady_name,
     voltage,
     write_folder,
@@ -126,19 +125,15 @@ class Tank:
     def truths(self, seed: int = 0) -> Truths:  # noqa: ARG002
         """Return drag, β and V_ss of each axis, and the lags that are asked for. Roll and pitch have no V_ss.
 
-        With a logged voltage, V_ss is that at its mean.
+        With a logged voltage, V_ss is that at the voltage of the measured thrust.
         """
         truth = self.truth
-        seconds = self.logs.seconds if "voltage" in self.logs.columns else 0.0
-        factor = sagging(0.5 * seconds, seconds) if seconds else 1.0
-        thrust = [name for name in truth.coefficients if name[:4] in ("a_t_", "b_t_")]
-        pushed = truth.with_(**{name: factor * truth[name] for name in thrust})
         found: dict[tuple[str, str], float] = {}
         for axis in self.recorded:
             names = [axis.coefficient(key) for key in ("a_d", "b_d", "beta")]
             found |= {(axis.name, name): truth[name] for name in names}
             if axis not in (ROLL, PITCH):
-                found |= {(axis.name, steady_name(c)): pushed.response(axis, c)[0] for c in COMMANDS}
+                found |= {(axis.name, steady_name(c)): truth.response(axis, c)[0] for c in COMMANDS}
         return found | {("", name): value for name, value in self.more.items() if name.startswith("T_")}
 
 
