@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.equation.catalogue import CURVE, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Curve, Layout, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
+from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.result import PLACED
 from rov_fmu.tank.arrays import Array

@@ -6,8 +6,8 @@ from math import inf, log
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
