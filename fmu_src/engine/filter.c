@@ -1,4 +1,4 @@
-/* An extended Kalman filter for the identification (rov_fmu/c/filter.py): it runs through the samples of one log.
+/* An extended Kalman filter for the identification (rov_fmu/identify/likelihood/filter.py): it runs through the samples of one log.
  *
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *
@@ -10,8 +10,8 @@
  *     y = s + n + e                        a sample: n is the sensor's coloured noise, also such a process, and e is white
  *
  * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
- * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps; the covariance
- * follows from the derivatives of the rates in the middle of each step. Names as in step.c: at, n, q.
+ * has the deviation of the integral of the command from its mean. The mean takes fourth-order Runge-Kutta steps. The derivatives of
+ * the rates change more slowly, and the covariance moves over a few of these steps at once. Names as in step.c: at, n, q.
  *
  * filter_lanes.c compiles it for several sets of parameters at once, one in each lane of a vector (real.h). They repeat the steps of
  * an earlier run. */
@@ -26,10 +26,8 @@
 #if LANES > 1
 EACH_LANE(exp, (real x), LANE(x, i))
 EACH_LANE(asin, (real x), LANE(x, i))
-EACH_LANE(remainder, (real x, double y), LANE(x, i), y)
 #define exp lanes_exp
 #define asin lanes_asin
-#define remainder lanes_remainder
 #endif
 
 #if defined _WIN32
@@ -50,6 +48,9 @@ enum {
     LATENESS = NOISE + MOST_SENSORS,
     N_X,
     N_SLOW = LATENESS - FORCE, /* the Ornstein-Uhlenbeck processes */
+    TOGETHER = 4,              /* the most steps of the mean over which the covariance moves at once */
+    BLOCK = 8,                 /* numbers that fit into the registers */
+    ROW = (N_X + BLOCK) | 1,   /* the numbers in a row of a matrix: rows of a power of 2 would displace each other from the cache */
     N_HELD = sizeof(model_held) / sizeof(real)
 };
 
@@ -119,8 +120,21 @@ typedef struct {
 } mode;
 
 typedef struct {
-    real x[N_X], P[N_X][N_X];
+    real x[N_X], P[N_X][ROW];
 } belief;
+
+/* The entries other than 0 of a matrix, row by row. A column is the place of a listed state. */
+typedef struct {
+    int count[FORCE], column[FORCE][N_X];
+    real entry[FORCE][N_X];
+} sparse;
+
+/* Matrices, which are too large for the stack of some threads. */
+typedef struct {
+    sparse A, once, over;   /* the derivatives of the rates, and the transitions over one step and over a few */
+    real whole[2][N_X][ROW]; /* a transition, and then a product of two */
+    real moved[FORCE + BLOCK][ROW];
+} matrices;
 
 typedef struct {
     const places *where;
@@ -136,6 +150,7 @@ typedef struct {
     mask beside[MOST_SENSORS]; /* if the last sample of a sensor was far beside its prediction */
     real cf, sf, ct, st;       /* cosines and sines of the measured roll and pitch at the time of the step or sample */
     double theta_rate;
+    matrices *m;
 } filter;
 
 /* Return a number, or 0 for a tiny one. What decays for long would become so small that processors compute with it a hundred times
@@ -143,6 +158,12 @@ typedef struct {
 static inline real flushed(real value)
 {
     return fabs(value) < TINY ? 0.0 : value;
+}
+
+/* Return an angle within half a turn. */
+static inline real wrapped(real angle)
+{
+    return angle - TURN * floor(angle / TURN + 0.5);
 }
 
 /* ---- The attitude and the sensors --------------------------------------------------------------------------------- */
@@ -327,7 +348,7 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
             H[c] = arm(f, sensor, j);
         } else if (turns(f, j) && !ignores_attitude) {
             y[j] = x[j] + 1e-6;
-            H[c] = remainder(at_once(f, y, sensor) - base, TURN) / 1e-6;
+            H[c] = wrapped(at_once(f, y, sensor) - base) / 1e-6;
             y[j] = x[j];
         } else if (kind == OVER_GROUND && j < N_AXES) {
             H[c] = f->where->direction[j] == place ? 1.0 : 0.0;
@@ -466,7 +487,7 @@ static lagging lagging_over(const filter *f, ptrdiff_t sensor, double h)
 static real next_to(const filter *f, real value, const real x[N_X], ptrdiff_t sensor)
 {
     const real found = at_once(f, x, sensor);
-    return wraps(f, sensor) ? value + remainder(found - value, TURN) : found;
+    return wraps(f, sensor) ? value + wrapped(found - value) : found;
 }
 
 /* Move what the sensors with a lag measure over a step, of which the states at its beginning, middle and end are known. */
@@ -513,12 +534,6 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
 }
 
 /* ---- The covariance ----------------------------------------------------------------------------------------------- */
-
-/* The entries other than 0 of a matrix, row by row. A column is the place of a listed state. */
-typedef struct {
-    int count[FORCE], column[FORCE][N_X];
-    real entry[FORCE][N_X];
-} sparse;
 
 /* Compute the derivatives of the rates of the vehicle's states with respect to the listed states. */
 static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], sparse *A)
@@ -567,7 +582,7 @@ static int count_before(const filter *f, int place)
 }
 
 /* Write a row of a matrix without its zeros. */
-static void set_row(const filter *f, const real row[N_X], int a, sparse *phi)
+static void set_row(const filter *f, const real row[], int a, sparse *phi)
 {
     phi->count[a] = 0;
     for (int b = 0; b < f->count; b++) {
@@ -631,35 +646,124 @@ static void transition_lagged(const filter *f, const real middle[N_X], double h,
     }
 }
 
-/* Move the covariance over one step. `late` is the change of each rate by the growth of the lateness; `remains` is how much of each
- * slow process remains. */
-static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi, const real late[FORCE], const real remains[N_SLOW])
+/* Multiply some rows of a sparse matrix by the first columns of another matrix. */
+static void multiply(const sparse *left, int rows, const real right[N_X][ROW], int columns, real product[][ROW])
 {
-    const int n = f->count, last = n - 1, moving = count_before(f, FORCE);
-    real moved[FORCE][N_X];
-    for (int a = 0; a < moving; a++) {
-        for (int b = 0; b < n; b++) {
-            moved[a][b] = late[f->listed[a]] * P[last][b];
-        }
-        for (int c = 0; c < phi->count[a]; c++) {
-            for (int b = 0; b < n; b++) {
-                moved[a][b] += phi->entry[a][c] * P[phi->column[a][c]][b];
+    for (int first = 0; first < columns; first += BLOCK) {
+        for (int a = 0; a < rows; a++) {
+            real sum[BLOCK];
+            memset(sum, 0, sizeof sum);
+            for (int c = 0; c < left->count[a]; c++) {
+                const real *const row = right[left->column[a][c]] + first;
+                for (int i = 0; i < BLOCK; i++) {
+                    sum[i] += left->entry[a][c] * row[i];
+                }
             }
+            memcpy(product[a] + first, sum, sizeof sum);
         }
     }
-    for (int a = 0; a < moving; a++) {
-        for (int b = 0; b <= a; b++) {
-            real sum = moved[a][last] * late[f->listed[b]];
-            for (int c = 0; c < phi->count[b]; c++) {
-                sum += moved[a][phi->column[b][c]] * phi->entry[b][c];
-            }
-            P[a][b] = P[b][a] = flushed(sum);
+}
+
+/* Return the transition over a few steps, and replace `remains` by how much of each slow process remains after them. */
+static const sparse *transition_over(const filter *f, int steps, real remains[N_SLOW])
+{
+    const int moving = count_before(f, FORCE), columns = count_before(f, NOISE);
+    matrices *const m = f->m;
+    real(*from)[ROW] = m->whole[0], (*to)[ROW] = m->whole[1], once[N_SLOW];
+    memcpy(once, remains, sizeof once);
+    for (int a = 0; a < columns && steps > 1; a++) {
+        memset(from[a], 0, sizeof from[a]);
+        for (int k = 0; a < moving && k < m->once.count[a]; k++) {
+            from[a][m->once.column[a][k]] = m->once.entry[a][k];
         }
-        P[a][last] = P[last][a] = flushed(moved[a][last]);
+    }
+    for (int done = 1, by; done < steps; done += by) {
+        by = 2 * done <= steps ? done : 1;
+        for (int a = moving; a < columns; a++) {
+            from[a][a] = remains[f->listed[a] - FORCE];
+        }
+        multiply(by == 1 ? &m->once : &m->over, moving, from, columns, to);
+        for (int a = 0; a < moving; a++) {
+            set_row(f, to[a], a, &m->over);
+        }
+        for (int i = 0; i < N_SLOW; i++) {
+            remains[i] *= by == 1 ? once[i] : remains[i];
+        }
+        real(*const other)[ROW] = from;
+        from = to;
+        to = other;
+    }
+    return steps > 1 ? &m->over : &m->once;
+}
+
+/* How the lateness changes the states over a few steps: first the lateness before them, and then one that began anew in each step. */
+typedef struct {
+    real late[1 + TOGETHER][FORCE]; /* the change of each listed state */
+    real newest;                    /* the index of the present lateness */
+    int count;
+} delays;
+
+/* Move the changes of the states over one step, and add what the present lateness changes during it. */
+static void step_delays(const filter *f, const sparse *phi, const real late[FORCE], delays *d)
+{
+    const int moving = count_before(f, FORCE);
+    for (int k = 0; k < d->count; k++) {
+        real before[FORCE];
+        memcpy(before, d->late[k], sizeof before);
+        for (int a = 0; a < moving; a++) {
+            real sum = d->newest == (double)k ? late[f->listed[a]] : 0.0;
+            for (int c = 0; c < phi->count[a] && phi->column[a][c] < moving; c++) {
+                sum += phi->entry[a][c] * before[phi->column[a][c]];
+            }
+            d->late[k][a] = sum;
+        }
+    }
+}
+
+/* Return the variance that a slow process gains. */
+static real gained(const filter *f, int slow, const real remains[N_SLOW])
+{
+    return (1.0 - remains[slow] * remains[slow]) * f->set->size[slow] * f->set->size[slow];
+}
+
+/* Move the covariance over a few steps, with the changes by the lateness. */
+static void step_covariance(const filter *f, real P[N_X][ROW], int steps, const delays *d, real remains[N_SLOW])
+{
+    const sparse *const phi = transition_over(f, steps, remains);
+    const double early = 0.5 * (steps - 1) / steps; /* what a slow process gains in a step acts in those after it: the mean share */
+    const int n = f->count, last = n - 1, moving = count_before(f, FORCE);
+    real(*const moved)[ROW] = f->m->moved;
+    for (int a = moving; a < last; a++) {
+        P[a][a] += early * gained(f, f->listed[a] - FORCE, remains);
+    }
+    multiply(phi, moving, P, n, moved);
+    for (int a = 0; a < moving; a++) {
+        for (int b = 0; b < n; b++) {
+            moved[a][b] += d->late[0][a] * P[last][b];
+        }
+    }
+    for (int b = 0; b < moving; b++) {
+        for (int first = b; first < moving; first += BLOCK) {
+            real sum[BLOCK];
+            for (int i = 0; i < BLOCK; i++) {
+                sum[i] = moved[first + i][last] * d->late[0][b];
+            }
+            for (int c = 0; c < phi->count[b]; c++) {
+                for (int i = 0; i < BLOCK; i++) {
+                    sum[i] += moved[first + i][phi->column[b][c]] * phi->entry[b][c];
+                }
+            }
+            for (int i = 0; i < BLOCK && first + i < moving; i++) {
+                for (int k = 1; k < d->count; k++) {
+                    sum[i] += d->late[k][first + i] * d->late[k][b];
+                }
+                P[first + i][b] = P[b][first + i] = flushed(sum[i]);
+            }
+        }
+        P[b][last] = P[last][b] = flushed(moved[b][last]);
     }
     for (int a = moving; a < last; a++) {
         const int slow = f->listed[a] - FORCE;
-        const real size = f->set->size[slow];
         for (int b = 0; b < moving; b++) {
             P[a][b] = P[b][a] = flushed(remains[slow] * moved[b][a]);
         }
@@ -667,21 +771,32 @@ static void step_covariance(const filter *f, real P[N_X][N_X], const sparse *phi
             P[a][b] = P[b][a] = flushed(remains[slow] * remains[f->listed[b] - FORCE] * P[a][b]);
         }
         P[a][last] = P[last][a] = flushed(remains[slow] * P[a][last]);
-        P[a][a] = remains[slow] * remains[slow] * (P[a][a] - size * size) + size * size;
+        const real before = P[a][a] - early * gained(f, slow, remains);
+        P[a][a] = remains[slow] * remains[slow] * before + gained(f, slow, remains);
     }
-}
-
-/* Let the lateness begin anew, uncorrelated with the other states. */
-static void reset_lateness(const filter *f, real P[N_X][N_X], mask begins_anew)
-{
-    const int last = f->count - 1;
-    for (int b = 0; b <= last; b++) {
-        P[last][b] = P[b][last] = begins_anew ? 0.0 : P[last][b];
+    for (int k = 1; k < d->count; k++) { /* what began anew is not correlated with anything that it did not change */
+        for (int b = 0; b <= last; b++) {
+            const real own = b < moving ? d->late[k][b] : (real)(b == last ? 1.0 : 0.0);
+            P[b][last] = P[last][b] = d->newest == (double)k ? own : P[last][b];
+        }
     }
-    P[last][last] = begins_anew ? 1.0 : P[last][last];
 }
 
 /* ---- Steps and samples -------------------------------------------------------------------------------------------- */
+
+/* Add to `late` the change of each listed state by the growth of the lateness over a step. */
+static void add_growth(const filter *f, const real middle[N_X], ptrdiff_t row, real growth, real late[FORCE])
+{
+    real r0[N_STATES], r1[N_STATES];
+    model_held q;
+    scale_thrust(middle, commanded(f, row - 1), &q);
+    rates(f, middle, &q, r0);
+    scale_thrust(middle, commanded(f, row), &q);
+    rates(f, middle, &q, r1);
+    for (int i = 0; i < N_STATES; i++) {
+        late[i] += fmax(growth, 0.0) * (r1[i] - r0[i]);
+    }
+}
 
 /* Move a belief from one time to another in a number of steps. */
 static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
@@ -689,49 +804,45 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
     const double h = (to - from) / pieces;
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     ptrdiff_t row = f->row;
-    real reset = f->reset, remains[N_SLOW];
+    real reset = f->reset, once[N_SLOW];
     lagging part[MOST_SENSORS];
     real slope[MOST_SENSORS][N_X];
-    sparse A, phi;
-    memset(remains, 0, sizeof remains);
+    matrices *const m = f->m;
+    delays d;
+    memset(once, 0, sizeof once);
     for (int a = moving; a < f->count - 1; a++) {
-        remains[f->listed[a] - FORCE] = exp(-h / f->set->time_constant[f->listed[a] - FORCE]);
+        once[f->listed[a] - FORCE] = exp(-h / f->set->time_constant[f->listed[a] - FORCE]);
     }
     for (int piece = 0; piece < pieces; piece++) {
         const double begin = from + piece * h, end = begin + h;
-        real held[N_HELD], middle[N_X], late[FORCE];
+        real held[N_HELD], middle[N_X], late[FORCE], remains[N_SLOW];
         while (row + 1 < f->log->rows && ALL(ends(f, row + 1) <= begin)) {
             row++;
         }
         set_tilt(f, 0.5 * (begin + end));
         mean_thrust(f, row, begin, end, held);
-        step_mean(f, b->x, held, h, remains, middle);
+        step_mean(f, b->x, held, h, once, middle);
         if (!has_covariance) {
             continue;
         }
-        if (piece % 4 == 0) { /* the derivatives of the rates change slowly */
-            slopes(f, middle, held, &A);
-            transition(f, &A, h, &phi);
-            transition_lagged(f, middle, h, remains, &phi, part, slope);
+        if (piece % TOGETHER == 0) {
+            slopes(f, middle, held, &m->A);
+            transition(f, &m->A, h, &m->once);
+            transition_lagged(f, middle, h, once, &m->once, part, slope);
+            memset(&d, 0, sizeof d);
+            d.count = 1;
         }
         memset(late, 0, sizeof late);
         for (ptrdiff_t j = row + 1; j < f->log->rows && ANY(begins(f, j) < end); j++) {
             const real growth = spread(f, j, end) - spread(f, j, begin);
             const mask begins_anew = begins(f, j) < end && reset < (double)j;
-            real r0[N_STATES], r1[N_STATES];
-            model_held q;
             if (ANY(begins_anew)) {
                 reset = begins_anew ? (double)j : reset;
-                reset_lateness(f, b->P, begins_anew);
+                d.newest = begins_anew ? (double)(1 + piece % TOGETHER) : d.newest;
+                d.count = 2 + piece % TOGETHER;
             }
             if (ANY(growth > 0.0)) {
-                scale_thrust(middle, commanded(f, j - 1), &q);
-                rates(f, middle, &q, r0);
-                scale_thrust(middle, commanded(f, j), &q);
-                rates(f, middle, &q, r1);
-                for (int i = 0; i < N_STATES; i++) {
-                    late[i] += fmax(growth, 0.0) * (r1[i] - r0[i]);
-                }
+                add_growth(f, middle, j, growth, late);
             }
         }
         for (int a = vehicle; a < moving; a++) {
@@ -740,7 +851,11 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
                 late[f->listed[a]] += part[sensor].end * slope[sensor][c] * late[f->listed[c]];
             }
         }
-        step_covariance(f, b->P, &phi, late, remains);
+        step_delays(f, &m->once, late, &d);
+        if (piece % TOGETHER == TOGETHER - 1 || piece == pieces - 1) {
+            memcpy(remains, once, sizeof remains);
+            step_covariance(f, b->P, 1 + piece % TOGETHER, &d, remains);
+        }
     }
 }
 
@@ -762,7 +877,7 @@ static real innovation(const filter *f, const belief *b, ptrdiff_t k)
     const int sensor = f->log->sensor[k];
     const real value = lags(f, sensor) ? b->x[LAGGED + sensor] : at_once(f, b->x, sensor);
     const real off = f->log->value[k] - value - b->x[NOISE + sensor];
-    return wraps(f, sensor) ? remainder(off, TURN) : off;
+    return wraps(f, sensor) ? wrapped(off) : off;
 }
 
 /* Compute P H and return the variance H P H + white noise. */
@@ -841,11 +956,11 @@ static void take(filter *f, belief *b, ptrdiff_t k, int repeats, real *off, real
 static int pieces_over(const filter *f, double from, double to)
 {
     double fastest = 1.0 / f->log->longest;
-    sparse A;
-    slopes(f, f->now.x, commanded(f, f->row), &A);
+    const sparse *const A = &f->m->A;
+    slopes(f, f->now.x, commanded(f, f->row), &f->m->A);
     for (int i = 0; i < N_STATES; i++) {
-        for (int k = 0; k < A.count[i]; k++) {
-            fastest = fmax(fastest, f->listed[A.column[i][k]] == i ? fabs(A.entry[i][k]) / f->log->share : 0.0);
+        for (int k = 0; k < A->count[i]; k++) {
+            fastest = fmax(fastest, f->listed[A->column[i][k]] == i ? fabs(A->entry[i][k]) / f->log->share : 0.0);
         }
     }
     for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
@@ -922,7 +1037,7 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
 }
 
 /* Run through a log with the parameters of each lane. failed[lane] becomes 1 when a number is not finite, and the run ends when this
- * is so for all. `memory` has room for a filter and then one model_held per row: it is too large for the stack of some threads. */
+ * is so for all. `memory` has room for a filter, its matrices, and then one model_held per row. */
 EXPORT void run_filter(const places *where, const record *log, const parameter_set sets[LANES], const mode *how,
                        const output results[LANES], int failed[LANES], filter *memory)
 {
@@ -934,7 +1049,8 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
     f->log = log;
     f->set = &numbers;
     f->at = at;
-    f->thrust = (model_held *)(memory + 1);
+    f->m = (matrices *)(memory + 1);
+    f->thrust = (model_held *)(f->m + 1);
     begin_run(f, sets);
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
     double restart = log->time[0] + how->begin, last = log->time[0];
@@ -997,7 +1113,7 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
 /* Return the sizes that Python needs to lay out its arrays. */
 EXPORT void filter_sizes(int sizes[8])
 {
-    const int held = (int)sizeof(model_held), whole = (int)sizeof(filter);
+    const int held = (int)sizeof(model_held), whole = (int)(sizeof(filter) + sizeof(matrices));
     const int found[8] = {N_X, N_AXES, MOST_SENSORS, N_VARIABLES, N_INPUTS, held, whole, LANES};
     memcpy(sizes, found, sizeof found);
 }

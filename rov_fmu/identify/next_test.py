@@ -2,15 +2,15 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import isfinite
+from math import inf, isfinite
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Record
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.curves import Motions
+from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.result import Answer, NextTest
@@ -131,8 +131,12 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     run = proposed.run(z, number)
     parameters = enumerate(objective.table.parameters)
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
-    data = Data.of(run, concerned, len(z))
-    proposed.differentiate(z, number, range(len(concerned)), run, data, exact=False)
+    steps = np.array([objective.table.parameters[k].step for k in concerned])
+    # Where all innovations are 0, it does not matter that the gains of the filter would change, too.
+    inside = z.copy()
+    inside[concerned] = np.maximum(z[concerned], objective.low[concerned] + steps)
+    slopes = proposed.changes(inside, number, concerned, steps, run, begin=-1.0, span=inf)
+    data = Data(run.innovations, run.variances, slopes, np.zeros_like(slopes), concerned, len(z))
     return data.information(slice(None))[1]
 
 

@@ -132,7 +132,7 @@ def _largest(e: Evidence) -> dict[str, str]:
 
 RULES = (
     Rule(
-        "logs whose motors are not the thrusters",
+        "logs with other motors",
         lambda e: len(e.misfits),
         None,
         0.0,
@@ -141,7 +141,7 @@ RULES = (
         "1",
     ),
     Rule(
-        "share of unseen samples in the 95 % bands",
+        "unseen samples in the 95 % bands",
         lambda e: coverage_of(e.predictions),
         0.8,
         0.6,
@@ -150,7 +150,7 @@ RULES = (
         is_told=True,
     ),
     Rule(
-        "the score G of the predictions",
+        "score G",
         lambda e: score_of(e.moving),
         0.5,
         0.25,
@@ -158,7 +158,7 @@ RULES = (
         is_least=True,
     ),
     Rule(
-        "moving quantities for which a prediction of no change is better",
+        "moving quantities for which no change is a better prediction",
         lambda e: len(e.worse) / len(e.moving) if e.moving else nan,
         0.0,
         0.5,
@@ -166,7 +166,7 @@ RULES = (
         lambda e: {"quantity": e.worse[0].quantity, "file": e.worse[0].file},
     ),
     Rule(
-        "nothing that moves and was predicted unseen",
+        "nothing predicted that moves",
         lambda e: not e.moving and not isfinite(e.error_of_tables),
         0.0,
         None,
@@ -174,7 +174,7 @@ RULES = (
         unit="1",
     ),
     Rule(
-        "errors over 10 s of the fit to all data, relative to the noise of the sensor",
+        "errors over 10 s of the fit to all data, relative to σ",
         lambda e: e.structure,
         2.0,
         None,
@@ -182,7 +182,7 @@ RULES = (
         unit="1",
     ),
     Rule(
-        "unknown slow forces and changes of thrust relative to the thrust, and velocities relative to the velocity",
+        "unknown disturbances, relative to thrust or velocity",
         lambda e: sum(d.share for d in e.unknown),
         None,
         MOST_UNKNOWN,
@@ -205,14 +205,14 @@ RULES = (
         "A steady velocity is known to no better than {value:.0%}.",
     ),
     Rule(
-        "half-width of the widest time or stopping distance",
+        "the same of times and stopping distances",
         lambda e: e.half_width("rise", "stop"),
         0.3,
         None,
         "A time or a stopping distance is known to no better than {value:.0%}.",
     ),
     Rule(
-        "error (RMS) of V_ss of the tables, predicted from the other commands",
+        "held-out V_ss of tables, error (RMS)",
         lambda e: e.error_of_tables,
         0.2,
         0.4,
@@ -220,7 +220,7 @@ RULES = (
         is_told=True,
     ),
     Rule(
-        "the largest effective inertia of the interval, relative to the inertia in air",
+        "upper end of the effective inertia, relative to that in air",
         lambda e: e.inertia,
         None,
         1.0,
@@ -237,7 +237,7 @@ RULES = (
         "1",
     ),
     Rule(
-        "slips of unit or sign",
+        "slips",
         lambda e: len(e.slips),
         None,
         0.0,
@@ -246,7 +246,7 @@ RULES = (
         "1",
     ),
     Rule(
-        "difference of J to a second start that ends at different coefficients",
+        "difference of J to another vehicle of a second start",
         lambda e: e.difference,
         None,
         DISAGREEMENT,

@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
+from rov_fmu.identify.assess import EXACT
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.solve import total
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import Answer, NextTest
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from tests.folders import HEAD, SPEED, read
 from tests.identify.conftest import SHORT, TRUTH, written
@@ -82,10 +84,17 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
         [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(places, objective.mean, strict=True)]
     )
     _, information = total(objective, z, objective.data(z, objective.runs(z)))
-    after = next_test(objective, Posterior.of(objective.table, z, information), HEAVE, TankLimits(), ())
-    assert after
-    assert test.then <= after.now < 1.6 * test.then, "this log has an offset and a window of its own"
-    assert after.now < 0.8 * test.now
+    after = Posterior.of(objective.table, z, information)
+    command = float(test.target.split()[-1].rstrip("%")) / 100.0
+
+    def logarithm(z: Array) -> Array:
+        vehicle, shapes = after.table.model(z)
+        return np.log(np.abs(shapes.motions(vehicle, HEAVE, np.array([command])).response()[0]))
+
+    (slope,) = after.slopes(logarithm)
+    now = max(QUANTILE * float(np.sqrt(slope @ after.covariance @ slope)), EXACT)
+    assert test.then <= now < 1.6 * test.then, "this log has an offset and a window of its own"
+    assert now < 0.8 * test.now
 
 
 def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:

@@ -98,23 +98,23 @@ def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted(
 
 
 MADE: dict[str, Any] = {
-    "logs whose motors": lambda x: {"misfits": ["a.tlog"] * round(x)},
-    "share of unseen": lambda x: {"predictions": [replace(DEPTH, coverage=x)]},
-    "the score G": lambda x: {"predictions": scored(x)},
+    "logs with other": lambda x: {"misfits": ["a.tlog"] * round(x)},
+    "unseen samples": lambda x: {"predictions": [replace(DEPTH, coverage=x)]},
+    "score G": lambda x: {"predictions": scored(x)},
     "moving quantities": lambda x: {"predictions": [replace(DEPTH, error=2.0 * (n < 1000 * x)) for n in range(1000)]},
-    "nothing that moves": lambda x: {"predictions": [DEPTH] * (x < 0.5)},
+    "nothing predicted": lambda x: {"predictions": [DEPTH] * (x < 0.5)},
     "errors over 10 s": lambda x: {"structure": x},
-    "unknown slow": lambda x: {"disturbances": [replace(FORCE, share=x)]},
+    "unknown dist": lambda x: {"disturbances": [replace(FORCE, share=x)]},
     "no answers": lambda x: {"answers": results.answers(1.0, 0.02) * (x < 0.5)},
     "half-width of the widest V_ss": lambda x: {"answers": results.answers(1.0, x)},
-    "half-width of the widest time": lambda x: {
+    "the same of times": lambda x: {
         "answers": [
             replace(a, steady=b.steady)
             for a, b in zip(results.answers(1.0, x), results.answers(1.0, 0.02), strict=True)
         ]
     },
-    "error (RMS) of V_ss": lambda x: {"steady": [point(x)]},
-    "the largest effective": lambda x: {"inertia": x},
+    "held-out V_ss": lambda x: {"steady": [point(x)]},
+    "upper end": lambda x: {"inertia": x},
     "effects of unusual": lambda x: {"effects": [SLOW] * round(x)},
     "slips": lambda x: {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)] * round(x)},
     "difference of J": lambda x: {"difference": x},

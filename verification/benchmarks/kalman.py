@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.bridges.arrays import force_names, forces, rates
-from rov_fmu.c.filter import Filter, Parameters, Record, Sensor, Slow
+from rov_fmu.identify.likelihood.filter import Filter, Parameters, Record, Sensor, Slow
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, duration

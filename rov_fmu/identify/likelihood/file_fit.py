@@ -54,7 +54,7 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
 def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
     """Yield the places of effects in the order in which they are left out, for a normal posterior after a rise of J."""
     z, C, parameters = posterior.z, posterior.covariance, enumerate(posterior.table.parameters)
-    null = {n: p.null for n, p in parameters if p.null is not None and n not in posterior.absent}
+    null = {n: p.null for n, p in parameters if p.is_effect and n not in posterior.absent}
     while null:
         rises = {n: (z[n] - end) ** 2 / max(C[n, n], 1e-300) for n, end in null.items()}
         least = min(rises, key=lambda n: rises[n])

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -24,9 +24,6 @@ _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
 _QUICK = 8.0
 """The reduction of J by new derivatives at which a quick fit ends."""
-_MOST = 8
-"""The most derivatives of the fit to all samples. Where it needs more, sizes of noise change on and on, and answers do
-not."""
 STARTS: tuple[Mapping[str, float], ...] = (
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
     {"slow": 1.0, "white": 2.0},
@@ -35,9 +32,9 @@ STARTS: tuple[Mapping[str, float], ...] = (
 
 With much noise, J has few minima far from the data.
 """
-_LOUD = 1.0
-"""The second start is tried if a slow process ends so many deviations of its prior above its usual size. The motion is
-then hardly explained by the model, and another minimum may explain it."""
+_LOUD = 2.3
+"""The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
+the model, and another minimum may explain it."""
 _CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
 """The start if the motion diverges from both others: a heavier vehicle with less drag."""
 
@@ -103,7 +100,7 @@ def fit_all(
     ends.sort(key=lambda end: end.value)
 
     show = moving(on_progress, "all samples", 0.3, 0.7)
-    near = minimise(full, _scaled(full, ends[0].z), show, most=_MOST, last=False)
+    near = minimise(full, _scaled(full, ends[0].z), show, last=False)
     for n, curve in enumerate(known.measured_curves):
         other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
         objective = Objective(table_of(other, logs, noises), logs, rows)
@@ -117,7 +114,8 @@ def fit_all(
         if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    best = minimise(full, _scaled(full, near.z), moving(on_progress, "exact derivatives", 0.8, 0.88), most=1)
+    on_progress("exact derivatives", 0.8)
+    best = minimise(full, _scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
@@ -127,7 +125,7 @@ def fit_all(
     if known.bent:
         plain = replace(known, bent=frozenset[str]())
         file = Objective(table_of(plain, logs, noises), logs, rows)
-        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.88, 0.9), most=_MOST)
+        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88))
     return Fit(known, full, best, posterior, without_weak_effects(file, least), float(difference))
 
 
@@ -159,7 +157,7 @@ def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
 
 def _is_loud(table: Table, z: Array) -> bool:
     """Return True if a slow process is much larger than usual."""
-    return any(p.is_slow_size and z[n] - p.mean > _LOUD * p.deviation for n, p in enumerate(table.parameters))
+    return any(p.is_slow_size and z[n] - p.mean > _LOUD for n, p in enumerate(table.parameters))
 
 
 def _evidence(objective: Objective, value: float, information: Array) -> float:

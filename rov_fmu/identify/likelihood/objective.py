@@ -24,12 +24,12 @@ from typing import TypeVar
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Filter, Run
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
 from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.c.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.equation.catalogue import CURVE, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
+from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.result import PLACED
 from rov_fmu.tank.arrays import Array
@@ -54,7 +54,9 @@ PRIORS = {
     "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
     "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
     "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
-    "slow_gain": Prior(2.0, "ln of the size of a slow change of thrust", "1 %, within a factor of 7"),
+    "slow_gain": Prior(
+        0.35, "ln of the size of a slow change of thrust", "1 %, to a factor of 2, or it acts as thrust"
+    ),
     "slow_velocity": Prior(2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"),
     "white_noise": Prior(0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
     "coloured_noise": Prior(1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"),
@@ -117,6 +119,11 @@ class Parameter:
     log: int | None = None
     """The index of the log that alone has it."""
     unit: str = "1"
+
+    @property
+    def is_effect(self) -> bool:
+        """True for an effect of the motion, which may be absent from the vehicle."""
+        return self.null is not None and self.of_motion
 
     @property
     def is_slow_size(self) -> bool:
@@ -507,7 +514,7 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str
         usual, least, largest = _SIZES[key]
         if deviation := prior(f"slow_{key}"):
             mean, low, high = log(usual), log(least), log(largest)
-            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high)
+            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high, null=low)
 
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in (form.axis for form in known.layout.axes):

@@ -10,9 +10,9 @@ from math import cos, sin
 
 import numpy as np
 
-from rov_fmu.c.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import first_in_each

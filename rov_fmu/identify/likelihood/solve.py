@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from rov_fmu.c.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples
 from rov_fmu.tank.arrays import Array
 
@@ -17,17 +17,15 @@ Chosen = NDArray[np.bool_]
 MOST_STEPS = 30
 ENOUGH = 0.3
 """The fit ends when a step reduces J by less. 1 is one unit of 2 ln of the likelihood."""
-_DAMPINGS = (0.0, 0.01, 0.1, 1.0, 10.0, 100.0, 1e3, 1e4)
-"""The dampings that are tried together, in units of the information of the prior."""
+_TRIALS = ((0.0, 1.0), (0.0, 0.4), (0.0, 0.1), (0.03, 1.0), (0.3, 1.0), (3.0, 1.0), (100.0, 1.0), (1e4, 1.0))
+"""The steps that are tried together: the damping in units of the information of the prior, and the share of the step.
+Data that are far more exact than the prior make a step short by its share alone."""
 _LARGEST = 4.0
 """The largest change in one step, in standard deviations of the prior."""
 _UP = 0.5
 """The largest growth of the logarithm of a slow process in one step: J grows like the square of the size."""
 _WITH_SAME, _SLOW = 3, 0.3
 """The most steps with the same derivatives, and the share of their reduction of J that another one must be worth."""
-_FAILURES = 2
-"""A search ends when new derivatives fail to reduce J so often in turn: J has kinks where a change of a command meets a
-sample, and is only nearly the same for other steps of the filter."""
 _REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
 """The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
 step from which the next one has new derivatives."""
@@ -59,77 +57,65 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    The fit ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the
-    information, promises nothing. Only the `last` fit has exact data and information; those of others may be of the
-    step before.
+    All runs take the steps of the first ones: J jumps by a few units where other parameters need other steps. The fit
+    ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the information,
+    promises nothing. The `last` fit takes one more step with exact derivatives. These are then its data and
+    information; those of others are of the step before.
     """
-    place = best = _place(objective, np.clip(start, objective.low, objective.high))
-    failed, data = 0, list[Data]()
+    z = np.clip(start, objective.low, objective.high)
+    runs = objective.runs(z)
+    now = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
     for count in range(1, most + 1):
         on_step(count)
         try:
-            data = objective.data(place.z, place.runs, exact=False)
-            if promises and not promises(*_within_reach(objective, place, data)):
-                break
-            place = _place(objective, _descended(objective, place, data))
+            data = objective.data(now.z, now.runs, exact=False)
         except DivergedError:
-            if not data:
+            if not now.data:
                 raise
             break
-        gain = best.value - place.value
-        if gain > 0.0:
-            best = place
-        failed = 0 if gain > 0.0 else failed + 1
-        if 0.0 <= gain < enough or failed == _FAILURES:
+        now, before = replace(now, data=data), now.value
+        if promises and not promises(*_within_reach(objective, now)):
+            break
+        now = _descended(objective, now)
+        if before - now.value < enough:
             break
     if last:
-        data = objective.data(best.z, best.runs)
-    return Minimum(best.z, best.value, best.runs, data, total(objective, best.z, data)[1])
+        now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
+        now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
+    return now
 
 
-@dataclass(frozen=True, eq=False)
-class _Place:
-    """A value of the parameters with its J."""
-
-    z: Array
-    value: float
-    runs: Sequence[Run]
-
-
-def _place(objective: Objective, z: Array) -> _Place:
-    runs = objective.runs(z)
-    return _Place(z, objective.value(z, runs), runs)
-
-
-def _descended(objective: Objective, place: _Place, data: Sequence[Data]) -> Array:
+def _descended(objective: Objective, start: Minimum) -> Minimum:
     """Return a place with a smaller J, after a few steps with the same derivatives, or the same place.
 
     Each step is the best of some that are damped differently, which run in the lanes of the filter together.
     """
-    z, value = place.z, place.value
+    now = start
     of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
     for count in range(_WITH_SAME):
-        free = of_motion if count == 0 else np.ones(len(z), bool)
-        gradient, information = total(objective, z, data)
+        free = of_motion if count == 0 else np.ones(len(now.z), bool)
+        gradient, information = total(objective, now.z, now.data)
         moved = []
-        for damping in _DAMPINGS:
-            change = _step(objective, z, gradient, information, free, damping) - z
-            moved.append(z + change / max(float(np.max(np.abs(change) / objective.deviation)) / _LARGEST, 1.0))
-        trials = objective.trials(np.array(moved).T, [objective.whole] * len(moved), place.runs)
+        for damping, share in _TRIALS:
+            change = share * (_step(objective, now.z, gradient, information, free, damping) - now.z)
+            moved.append(now.z + change / max(float(np.max(np.abs(change) / objective.deviation)) / _LARGEST, 1.0))
+        trials = objective.trials(np.array(moved).T, [objective.whole] * len(moved), start.runs)
         least = min(range(len(moved)), key=lambda n: trials[n][0])
-        gain = value - trials[least][0]
+        value, samples = trials[least]
+        gain = now.value - value
         if not gain > 0.0:
             continue
-        z, value = moved[least], trials[least][0]
-        data = [old.at(*samples) for old, samples in zip(data, trials[least][1], strict=True)]
-        if count > 0 and gain < _SLOW * (place.value - value):
+        runs = [replace(run, innovations=off, variances=S) for run, (off, S) in zip(now.runs, samples, strict=False)]
+        data = [old.at(*some) for old, some in zip(now.data, samples, strict=True)]
+        now = Minimum(moved[least], value, runs, data, information)
+        if count > 0 and gain < _SLOW * (start.value - value):
             break
-    return z
+    return now
 
 
-def _within_reach(objective: Objective, place: _Place, data: Sequence[Data]) -> tuple[float, Array]:
+def _within_reach(objective: Objective, place: Minimum) -> tuple[float, Array]:
     """Return the J that is left if a step reduces it by twice what is expected, and the information."""
-    gradient, information = total(objective, place.z, data)
+    gradient, information = total(objective, place.z, place.data)
     change = _step(objective, place.z, gradient, information, np.ones(len(place.z), bool), 0.0) - place.z
     return place.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
 

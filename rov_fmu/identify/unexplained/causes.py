@@ -11,8 +11,8 @@ from math import log
 
 import numpy as np
 
-from rov_fmu.c.filter import Run
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.identify.likelihood.filter import Run
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import first_in_each

@@ -6,18 +6,20 @@ from math import inf, log
 
 import numpy as np
 
-from rov_fmu.c.filter import DivergedError, Run
 from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.solve import Minimum
-from rov_fmu.identify.result import Disturbance, UnknownForce
+from rov_fmu.identify.likelihood.solve import Minimum, minimise
+from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.tank.arrays import Array
 
 _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
+_STEPS = 8
+"""The most derivatives of a fit without a slow process."""
 _KINDS = {"slow force": "force", "slow gain": "gain", "slow velocity": "velocity"}
 
 
@@ -49,19 +51,26 @@ def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[Unknow
 
 
 def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: int) -> float:
-    """Return 2 ln of the ratio of the likelihoods with a slow process and without, less the price of one parameter.
+    """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it.
 
-    The price is how much the data narrow its prior (the Laplace approximation of the Bayes factor).
+    The price of its size is how much the data narrow its prior (the Laplace approximation). The fit ends early where
+    strong evidence is certain: J within reach, with what the others can explain, is not small enough.
     """
-    p, z = objective.table.parameters[place], best.z
-    without = z.copy()
-    without[place] = p.low
+    p, without = objective.table.parameters[place], objective.without([place])
+    assert p.null is not None
+    price = ((p.null - p.mean) / p.deviation) ** 2 + 2.0 * log(max(p.deviation / posterior.errors[place], 1.0))
+
+    def evidence(J: float) -> float:
+        return J - best.value - price
+
+    z = np.clip(best.z, without.low, without.high)
     try:
-        evidence = objective.value(without, objective.runs(without, best.runs)) - best.value
+        first = evidence(objective.value(z, objective.runs(z, best.runs)))
+        if first <= KEPT:
+            return first
+        return evidence(minimise(without, z, most=_STEPS, last=False, promises=lambda J, _: evidence(J) <= KEPT).value)
     except DivergedError:
         return inf
-    evidence -= ((p.low - p.mean) / p.deviation) ** 2 - ((z[place] - p.mean) / p.deviation) ** 2
-    return float(evidence) - 2.0 * log(max(p.deviation / posterior.errors[place], 1.0))
 
 
 def _disturbance(

@@ -7,16 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.c.filter import Filter, Parameters, Record, Run
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.filter import Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, refits, total
 from rov_fmu.tank.arrays import Array
-from tests.c.sets import one_set
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
+from tests.identify.likelihood.sets import one_set
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
@@ -38,12 +38,9 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
 
 @pytest.fixture(scope="module")
 def place(objective: Objective) -> Array:
-    """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none.
-
-    Ten steps come near enough.
-    """
+    """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none."""
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
-    found = minimise(objective, objective.mean + louder * objective.deviation, most=10)
+    found = minimise(objective, objective.mean + louder * objective.deviation)
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
     z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
@@ -122,6 +119,19 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     z[kinds.index("slow force")] = np.log(0.02)
     z[kinds.index("sensor lag")] = 0.1
     check_gradient(objective, z)
+
+
+@pytest.mark.parametrize("threads", [2, 4])
+def test_the_number_of_threads_changes_no_bit(
+    objective: Objective, place: Array, threads: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def found(cores: int) -> bytes:
+        monkeypatch.setattr("rov_fmu.identify.likelihood.objective.usable_cores", lambda: cores)
+        best = minimise(objective, place, most=1)
+        arrays = [best.z, best.information, *(one.gains for one in best.runs), *(one.slopes for one in best.data)]
+        return b"".join(array.tobytes() for array in arrays)
+
+    assert found(threads) == found(1)
 
 
 def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:

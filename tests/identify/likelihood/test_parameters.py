@@ -68,11 +68,11 @@ logging width log_surge_0.csv: 0.5 ± 0.5, 0 to 1
 current log_surge_0.csv to the north: 0 ± 0.1, -inf to inf, absent at 0
 advance rear: 0 ± 0.2, 0 to inf, absent at 0
 advance top: 0 ± 0.2, 0 to inf, absent at 0
-slow force surge: ln 0.001 ± 2.5, 1e-07 to 0.1
-slow force heave: ln 0.001 ± 2.5, 1e-07 to 0.1
-slow gain: ln 0.01 ± 2, 1e-06 to 0.2
-slow velocity heave: ln 0.001 ± 2.5, 1e-07 to 0.3
-slow velocity horizontal: ln 0.001 ± 2.5, 1e-07 to 0.3
+slow force surge: ln 0.001 ± 2.5, 1e-07 to 0.1, absent at -16.1
+slow force heave: ln 0.001 ± 2.5, 1e-07 to 0.1, absent at -16.1
+slow gain: ln 0.01 ± 0.35, 1e-06 to 0.2, absent at -13.8
+slow velocity heave: ln 0.001 ± 2.5, 1e-07 to 0.3, absent at -16.1
+slow velocity horizontal: ln 0.001 ± 2.5, 1e-07 to 0.3, absent at -16.1
 white noise depth: ln 0.00396 ± 0.7, 0.000535 to inf
 coloured noise depth: ln 0.3 ± 1, 0 to inf
 correlation time depth: ln 2 ± 1, 0 to inf

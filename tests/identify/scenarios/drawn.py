@@ -5,7 +5,7 @@ of 20 ms), and shares no line with the identification. The folders are small, so
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import copysign, cos, exp, log, sin, sqrt
 from pathlib import Path
 
@@ -132,8 +132,12 @@ class Drawn:
     expected: Expected = NOTHING_SPECIAL
 
     def truths(self, seed: int) -> Truths:
-        """Return the answers of each axis that a sensor shows, those of a weak pair with its weakness."""
+        """Return the answers of each axis that a sensor shows, those of a weak pair with its weakness.
+
+        A battery that sags has its average thrust: logs without its voltage do not show which of it is the full one.
+        """
         body = self._body(np.random.default_rng(seed))
+        body = replace(body, full=body.full * (1.0 - 0.5 * self.fault.sag))
         health = [h if h > 0.0 else 1.0 for h in self.fault.health]
         found: dict[tuple[str, str], float] = {}
         for axis in self.sensors:

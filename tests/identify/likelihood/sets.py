@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.c.filter import Parameters, Slow
+from rov_fmu.identify.likelihood.filter import Parameters, Slow
 
 
 def one_set(sets: Parameters, n: int) -> Parameters:
