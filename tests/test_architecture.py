@@ -51,13 +51,14 @@ MAY_IMPORT = {
     },
     "tests/verification": {"tests", "tests/verification", "verification", "examples", "rov_fmu"},
     "tests/docs": {"tests", "tests/docs", "docs", "examples", "rov_fmu", REFERENCES},
-    "tests": {"tests", REFERENCES, "rov_fmu"},
+    "tests": {"tests", REFERENCES, "verification/fresh_environment", "rov_fmu"},
 }
 """Which folders of this repository each folder may import. The innermost folder counts."""
 
 LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/io": 13,
+    "rov_fmu/interface": 13,
     "tests/fmu": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,

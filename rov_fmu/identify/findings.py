@@ -12,8 +12,6 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
-from rov_fmu.identify.likelihood.curves import NO_SHAPES
-from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     EFFECTS,
@@ -432,6 +430,9 @@ def extrapolated(vehicle: Vehicle) -> list[str]:
 
 def with_lag(identification: Identification) -> list[str]:
     """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
+    from rov_fmu.identify.likelihood.curves import NO_SHAPES  # `tune` has no need of the filter, which these load
+    from rov_fmu.identify.likelihood.objective import TableRow, modelled
+
     vehicle, told = identification.vehicle, []
     for result in identification.axes:
         axis, half = result.axis, answer_at(result, 0.5)

@@ -73,7 +73,7 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
 def test_an_axis_that_may_not_be_trusted_is_drawn_by_force_only() -> None:
     vehicle = rov_fmu.load("videoray_refit")
     assert vehicle.provenance
-    words = tuple(one.replace("heave: good", "heave: do not use") for one in vehicle.provenance.verdicts)
+    words = tuple(one.replace("heave: usable", "heave: do not use") for one in vehicle.provenance.verdicts)
     doubted = replace(vehicle, provenance=vehicle.provenance.model_copy(update={"verdicts": words}))
     with pytest.raises(InputError, match=r"these axes may be off: heave: do not use; --force \(in Python, forced\)"):
         RovVectorEnv(doubted, 2).reset(seed=1)

@@ -534,4 +534,4 @@ def test_draws_are_those_of_the_environment_with_the_same_seed(drawn: Path, monk
     rov = package.load(**sets[2])
     assert rov.coefficients["a_d_u"] == sets[2]["a_d_u"]
     assert "100" not in (drawn / "README.md").read_text(encoding="utf-8").partition("sets of")[0][-5:]
-    assert "surge: good." in (drawn / "README.md").read_text(encoding="utf-8")
+    assert "surge: usable." in (drawn / "README.md").read_text(encoding="utf-8")

@@ -65,8 +65,8 @@ def test_a_mistake_is_one_line_and_writes_nothing(
 @pytest.mark.parametrize(
     ("sentence", "changed", "axes"),
     [
-        ("heave: good.", "heave: do not use.", "heave: do not use"),
-        ("heave: good.", "sway: good.", "heave: not identified"),
+        ("heave: usable.", "heave: do not use.", "heave: do not use"),
+        ("heave: usable.", "sway: usable.", "heave: not identified"),
     ],
 )
 def test_axes_that_are_not_fit_for_use_are_drawn_by_force_only(
