@@ -69,7 +69,7 @@ COMPLETE: dict[str, Tank] = {
         _STEPS,
         more=_REVERSE,
         priors=KNOWN_THRUST,
-        expected=Expected(("reverse thrust",), wider_than_gate=8.0),
+        expected=Expected(("reverse thrust",)),
     ),
     "current": _usual(_STEPS, "current", sensors=_with(USUAL, DISTANCE), conditions=Conditions(current=(0.1, 0.0))),
     "load, delay, reverse, correlated noise": _usual(
