@@ -57,14 +57,13 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    All runs take the steps of the first ones: J jumps by a few units where other parameters need other steps. The fit
-    ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the information,
-    promises nothing. The `last` fit takes one more step with exact derivatives. These are then its data and
-    information; those of others are of the step before.
+    The filter chooses its steps anew with each derivative, for example where commands now act later, as long as this
+    goes along with a smaller J. Then it keeps them: J jumps by a few units with other steps. The fit ends when new
+    derivatives reduce J by less than `enough`, and early where J within reach, with the information, promises nothing.
+    The `last` fit takes one more step with exact derivatives. These are then its data and information; those of others
+    are of the step before.
     """
-    z = np.clip(start, objective.low, objective.high)
-    runs = objective.runs(z)
-    now = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
+    now, chooses = _place(objective, np.clip(start, objective.low, objective.high)), True
     for count in range(1, most + 1):
         on_step(count)
         try:
@@ -73,16 +72,28 @@ def minimise(
             if not now.data:
                 raise
             break
-        now, before = replace(now, data=data), now.value
+        before = now = replace(now, data=data)
         if promises and not promises(*_within_reach(objective, now)):
             break
         now = _descended(objective, now)
-        if before - now.value < enough:
+        if before.value - now.value < enough:
             break
+        if chooses:
+            chooses = False
+            with suppress(DivergedError):
+                anew = _place(objective, now.z)
+                if chooses := anew.value < before.value:
+                    now = replace(now, value=anew.value, runs=anew.runs)
     if last:
         now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
         now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
     return now
+
+
+def _place(objective: Objective, z: Array) -> Minimum:
+    """Return a place without data, with steps that suit it. The information is that of the prior."""
+    runs = objective.runs(z)
+    return Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
 
 
 def _descended(objective: Objective, start: Minimum) -> Minimum:
