@@ -10,7 +10,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.parameters import CENTRE
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
-from rov_fmu.identify.result import PLACED, RATIOS, Effect, Logging, Sensor
+from rov_fmu.identify.result import EFFECTS, Effect, Logging, Sensor
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -33,28 +33,11 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.kind == "centre of buoyancy":
             value += file.table.base[CENTRE[p.part]]
         low, high = around(value, error)
-        if p.kind in RATIOS:
+        if EFFECTS[p.kind].is_ratio:
             value, low, high = np.exp([value, low, high]).tolist()
-        name = _WORDS[p.kind] + (f" {p.part}" if p.part else "")
+        name = EFFECTS[p.kind].words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n), float(beyond))
-
-
-_WORDS = {
-    "reverse thrust": "thrust astern relative to thrust ahead",
-    "dead band": "dead band",
-    "dead band astern": "dead band astern relative to dead band ahead",
-    "advance": "loss of thrust with the speed of advance, relative to full thrust",
-    "lag": "time constant of the thrusters",
-    "dead time": "dead time of the commands",
-    "drag astern": "drag astern relative to drag ahead",
-    "load": "constant load",
-    "centre of buoyancy": "centre of buoyancy",
-    "current": "current",
-    **{kind: f"place of the {kind}" for kind in PLACED.values()},
-    "sensor lag": "time constant",
-    "voltage": "exponent of thrust over voltage",
-}
 
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:

@@ -16,9 +16,8 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
     DISAGREEMENT,
+    EFFECTS,
     MOST_UNKNOWN,
-    PLACED,
-    RATIOS,
     Answer,
     AxisOfBase,
     AxisResult,
@@ -497,7 +496,7 @@ def size_in_words(value: float, unit: str) -> str:
 
 def effect_in_words(effect: Effect) -> str:
     """Return the size of an effect; a ratio has two digits of how far it is from 1."""
-    if effect.kind not in RATIOS or effect.value == 1.0:
+    if not EFFECTS[effect.kind].is_ratio or effect.value == 1.0:
         return size_in_words(effect.value, effect.unit)
     return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
@@ -687,13 +686,7 @@ def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]
     names["value"] = in_words(effect.value, effect.interval, effect.unit)
     if effect.is_unusual:
         yield Finding("unusual effect", "", "", "", names)
-    if effect.kind == "current":
-        names["note"] = ". It belongs to the water, so the vehicle file does not have it"
-    elif effect.kind in PLACED.values():
-        names["note"] = ". The vehicle file does not have it, because it tells the motion of the origin"
-    elif effect.kind == "sensor lag":
-        names["note"] = ". The vehicle file does not have it, because it describes the vehicle without its sensors"
-    elif effect.kind == "dead time" and not identification.vehicle.layout.has_dead_time:
-        names["note"] = ". The vehicle file does not have it; T_d in [commands] would add it"
+    if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
+        names["note"] = EFFECTS[effect.kind].why_not
     axis = of if of in AXES else ""
     yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

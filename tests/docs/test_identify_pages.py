@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 import tomlkit
 
-from rov_fmu.identify import assess, effects, held_out
+from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
-from rov_fmu.identify.result import MOST_UNKNOWN
+from rov_fmu.identify.result import EFFECTS, MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
 from rov_fmu.identify.verdict import RULES, _largest
 from tests.commands import ROOT
@@ -101,7 +101,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     )
     assert f"raises the evidence by more than {slips._CLEAR:g} (`slips.py`)" in page
     assert f"reads {records.THINNED:g} samples per second" in page
-    assert len(effects._WORDS) == len(
+    assert len(EFFECTS) == len(
         page.partition("## Effects ")[2].partition(" are effects")[0].replace(" and ", ", ").split(", ")
     )
 

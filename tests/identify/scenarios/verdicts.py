@@ -84,7 +84,7 @@ class Line:
                 words.append(word)
                 farthest.append(max(map(off, own), default=np.nan))
                 printed += own
-        return cls(words, farthest, printed, float(np.mean([o.seconds for o in outcomes])))
+        return cls(words, farthest, printed, sum(o.seconds for o in outcomes) / max(len(outcomes), 1))
 
     @property
     def good(self) -> float:

@@ -1,0 +1,45 @@
+"""Verdicts of vehicles drawn anew: right models are good, and no answer that is far off is called good."""
+
+from dataclasses import replace
+
+import pytest
+
+from tests.identify.scenarios.judge import at_least
+from tests.identify.scenarios.outcome import Estimate, Outcome
+from tests.identify.scenarios.verdicts import RIGHT, WRONG, Line, broken, off, run
+
+QUICK = ("neither velocity nor heading", "load of 0.6 %")
+"""The kinds of the default tests: those that are identified in a second."""
+
+
+@pytest.mark.parametrize("name", QUICK)
+def test_a_right_model_is_good(name: str) -> None:
+    line = Line.of([run(name, 0)])
+    assert line.words == ["good"]
+    assert line.coverage > 0.8
+    assert line.far == (0, 0)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(2))
+def test_verdicts_keep_what_they_promise(seed: int) -> None:
+    """The command of `verdicts.py` has the numbers of many seeds."""
+    kept = {name: [run(name, seed)] for name in (*RIGHT, *WRONG)}
+    assert not [words for words in broken(kept) if "only" not in words]
+    right = Line.of([o for name in RIGHT for o in kept[name]])
+    assert at_least("good", right.words.count("good"), len(right.words), 0.9).p_value > 0.001
+    assert right.coverage > 0.8
+
+
+def test_what_a_line_says() -> None:
+    """An answer is off by the logarithm of its ratio to the truth, in half-widths; another sign is infinitely far."""
+    near = Estimate("surge", "V_ss 50 %", 1.1, (1.0, 1.21), 1.0)
+    assert off(near) == pytest.approx(1.0)
+    assert off(replace(near, value=-1.1)) == float("inf")
+    far = replace(near, truth=0.5)
+    kept = [
+        Outcome((near, far, replace(near, interval=None)), verdicts={"surge": "good", "yaw": "usable"}, seconds=2.0)
+    ]
+    line = Line.of(kept)
+    assert (line.words, line.good, line.coverage, line.far) == (["good", "usable"], 0.5, 0.5, (1, 1))
+    assert [words.partition(" ")[0] for words in broken({"tether": kept})] == ["1"]
