@@ -26,6 +26,8 @@ _UP = 0.5
 """The largest growth of the logarithm of a slow process in one step: J grows like the square of the size."""
 _WITH_SAME, _SLOW = 3, 0.3
 """The most steps with the same derivatives, and the share of their reduction of J that another one must be worth."""
+_STALLED = 2
+"""A search ends when new derivatives reduce J by too little so often in turn: at a kink they may fail by chance."""
 _REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
 """The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
 step from which the next one has new derivatives."""
@@ -57,43 +59,33 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    The filter chooses its steps anew with each derivative, for example where commands now act later, as long as this
-    goes along with a smaller J. Then it keeps them: J jumps by a few units with other steps. The fit ends when new
-    derivatives reduce J by less than `enough`, and early where J within reach, with the information, promises nothing.
-    The `last` fit takes one more step with exact derivatives. These are then its data and information; those of others
-    are of the step before.
+    All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The fit
+    ends when new derivatives twice in turn reduce J by less than `enough`, the second time exact ones, and early where
+    J within reach, with the information, promises nothing. The `last` fit takes one more step with exact derivatives.
+    These are then its data and information; those of others are of the step before.
     """
-    now, chooses = _place(objective, np.clip(start, objective.low, objective.high)), True
+    z = np.clip(start, objective.low, objective.high)
+    runs = objective.runs(z)
+    now, stalled = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2)), 0
     for count in range(1, most + 1):
         on_step(count)
         try:
-            data = objective.data(now.z, now.runs, exact=False)
+            data = objective.data(now.z, now.runs, exact=stalled > 0)
         except DivergedError:
             if not now.data:
                 raise
             break
-        before = now = replace(now, data=data)
+        before = now = replace(now, data=data, information=total(objective, now.z, data)[1])
         if promises and not promises(*_within_reach(objective, now)):
             break
         now = _descended(objective, now)
-        if before.value - now.value < enough:
+        stalled = stalled + 1 if before.value - now.value < enough else 0
+        if stalled == _STALLED:
             break
-        if chooses:
-            chooses = False
-            with suppress(DivergedError):
-                anew = _place(objective, now.z)
-                if chooses := anew.value < before.value:
-                    now = replace(now, value=anew.value, runs=anew.runs)
     if last:
         now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
         now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
     return now
-
-
-def _place(objective: Objective, z: Array) -> Minimum:
-    """Return a place without data, with steps that suit it. The information is that of the prior."""
-    runs = objective.runs(z)
-    return Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
 
 
 def _descended(objective: Objective, start: Minimum) -> Minimum:
