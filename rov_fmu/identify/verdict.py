@@ -176,7 +176,7 @@ RULES = (
     Rule(
         "errors over 10 s of the fit to all data, relative to σ",
         lambda e: e.structure,
-        2.0,
+        1.5,
         None,
         "Predictions over 10 s are off by {value:.1f} times the noise of the sensor, so the model lacks something.",
         unit="1",
