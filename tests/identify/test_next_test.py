@@ -93,7 +93,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
 
     (slope,) = after.slopes(logarithm)
     now = max(QUANTILE * float(np.sqrt(slope @ after.covariance @ slope)), EXACT)
-    assert test.then / 1.6 < now < 1.6 * test.then, "this log has an offset and a window of its own"
+    assert 0.6 * test.then < now < 1.6 * test.then, "this log has an offset and a window of its own"
     assert now < 0.8 * test.now
 
 

@@ -125,7 +125,7 @@ def fit_all(
     if known.bent:
         plain = replace(known, bent=frozenset[str]())
         file = Objective(table_of(plain, logs, noises), logs, rows)
-        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88))
+        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88), enough=_QUICK)
     return Fit(known, full, best, posterior, without_weak_effects(file, least), float(difference))
 
 

@@ -26,6 +26,8 @@ _UP = 0.5
 """The largest growth of the logarithm of a slow process in one step: J grows like the square of the size."""
 _WITH_SAME, _SLOW = 3, 0.3
 """The most steps with the same derivatives, and the share of their reduction of J that another one must be worth."""
+_STALLED = 2
+"""A search ends when new derivatives reduce J by too little so often in turn: at a kink they may fail by chance."""
 _REFIT_STEPS, _REFIT_ENOUGH, _REFIT_FAR = 8, 0.1, 2.0
 """The most steps of a fit to a part of the data, the expected reduction of J at which it ends, and the reduction by a
 step from which the next one has new derivatives."""
@@ -57,27 +59,28 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    All runs take the steps of the first ones: J jumps by a few units where other parameters need other steps. The fit
-    ends when new derivatives reduce J by less than `enough`, and early where J within reach, with the information,
-    promises nothing. The `last` fit takes one more step with exact derivatives. These are then its data and
-    information; those of others are of the step before.
+    All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The fit
+    ends when new derivatives twice in turn reduce J by less than `enough`, the second time exact ones, and early where
+    J within reach, with the information, promises nothing. The `last` fit takes one more step with exact derivatives.
+    These are then its data and information; those of others are of the step before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
-    now = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2))
+    now, stalled = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2)), 0
     for count in range(1, most + 1):
         on_step(count)
         try:
-            data = objective.data(now.z, now.runs, exact=False)
+            data = objective.data(now.z, now.runs, exact=stalled > 0)
         except DivergedError:
             if not now.data:
                 raise
             break
-        now, before = replace(now, data=data), now.value
+        before = now = replace(now, data=data, information=total(objective, now.z, data)[1])
         if promises and not promises(*_within_reach(objective, now)):
             break
         now = _descended(objective, now)
-        if before - now.value < enough:
+        stalled = stalled + 1 if before.value - now.value < enough else 0
+        if stalled == _STALLED:
             break
     if last:
         now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
