@@ -120,6 +120,15 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
     assert late.beyond == pytest.approx(2.6)
 
 
+def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
+    """A sensor at 10 Hz shows nothing above 5 Hz, the corner frequency of a lag of 0.032 s."""
+    for lag, told in ((0.031, False), (0.033, True)):
+        some = [one for one in effects_of(found(fit, sensor_lag=lag, lag=lag)) if "lag" in one.kind]
+        assert {one.kind for one in some} == {"lag", "sensor lag"}
+        assert all((one.evidence > KEPT, one.kept) == (True, told) for one in some if one.kind == "sensor lag")
+        assert told or not any(one.kept for one in some)
+
+
 @pytest.mark.parametrize(("lag", "offset"), [(0.2, -0.05), (0.02, -0.03)])
 def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(lag: float, offset: float, fit: Fit) -> None:
     one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))

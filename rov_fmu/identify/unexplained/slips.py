@@ -20,7 +20,7 @@ by such a factor. The scale of commands is checked where they are read.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import log, pi
+from math import hypot, log, pi
 
 import numpy as np
 
@@ -36,8 +36,9 @@ from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
-_CERTAIN = 2.0
-"""An inertia is too small if it is so many standard errors below the vehicle's own."""
+_CERTAIN, _WEIGHED = 2.0, 0.05
+"""An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
+and the water inside change from dive to dive."""
 _CLEAR, _NEXT = 9.0, 6.0
 """The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
@@ -125,7 +126,7 @@ def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -
         place = objective.table.place("inertia", axis.name)
         if place is not None and not axis.is_rotation:
             inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
-            yield axis, float(np.log(inertia / vehicle[axis.inertia])), float(errors[place])
+            yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[place]), _WEIGHED)
 
 
 def _lightness(hypothesis: Hypothesis, axis: Axis, ratio: float, error: float) -> float:
