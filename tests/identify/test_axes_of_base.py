@@ -61,7 +61,7 @@ def drawn(base: str, *columns: str) -> tuple[Array, dict[str, Array]]:
 
 @pytest.mark.parametrize("base", BASES)
 def test_a_dive_that_shows_no_turn_concerns_only_the_axes_that_it_shows(base: str, tmp_path: Path) -> None:
-    """With a heading, roll or pitch, the other axes stay: only their drag and inertia are uncertain beside the tests'."""
+    """With a heading, roll or pitch, the others stay: only their drag and inertia are uncertain beside the tests'."""
     folder = folder_of(tmp_path, f'base = "{base}"\n{HEAD}', {})
     axes = BASES[base]
     shown = [some for count in (1, 2, len(axes) - 1, len(axes)) for some in combinations(axes, count)]

@@ -1,7 +1,7 @@
 """Wrong units, scales and signs in files: each leads to a question about the file, or to a refusal that names it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -180,9 +180,15 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
     known, recorded, rows = begin(tests)
     objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
     z, place = objective.mean.copy(), objective.table.place("inertia", "surge")
+    assert place is not None
     z[place] = np.log(ratio * known.coefficients["beta_u"])
-    tried: list[float] = []
-    monkeypatch.setattr(module, "_customary", lambda one, compared, light: tried.extend([len(light)]) or ())
+    tried: list[int] = []
+
+    def customary(*found: Collection[Axis]) -> tuple[float, ...]:
+        tried.append(len(found[-1]))
+        return ()
+
+    monkeypatch.setattr(module, "_customary", customary)
     assert not slips(tests, known, objective, z, np.full(len(z), 1e-3))
     assert tried == [int(is_suspected)]
 
