@@ -43,7 +43,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:
-    """Return the time constant whose corner frequency is the Nyquist frequency of what shows it, s.
+    """Return the time constant whose corner frequency is that of the samples that show it, s.
 
     A lag that is shorter changes samples no more than the model between them does.
     """
@@ -53,7 +53,7 @@ def _shortest(fit: Fit, p: Parameter) -> float:
         for n, m in enumerate(one.measured)
         if p.kind == "lag" or (p.kind == "sensor lag" and with_same_lag(m.sensor) == p.part)
     ]
-    return min(intervals, default=-inf) / pi
+    return min(intervals, default=-inf) / (2.0 * pi)
 
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:
