@@ -205,12 +205,13 @@ def _layout_of(log: Log, of: Folder | Layout) -> Layout:
 
     Of a folder, it is that of the largest layout that the vehicle can have. A dive that does not show how the vehicle
     turns concerns only the axes that it shows: turns that nothing corrects would run away and, by the coupling, carry
-    the motion along these axes with them.
+    the motion along these axes with them. Roll and pitch show how it turns, too: a turn rate changes both where the
+    vehicle is tilted, and the heading itself moves nothing but a current.
     """
     layout = of if isinstance(of, Layout) else of.layout if log.axis else of.logged
     assert layout
     shown = [log.axis] if log.axis else shown_axes(log, layout)
-    is_part = bool(log.axis) or (layout.has(YAW) and YAW not in shown)
+    is_part = bool(log.axis) or (layout.has(YAW) and not {ROLL, PITCH, YAW} & {*shown})
     return with_axes_alone(layout, shown) if is_part and layout.has(*shown) else layout
 
 

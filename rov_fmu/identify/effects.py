@@ -1,13 +1,14 @@
 """The optional effects with their evidence, and what the fit found about loggers and sensors."""
 
 from collections.abc import Iterator
+from math import inf, pi
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.parameters import CENTRE
+from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import EFFECTS, Effect, Logging, Sensor
@@ -37,7 +38,22 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             value, low, high = np.exp([value, low, high]).tolist()
         name = EFFECTS[p.kind].words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
-        yield Effect(p.kind, p.of, name, value, (low, high), unit, posterior.evidence(n), float(beyond))
+        evidence, least = posterior.evidence(n), _shortest(fit, p)
+        yield Effect(p.kind, p.of, name, value, (low, high), unit, evidence, float(beyond), least)
+
+
+def _shortest(fit: Fit, p: Parameter) -> float:
+    """Return the time constant whose corner frequency is that of the samples that show it, s.
+
+    A lag that is shorter changes samples no more than the model between them does.
+    """
+    intervals = [
+        float(np.median(np.diff(one.record.time[one.record.sensor == n])))
+        for one in fit.objective.logs
+        for n, m in enumerate(one.measured)
+        if p.kind == "lag" or (p.kind == "sensor lag" and with_same_lag(m.sensor) == p.part)
+    ]
+    return min(intervals, default=-inf) / (2.0 * pi)
 
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:

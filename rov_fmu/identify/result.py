@@ -189,6 +189,8 @@ class Effect:
     """2 ln of the Bayes factor of the model with it against the model without it."""
     beyond: float = 0.0
     """How many deviations of its prior it is from the usual size; 0 for what a single log has."""
+    least: float = -inf
+    """The smallest value that the sampling shows."""
 
     @property
     def is_unusual(self) -> bool:
@@ -198,7 +200,7 @@ class Effect:
     @property
     def kept(self) -> bool:
         """True if it is reported. The vehicle file has those of the vehicle, but not those of water or sensors."""
-        return self.evidence > KEPT
+        return self.evidence > KEPT and self.value > self.least
 
 
 @dataclass(frozen=True)

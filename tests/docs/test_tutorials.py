@@ -79,7 +79,9 @@ def test_otter(otter: Identification) -> None:
     assert all(otter.vehicle[name] == pytest.approx(OTTER[name], rel=0.03) for name in names)
     found = {effect.kind: effect for effect in kept(otter).values()}
     assert {"dead time", "load"} <= found.keys()
-    assert found["dead time"].value == pytest.approx(DELAY, abs=0.003)
+    low, high = found["dead time"].interval
+    assert low <= DELAY <= high
+    assert high - low < 0.08, "short lags of the sensors may act in its place"
     assert found["load"].value == pytest.approx(OTTER["F_0_w"], abs=0.003)
     check_trust(otter)
     assert not by_heading(otter.findings)["Warnings"]

@@ -120,6 +120,14 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
     assert late.beyond == pytest.approx(2.6)
 
 
+def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
+    """However clear: a lag of 0.0159 s has a corner frequency of 10 Hz, at which the sensor is sampled."""
+    for lag, is_told in ((0.0155, False), (0.0163, True)):
+        some = [one for one in effects_of(found(fit, sensor_lag=lag)) if one.kind == "sensor lag"]
+        assert some
+        assert all((one.evidence > KEPT, one.kept) == (True, is_told) for one in some)
+
+
 @pytest.mark.parametrize(("lag", "offset"), [(0.2, -0.05), (0.02, -0.03)])
 def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(lag: float, offset: float, fit: Fit) -> None:
     one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))

@@ -1,7 +1,7 @@
 """Wrong units, scales and signs in files: each leads to a question about the file, or to a refusal that names it."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -15,6 +15,7 @@ from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.vehicle import VehicleFileError
@@ -168,6 +169,28 @@ def test_feet_and_knots_are_asked_about_where_another_log_shows_them(
 @pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])
 def test_nothing_is_asked_of_a_log_without_slip(axis: Axis, tmp_path: Path) -> None:
     assert not asked(tmp_path, recordings(axis)[0], rov=KNOWN)
+
+
+@pytest.mark.parametrize(("ratio", "is_suspected"), [(0.91, False), (0.6, True)])
+def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_than_weighing_tells(
+    ratio: float, is_suspected: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However exact the fit: the VideoRay of the paper moves as if it had 91 % of its mass."""
+    tests = load_tests(folder_of(write_folder(tmp_path, recordings(SURGE)[:1]), KNOWN, FORCES))
+    known, recorded, rows = begin(tests)
+    objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
+    z, place = objective.mean.copy(), objective.table.place("inertia", "surge")
+    assert place is not None
+    z[place] = np.log(ratio * known.coefficients["beta_u"])
+    tried: list[int] = []
+
+    def customary(*found: Collection[Axis]) -> tuple[float, ...]:
+        tried.append(len(found[-1]))
+        return ()
+
+    monkeypatch.setattr(module, "_customary", customary)
+    assert not slips(tests, known, objective, z, np.full(len(z), 1e-3))
+    assert tried == [int(is_suspected)]
 
 
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:

@@ -143,7 +143,7 @@ def has_place(sensor: Sensor) -> bool:
     return not sensor.axis.is_rotation and (sensor.is_velocity or sensor.axis is not HEAVE)
 
 
-def _with_same_lag(sensor: Sensor) -> str:
+def with_same_lag(sensor: Sensor) -> str:
     """Return which sensors of a vehicle share the lag of this one, in words."""
     if sensor.is_velocity:
         return "of the turn rate sensor" if sensor.axis.is_rotation else "of the velocity sensor"
@@ -328,7 +328,7 @@ class Table:
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
-        place = self.place("sensor lag", "", _with_same_lag(sensor))
+        place = self.place("sensor lag", "", with_same_lag(sensor))
         return None if place is None else z[place]
 
 
@@ -503,7 +503,7 @@ def _of_sensors(logs: Sequence[SampledLog], prior: Callable[[str], float]) -> It
         parts = _PLACES if turns - {YAW} else _PLACES[:2] if turns else ()
         for part in parts if prior("sensor_place") else ():
             yield Parameter(kind, "", part, deviation=prior("sensor_place"), null=0.0, unit="m")
-    lags = {_with_same_lag(sensor) for one in logs for sensor in one.record.sensors}
+    lags = {with_same_lag(sensor) for one in logs for sensor in one.record.sensors}
     for part in sorted(lags) if prior("sensor_lag") else ():
         yield Parameter("sensor lag", "", part, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
 

@@ -9,7 +9,8 @@ for n such values: the density of the values in a file is 1/|k| times that of th
 common scale of all data of an axis equally well, and only the priors of drag, inertia and thrust tell them apart.
 
 Added mass is never negative, so an inertia below the vehicle's own is as unlikely as its distance from it says. That
-distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s.
+distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s. So is
+the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
 Only few hypotheses are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
 only a channel that would agree with this motion for another k, but not for 1, is suspected. The priors do not tell
@@ -19,7 +20,7 @@ by such a factor. The scale of commands is checked where they are read.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import log, pi
+from math import hypot, log, pi
 
 import numpy as np
 
@@ -35,8 +36,9 @@ from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
-_CERTAIN = 2.0
-"""An inertia is too small if it is so many standard errors below the vehicle's own."""
+_CERTAIN, _WEIGHED = 2.0, 0.05
+"""An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
+and the water inside change from dive to dive."""
 _CLEAR, _NEXT = 9.0, 6.0
 """The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
@@ -54,7 +56,7 @@ of 2.7, and thus the velocity within one of 1.6."""
 _ALIKE, _WORSE = 0.5, 4.0
 """The least correlation of measured and simulated motion. A scale is unlikely if it leaves so many times more
 unexplained than another one does: a heading that is scaled and then wrapped may still look a little like the motion."""
-_DENSITY, _MOVING, _TURNING, _SLOWEST = 1000.0, 1.5, 6.0, 0.1
+_DENSITY, _MOVING, _TURNING, _SLOWEST, _USUAL = 1000.0, 1.5, 6.0, 0.1, log(8.0)
 """The density of water, and the usual drag of vehicles of the volume V = m/rho: 1.5 rho V^(2/3) v^2 / 2, and about an
 axis 6 I r^2 / 2, both within a factor of 8. The drag becomes linear below 0.1 m/s or rad/s."""
 _UNHEEDED = 1e6
@@ -98,7 +100,8 @@ def slips(tests: Tests, known: Beginning, objective: Objective, best: Array, err
         return ()
 
     def least(hypothesis: Hypothesis, start: Array | None = None) -> float:
-        return _least(tests, hypothesis, start) + sum(_lightness(hypothesis, *one) for one in inertias)
+        unlikely = sum(_lightness(hypothesis, *one) for one in inertias) + _drag(hypothesis, compared, known.guessed)
+        return _least(tests, hypothesis, start) + unlikely
 
     as_it_is, J = least(frozenset(), best), dict[Hypothesis, float]()
     while untried:  # The best explanation may need fewer channels than it has.
@@ -123,13 +126,27 @@ def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -
         place = objective.table.place("inertia", axis.name)
         if place is not None and not axis.is_rotation:
             inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
-            yield axis, float(np.log(inertia / vehicle[axis.inertia])), float(errors[place])
+            yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[place]), _WEIGHED)
 
 
 def _lightness(hypothesis: Hypothesis, axis: Axis, ratio: float, error: float) -> float:
     """Return how unlikely an inertia is that is below the vehicle's own. With k, it is k times as large."""
     scale = min((abs(scale) for one, scale in hypothesis if one.channel.quantity.axis is axis), default=1.0)
     return max(-(ratio + log(scale)) / error, 0.0) ** 2
+
+
+def _drag(hypothesis: Hypothesis, compared: Sequence[_Compared], guessed: Sequence[str]) -> float:
+    """Return how unlikely the drag of the axes is whose prior of the drag follows from the data.
+
+    The drag is relative to the usual one as the simulated velocity, squared, to the measured one.
+    """
+    scales, ratios = dict(hypothesis), dict[str, list[float]]()
+    for one in compared:
+        axis = one.channel.quantity.axis
+        if axis and axis.name in guessed and one.ratios:
+            scale, ratio = next(iter(one.ratios.items()))
+            ratios.setdefault(axis.name, []).append(log(ratio * abs(scale / scales.get(one, 1.0))))
+    return sum((2.0 * float(np.mean(some)) / _USUAL) ** 2 for some in ratios.values())
 
 
 def _customary(one: _Compared, compared: Sequence[_Compared], light: Collection[Axis]) -> Iterator[float]:

@@ -61,7 +61,7 @@ def drawn(base: str, *columns: str) -> tuple[Array, dict[str, Array]]:
 
 @pytest.mark.parametrize("base", BASES)
 def test_a_dive_that_shows_no_turn_concerns_only_the_axes_that_it_shows(base: str, tmp_path: Path) -> None:
-    """With a heading, the other axes stay, and only their drag and inertia are uncertain beside those of the tests."""
+    """With a heading, roll or pitch, the others stay: only their drag and inertia are uncertain beside the tests'."""
     folder = folder_of(tmp_path, f'base = "{base}"\n{HEAD}', {})
     axes = BASES[base]
     shown = [some for count in (1, 2, len(axes) - 1, len(axes)) for some in combinations(axes, count)]
@@ -71,7 +71,10 @@ def test_a_dive_that_shows_no_turn_concerns_only_the_axes_that_it_shows(base: st
     known, logs, _ = begin(load_tests(folder))
     concerned = {one.log.file: {form.axis for form in one.layout.axes} for one in logs}
     assert concerned.pop("dive_track.csv") == {*axes}
-    expected = {f"dive_{''.join(a.velocity for a in some)}.csv": {*(axes if YAW in some else some)} for some in shown}
+    expected = {
+        f"dive_{''.join(a.velocity for a in some)}.csv": {*(axes if {ROLL, PITCH, YAW} & {*some} else some)}
+        for some in shown
+    }
     assert concerned == expected
     assert {*known.fitted} == {*axes}
     assert not known.unseen
