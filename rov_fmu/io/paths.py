@@ -5,6 +5,7 @@ that contains the name.
 """
 
 import os
+import re
 from pathlib import Path, PureWindowsPath
 
 _PACKAGE = Path(__file__).parent.parent
@@ -19,6 +20,8 @@ MODELS = _TOP / "models"
 """The folder of the vehicles that ship; each has a folder of its own."""
 PREBUILT = _TOP / "prebuilt"
 """The folder of what a wheel has compiled for these vehicles. A checkout has no such folder."""
+DEVICE = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.IGNORECASE)
+"""Names of devices in Windows. No file can have such a name there, whatever its extension."""
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -36,10 +36,12 @@ class MetaData:
 
     @property
     def words(self) -> str:
-        """What the hashes and the signature say; empty if the FMU has neither."""
+        """What the hashes and the signature say."""
         if self.signer:
             return f"All {len(self.files)} files are as they were built. Signed with the key {self.signer}."
-        return f"All {len(self.files)} files match the hashes in the FMU, which is not signed." if self.files else ""
+        if self.files:
+            return f"All {len(self.files)} files match the hashes in the FMU, which is not signed."
+        return "The FMU has no hashes of its files, and it is not signed: nothing shows who made it, or a change."
 
 
 def check_evidence(fmu: Path, key: Path | None = None) -> MetaData:
@@ -69,7 +71,7 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
     try:
         root = root_of_xml(archive.read(META_DATA))
     except (etree.XMLSyntaxError, zipfile.BadZipFile) as error:
-        raise FileError(f"{where}: is damaged: {brief(str(error))}") from error
+        raise ProofError(f"{where}: was altered after the FMU was built: {brief(str(error.args[0]))}") from error
     entries = {
         classification.get("type"): {
             entry.get("keyword", ""): (entry.text or "").strip()

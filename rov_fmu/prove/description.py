@@ -82,7 +82,9 @@ def _root(folder: str) -> Any:
     try:
         root = root_of_xml(path.read_bytes())
     except etree.XMLSyntaxError as error:
-        raise ValueError(f"not XML: {error.msg}") from error
+        raise ValueError(f"not XML: {error.msg.partition(', try XML_PARSE_HUGE')[0]}") from error
+    if not root.get("fmiVersion"):
+        raise ValueError("must have an fmiVersion at its root")
     if root.getroottree().docinfo.internalDTD is not None:  # a few lines of entities can stand for gigabytes
         raise ValueError("has a document type definition (DTD); no model description needs one")
     if root.xpath(f"count(ModelVariables/*) > {_MOST_VARIABLES}"):

@@ -3,7 +3,9 @@
 The files stay in their folder, their size is limited, and every reader of the archive finds the same files.
 """
 
+import errno
 import os
+import re
 import stat
 import struct
 import zipfile
@@ -13,8 +15,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
+from unicodedata import normalize
 
 from rov_fmu.io.messages import FileError, ProofError, brief, shown
+from rov_fmu.io.paths import DEVICE
 from rov_fmu.io.reading import open_file
 
 _MOST_UNPACKED = 2_000_000_000
@@ -25,8 +29,10 @@ _SMALL = 100_000_000
 """Bytes that an archive may unpack to, however well it is compressed."""
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """The compression that FMI allows. Python takes memory without limit for other methods."""
-_UTF_8, _SIZES_BEHIND = 0x800, 8
-"""The flags of a file whose name is in UTF-8, and of one whose sizes follow its content."""
+_ENCRYPTED, _SIZES_BEHIND, _UTF_8 = 1, 8, 0x800
+"""The flags of a file that is encrypted, of one whose sizes follow its content, and of one whose name is in UTF-8."""
+_PART = re.compile(r"(?!\.\.?$)[^\x00-\x1f<>:\"\\|?*]*[^\x00-\x1f<>:\"\\|?* .]")
+"""What may stand between the slashes of a path, so that it is the same path on every system."""
 _LARGE = b"\1\0\x10\0"
 """How the extra field with the sizes of a large file begins."""
 _END = "<4s4H2LH"
@@ -68,22 +74,32 @@ def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
     except (FileError, ProofError):
         raise
     except Exception as error:  # zipfile raises many kinds on damaged or encrypted archives
-        raise FileError(f"{fmu}: is not an FMU, or is damaged: {brief(str(error))}") from error
+        is_outside = isinstance(error, OSError) and error.errno == errno.EINVAL
+        reason = "its directory names a place outside of it" if is_outside else brief(str(error))
+        raise FileError(f"{fmu}: is not an FMU, or is damaged: {reason}") from error
 
 
 def refusal(zipped: zipfile.ZipFile) -> str:
     """Return why an archive may not be unpacked, or an empty text."""
     members = zipped.infolist()
-    times = Counter(member.orig_filename for member in members)
-    for member in members:
+    places = [_place(member.orig_filename) for member in members]
+    names, times = Counter(member.orig_filename for member in members), Counter(places)
+    folders = {folder for place in places for folder in _folders(place)}
+    for member, place in zip(members, places, strict=True):
         name = member.orig_filename
-        is_outside = name.startswith("/") or ".." in name.split("/") or any(c in name for c in "\\:\0")
+        is_portable = all(map(_is_portable, name.removesuffix("/").split("/")))
         is_special = stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR)
         for is_wrong, reason in (
-            (is_outside, "a path in an FMU must be relative, with forward slashes and without .."),
+            (not is_portable, "must be a relative path with forward slashes that every system has"),
             (is_special, "is a link or a special file; an FMU must have files and folders only"),
             (member.compress_type not in _METHODS, "must be stored or deflated, the compression that FMI allows"),
-            (times[name] > 1, f"is {times[name]} times in the archive"),
+            (member.flag_bits & _ENCRYPTED, "is encrypted"),
+            (names[name] > 1, f"is {names[name]} times in the archive"),
+            (
+                times[place] > 1,
+                "is the path of another member, too, where capital letters are as small ones",
+            ),
+            (place in folders and not member.is_dir(), "is a file, and a folder of other files"),
         ):
             if is_wrong:
                 return f"member {shown(name)}: {reason}"
@@ -97,6 +113,23 @@ def refusal(zipped: zipfile.ZipFile) -> str:
             f"above {_SMALL / 1e6:g} MB at most {_MOST_RATIO} times are allowed"
         )
     return ""
+
+
+def _is_portable(part: str) -> bool:
+    """Return True if a part of a path names the same file or folder on every system."""
+    return bool(_PART.fullmatch(part)) and not DEVICE.fullmatch(part.partition(".")[0].rstrip())
+
+
+def _place(name: str) -> str:
+    """Return what equal paths have in common: on some systems, capital letters and accents make no other path."""
+    return normalize("NFC", name.removesuffix("/")).casefold()
+
+
+def _folders(place: str) -> Iterator[str]:
+    """Yield the folders that a path leads through."""
+    parts = place.split("/")
+    for n in range(1, len(parts)):
+        yield "/".join(parts[:n])
 
 
 def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:

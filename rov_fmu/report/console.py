@@ -150,7 +150,7 @@ def print_proof(findings: "Sequence[Finding]") -> None:
     experiments = [*dict.fromkeys(f.experiment for f in findings)]
     number = f"{len(experiments)} experiment{'s' if len(experiments) > 1 else ''}"
     passed = f"{sum(f.passed for f in findings)} of {len(findings)} pass"
-    counted = f"{number}, {len(findings)} results: {passed}."
+    counted = f"{number}, {len(findings)} result{'s' if len(findings) > 1 else ''}: {passed}."
     paragraph(out, f"{counted} A deviation is the largest one, relative to the largest expected value.")
     out.print()
     found = table("", "experiment", ("deviation", "tolerance"), ("result", "of"))
@@ -166,9 +166,8 @@ def print_proof(findings: "Sequence[Finding]") -> None:
 
 
 def print_evidence(evidence: "MetaData") -> None:
-    """Print what the hashes in an FMU and its signature say, if it has any."""
-    if evidence.words:
-        paragraph(console(), evidence.words)
+    """Print what the hashes in an FMU and its signature say."""
+    paragraph(console(), evidence.words)
 
 
 def print_claims(proof: "Proof") -> None:

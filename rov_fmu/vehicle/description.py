@@ -14,19 +14,16 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.field_types import Name, Text, not_blank, printable
 from rov_fmu.io.output import is_same
-from rov_fmu.io.paths import inside, inside_or_shipped
+from rov_fmu.io.paths import DEVICE, inside, inside_or_shipped
 from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
 from rov_fmu.vehicle.quantity import Interval
-
-_RESERVED = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.I)
-"""Names of devices in Windows. No file can have such a name there, whatever its extension."""
 
 
 def _identifier(text: str) -> str:
     """Return the text if it can name an FMU on every system. Raises ValueError."""
     if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
         raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
-    if _RESERVED.fullmatch(text):
+    if DEVICE.fullmatch(text):
         raise ValueError("must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0 ... COM9, LPT0 ... LPT9")
     return text
 

@@ -280,7 +280,10 @@ BAD: dict[str, tuple[Files, str]] = {
         {"k.ssv": '<ParameterSet><Parameter name="k"><Real value="1" unit="N"/></Parameter></ParameterSet>'},
         f"{FOLDER}/k.ssv: parameter 'k': is in N, and not in None",
     ),
-    "a file that is a folder, too": ({"modelDescription.xml/": ""}, "cannot be unpacked: File exists: modelDescript"),
+    "a file that is a folder, too": (
+        {"modelDescription.xml/": ""},
+        "member 'modelDescription.xml': is the path of another member",
+    ),
 }
 
 

@@ -40,18 +40,30 @@ def _zeros(megabytes: int) -> Callable[..., None]:
     return add
 
 
+_PATH = "must be a relative path with forward slashes that every system has"
 BAD: dict[str, tuple[Callable[..., None], str]] = {
-    "a path upwards": (_member("resources/../../evil"), "member 'resources/../../evil': a path in an FMU must"),
-    "an absolute path": (_member("/tmp/evil"), "member '/tmp/evil': a path in an FMU must be relative"),
-    "a path of Windows": (_member("..\\evil"), r"member '..\\evil': a path in an FMU must be relative"),
-    "a drive": (_member("C:/evil"), "member 'C:/evil': a path in an FMU must be relative"),
+    "a path upwards": (_member("resources/../../evil"), f"member 'resources/../../evil': {_PATH}"),
+    "an absolute path": (_member("/tmp/evil"), f"member '/tmp/evil': {_PATH}"),
+    "a path of Windows": (_member("..\\evil"), rf"member '..\\evil': {_PATH}"),
+    "a drive": (_member("C:/evil"), f"member 'C:/evil': {_PATH}"),
     "a link": (_member("resources/link", b"/etc/passwd", _LINK), "member 'resources/link': is a link or a special"),
     "another compression": (
         _member("resources/a", bytes(1_000_000), method=zipfile.ZIP_BZIP2),
         "member 'resources/a': must be stored or deflated, the compression that FMI allows",
     ),
     "a name that is too long": (_member("x" * 300), "cannot be unpacked: File name too long: xxx"),
-    "a file below a file": (_member("modelDescription.xml/x"), "cannot be unpacked: "),
+    "a file below a file": (
+        _member("modelDescription.xml/x"),
+        "member 'modelDescription.xml': is a file, and a folder of other files",
+    ),
+    "the same path with a dot": (_member("./modelDescription.xml"), f"member './modelDescription.xml': {_PATH}"),
+    "the same path with two slashes": (_member("binaries//a.so"), f"member 'binaries//a.so': {_PATH}"),
+    "the same path with capital letters": (
+        _member("MODELDescription.xml"),
+        "member 'modelDescription.xml': is the path of another member, too, on systems where",
+    ),
+    "a device of Windows": (_member("resources/con.txt"), f"member 'resources/con.txt': {_PATH}"),
+    "a blank at the end": (_member("resources/x "), f"member 'resources/x ': {_PATH}"),
     "a bomb": (_zeros(150), "would take 15"),
 }
 
