@@ -13,7 +13,8 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.assess import logarithms
-from rov_fmu.identify.beginning import QUANTITIES, Tests
+from rov_fmu.identify.beginning import QUANTITIES
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, TableRow, cost, modelled

@@ -11,9 +11,9 @@ from scipy.stats import binom
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify import beginning
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification
@@ -137,7 +137,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     base = load_vehicle(REFIT)
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
     tests = read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', responses(TRUTH, YAW))
-    assert tests.given.vehicle.layout == base.layout
+    assert tests.vehicle.layout == base.layout
     assert tests.inputs.keys() == {"rov.toml", "videoray_refit", "steady_yaw.csv", "time_constant_yaw.csv"}
     result = identify(tests)
     about = {finding.axis or finding.curve for finding in result.findings}
@@ -247,7 +247,7 @@ def test_the_file_of_a_measured_curve_tells_how_far_off_its_forces_are(
 def of_logs(identified: Identified) -> Identification:
     """Identify heave from forces, two logs, and one that teaches nothing."""
 
-    def tests(folder: Path) -> beginning.Tests:
+    def tests(folder: Path) -> Tests:
         (with_logs(folder, HEAVE, 2) / "log_heave_2.csv").write_text(STILL, encoding="utf-8")
         return load_tests(folder)
 
