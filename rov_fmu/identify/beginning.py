@@ -11,8 +11,9 @@ from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YA
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.given import TestContents, Tests, narrowed, with_axes_alone
+from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
+from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
 from rov_fmu.identify.likelihood.records import (
     SampledLog,
@@ -289,7 +290,7 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
         is_loaded = axis.name in logged or tests.tested.steady.get(axis.name) or axis in shown
         if is_loaded and not (centres and axis in (ROLL, PITCH)):
-            more[form.name_of("F_0")] = 0.0
+            more[form.name_of("F_0")] = ABSENT["F_0"]
     vehicle = _with_voltage(vehicle, base, tests)
     layout = vehicle.layout
     values = {**vehicle.coefficients, **values}
@@ -299,13 +300,13 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             for key in ("a_t", "b_t"):
                 more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
             if logged or curve.name in tests.tested.thrust:
-                more[curve.coefficient("c_0")] = 0.0
+                more[curve.coefficient("c_0")] = ABSENT["c_0"]
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
         if logged or tests.tested.time_constants:
-            more[curve.coefficient("T")] = LEAST_LAG
+            more[curve.coefficient("T")] = ABSENT["T"]
         if logged and not (layout.has_wrench or curve.tables):
-            more[curve.coefficient("d")] = 0.0
+            more[curve.coefficient("d")] = ABSENT["d"]
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 
@@ -329,7 +330,7 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
     known = {**tests.description.measured_at, **told}
     for curve in curves:
         more[curve.name_of("V_0")] = known.get(curve.name, mean)
-        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
+        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else ABSENT["n_V"]
     source = "Voltage of the measured thrust" if known else "Mean voltage of the logs"
     layout = replace(vehicle.layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
     return _with(layout, vehicle.coefficients, more)

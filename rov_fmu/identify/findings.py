@@ -13,10 +13,10 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.result import (
     DISAGREEMENT,
-    EFFECTS,
     MOST_UNKNOWN,
     Answer,
     AxisOfBase,
@@ -496,7 +496,7 @@ def size_in_words(value: float, unit: str) -> str:
 
 def effect_in_words(effect: Effect) -> str:
     """Return the size of an effect; a ratio has two digits of how far it is from 1."""
-    if not EFFECTS[effect.kind].is_ratio or effect.value == 1.0:
+    if not KINDS[effect.kind].is_ratio or effect.value == 1.0:
         return size_in_words(effect.value, effect.unit)
     return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
@@ -687,6 +687,6 @@ def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]
     if effect.is_unusual:
         yield Finding("unusual effect", "", "", "", names)
     if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
-        names["note"] = EFFECTS[effect.kind].why_not
+        names["note"] = KINDS[effect.kind].why_not
     axis = of if of in AXES else ""
     yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

@@ -14,12 +14,12 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Part, VehicleAxis
+from rov_fmu.equation.parts import Part
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF
 from rov_fmu.identify.likelihood.objective import changed
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
@@ -273,20 +273,14 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         name = part.coefficient(key)
         if key not in part.keys or name in own:
             return key in part.keys
-        value = coefficients[name]
-        by_value = {"V_0": with_voltage, "n_V": with_voltage, "F_0": value != 0.0, "T": value != LEAST_LAG}
-        by_value |= dict.fromkeys(("d", f"d{REVERSE}"), value > 0.0)
-        if key in by_value:
-            return by_value[key]
-        if isinstance(part, Curve) and key in _DEAD_BAND:
-            is_kept = key == "c_0" or name in base or ("dead band astern", part.name) in present
-            return is_kept and value > 0.0
-        if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
-            return name in base or ("drag astern", part.axis.name) in present
-        if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
-            is_measured = name in tests.known or fit.known.measured_curves.get(part.name, False)
-            return name in base or is_measured or ("reverse thrust", part.name) in present
-        return True
+        if key in ("V_0", "n_V"):
+            return with_voltage
+        if coefficients[name] == ABSENT.get(key.removesuffix(REVERSE)):
+            return False
+        if name in base or not key.endswith(REVERSE) or key not in EFFECT_OF:
+            return True
+        effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
+        return (effect, of) in present or (effect == "reverse thrust" and fit.known.measured_curves.get(of, False))
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)

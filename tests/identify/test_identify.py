@@ -11,11 +11,11 @@ from scipy.stats import binom
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
-from rov_fmu.identify.given import Tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
+from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
@@ -247,7 +247,7 @@ def test_the_file_of_a_measured_curve_tells_how_far_off_its_forces_are(
 def of_logs(identified: Identified) -> Identification:
     """Identify heave from forces, two logs, and one that teaches nothing."""
 
-    def tests(folder: Path) -> Tests:
+    def tests(folder: Path) -> given.Tests:
         (with_logs(folder, HEAVE, 2) / "log_heave_2.csv").write_text(STILL, encoding="utf-8")
         return load_tests(folder)
 

@@ -30,7 +30,8 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Parameter, Table
+from rov_fmu.identify.likelihood.kinds import LEAST_LAG
+from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle

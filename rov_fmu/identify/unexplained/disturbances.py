@@ -8,8 +8,9 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
+from rov_fmu.identify.likelihood.parameters import Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
