@@ -217,16 +217,23 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
         if any(axis.coefficient(key) not in tests.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
-    has_lag = any(name.startswith("T_") for name in tests.base)
     moved = {form.axis for one in logs for form in one.layout.axes}
-    exact = _exact(tests, vehicle.layout, measured, moved, shown)
-    errors = _thrust_errors(tests, curves)
-    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
-        vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
+        vehicle.layout,
+        values,
+        fitted,
+        curves,
+        measured,
+        with_lag=any(name.startswith("T_") for name in tests.base),
+        guessed=guessed,
+        full=full,
+        deviations=deviations,
+        exact=_exact(tests, vehicle.layout, measured, moved, shown),
+        thrust_errors=_thrust_errors(tests, curves),
+        unseen=[form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}],
+        has_times=bool(tests.tested.time_constants),
+        bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
-    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
-    known = replace(known, unseen=unseen, bent=bent, has_times=bool(tests.tested.time_constants))
     return known, logs, [*_table_rows(tests, vehicle)]
 
 

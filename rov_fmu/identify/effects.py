@@ -9,7 +9,7 @@ from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE
-from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, Sensor
 
@@ -25,7 +25,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             continue
         assert p.null is not None
         posterior = fit.posterior if n in file.absent else file
-        value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
+        value, error, unit = float(posterior.z[n]), posterior.errors[n], p.unit
         if p.kind == "dead band":
             error = max(error, EXACT_BAND / QUANTILE)
         if p.kind == "load":

@@ -19,7 +19,7 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import LEAST_NOISE, Point, Prediction
 from rov_fmu.tank.arrays import Array
@@ -228,7 +228,7 @@ def ahead(
     """
     run = objective.run(z, number, begin=begin, span=span)
     slopes = _slopes(objective, number, z, covariance, run, begin, span)
-    deviations = np.sqrt(run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+    deviations = np.sqrt(run.variances + variances_of(slopes, covariance))
     wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
     lost = wraps[objective.records[number].sensor]
     return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
