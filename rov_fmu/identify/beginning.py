@@ -30,7 +30,7 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
-from rov_fmu.tank.folder import KINDS, Folder, file_hash, read_folder
+from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -208,7 +208,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     ]
     values = dict(vehicle.coefficients)
     for name, rows in tests.rows("thrust"):
-        rough = _rough_thrust(vehicle, next(c for c in vehicle.layout.curves if c.name == name), rows)
+        rough = _rough_thrust(vehicle, vehicle.layout.curves_by_name[name], rows)
         values |= {key: value for key, value in rough.items() if key not in tests.known}
     vehicle = Vehicle(vehicle.layout, values)
     full = {form.axis.name: vehicle.strongest(form.axis) for form in vehicle.layout.axes}
@@ -234,7 +234,13 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
         has_times=bool(tests.tested.time_constants),
         bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
-    return known, logs, [*_table_rows(tests, vehicle)]
+    counted = [
+        one
+        for kind in QUANTITIES
+        for row, one in table_rows(tests, vehicle.layout, kind)
+        if tests.counts(kind, one.subject.name, row.command)
+    ]
+    return known, logs, counted
 
 
 def _exact(
@@ -417,19 +423,12 @@ def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> flo
     return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.by_name[axis.name]) * largest
 
 
-def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:
-    """Yield all rows of tables that count."""
-    curves = {curve.name: curve for curve in vehicle.layout.curves}
-    for kind in KINDS:
-        if kind == "log":
-            continue
-        quantity = QUANTITIES[kind]
-        for subject, rows in tests.rows(kind):
-            largest = max(abs(row.value) for row in rows)
-            for row in rows:
-                if not tests.counts(kind, subject, row.command):
-                    continue
-                of = curves[subject] if kind == "thrust" else AXES[subject]
-                scale = largest if kind == "thrust" else abs(row.value)
-                noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
-                yield TableRow(noise, of, quantity, row.command, row.value, scale)
+def table_rows(tests: Tests, layout: Layout, kind: str) -> Iterator[tuple[Row, TableRow]]:
+    """Yield the rows of the tables of a kind, with what J reads of them."""
+    for subject, rows in tests.rows(kind):
+        largest = max(abs(row.value) for row in rows)
+        of = layout.curves_by_name[subject] if kind == "thrust" else AXES[subject]
+        for row in rows:
+            scale = largest if kind == "thrust" else abs(row.value)
+            noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
+            yield row, TableRow(noise, of, QUANTITIES[kind], row.command, row.value, scale)
