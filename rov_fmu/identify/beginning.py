@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import TestContents, Tests, narrowed, with_axes_alone
+from rov_fmu.identify.given import TestContents, Tests, narrowed, window_of, with_axes_alone
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning
@@ -152,14 +152,12 @@ def _driven_together(found: Folder) -> Iterator[Finding]:
 
 def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
     """Return what the files test. A log that could not be read may test the axis in its name."""
-    description = found.rov_file.description
-    windows = description.tables.windows if description else {}
 
     def subjects(kind: str) -> list[str]:
         return [subject for other, subject in found.files if other == kind]
 
     def has_backward_rows(kind: str, subject: str) -> bool:
-        low, _ = windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+        low, _ = window_of(found.rov_file.description, kind, subject)
         return any(low <= row.command < 0.0 for row in found.rows.get((kind, subject), ()))
 
     unread = filter(None, subjects("log")) if found.mistakes else ()

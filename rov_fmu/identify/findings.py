@@ -221,9 +221,9 @@ _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
 """The kinds in the order in which they are told under their heading."""
 
 
-def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of findings; similar findings share one sentence."""
-    return findings.sentences(found, SENTENCES)
+def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
+    """Return the sentences of findings, if given only of those of a kind; similar findings share one sentence."""
+    return findings.sentences((one for one in found if kind in ("", one.kind)), SENTENCES)
 
 
 def heading(finding: Finding) -> Heading:
@@ -237,11 +237,6 @@ def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     for finding in found:
         groups[heading(finding)].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
-
-
-def not_read(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences about files that are not read, although nothing is wrong with them."""
-    return sentences(finding for finding in found if finding.kind == "other files")
 
 
 def told(identification: Identification) -> Identification:
@@ -596,11 +591,6 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
         a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
         if a_t in {one.name for one in known} and not {curve, a_t} & told:
             yield Finding("assumed thrust", curve=curve)
-
-
-def assumed_thrust(identification: Identification) -> tuple[str, ...]:
-    """Return a sentence for each curve whose thrust is an assumption: it says in which units the forces are."""
-    return sentences(finding for finding in identification.findings if finding.kind == "assumed thrust")
 
 
 _REMEDIES = {

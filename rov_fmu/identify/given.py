@@ -84,9 +84,14 @@ class Tests:
 
     def counts(self, kind: str, subject: str, command: float) -> bool:
         """Return True if a command is inside the window of rov.toml."""
-        window = f"thrust_{subject}" if kind == "thrust" else subject
-        low, high = self.description.tables.windows.get(window, (-1.0, 1.0))
+        low, high = window_of(self.description, kind, subject)
         return low <= command <= high
+
+
+def window_of(description: Description | None, kind: str, subject: str) -> tuple[float, float]:
+    """Return the least and the largest command of a table that count by rov.toml."""
+    windows = description.tables.windows if description else {}
+    return windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
 
 
 def narrowed(found: Folder, description: Description, tested: TestContents, useless: Sequence[str]) -> Tests | None:
@@ -126,7 +131,7 @@ def narrowed(found: Folder, description: Description, tested: TestContents, usel
         vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
-        requests=description.requests.of({curve.name for curve in layout.curves}),
+        requests=description.requests.of(layout.curves_by_name),
         thrusters=own,
         tested=tested,
         findings=tuple(_left_out(description, tested, layout)),
@@ -215,7 +220,7 @@ def _left_out(description: Description, tested: TestContents, layout: Layout) ->
     if description.layout.coupled and not layout.coupled:
         yield Finding("not coupled")
     for name, (file, _) in tested.thrust.items():
-        if name not in {curve.name for curve in layout.curves}:
+        if name not in layout.curves_by_name:
             yield Finding("unused curve", curve=name, file=file)
 
 
