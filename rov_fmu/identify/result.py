@@ -355,11 +355,6 @@ class AxisResult:
             default=None,
         )
 
-    @property
-    def coverage(self) -> float:
-        """The share of all samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
-        return coverage_of(self.predictions)
-
 
 @dataclass(frozen=True, eq=False)
 class Identification:
