@@ -34,6 +34,7 @@ from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant, with_interval
 from rov_fmu.tank import findings
+from rov_fmu.tank.arrays import rms
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
@@ -389,7 +390,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     pushed: dict[str, list[str]] = {}
     for d in identification.disturbances:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
-        most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
+        most = max((rms(force) for force in forces), default=inf)
         if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
             size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
             pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")

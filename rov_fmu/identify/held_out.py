@@ -21,7 +21,7 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import LEAST_NOISE, Point, Prediction
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -201,7 +201,7 @@ def _predicted(
                 deviation=deviation,
                 unchanged=_unchanged(record.time[at], measured, span),
                 noise=objective.table.get(z, "white noise", m.channel.quantity.name),
-                error=float(np.sqrt(np.mean(off**2))),
+                error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 loss=cost(off, deviation**2) / len(off),
                 compared=measured - compared.innovations[at] if compared else None,
@@ -240,9 +240,9 @@ def ahead(
 def _unchanged(time: Array, values: Array, span: float) -> float:
     """Return the RMS change of a quantity since the start of its prediction."""
     if span == inf:
-        return float(np.sqrt(np.mean((values - values[0]) ** 2)))
+        return rms(values - values[0])
     first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
-    return float(np.sqrt(np.mean((values - values[first]) ** 2)))
+    return rms(values - values[first])
 
 
 def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
@@ -263,7 +263,7 @@ def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
             if at.sum() < 10:
                 continue
             unchanged = _unchanged(record.time[at], record.value[at], AHEAD)
-            ratio = float(np.sqrt(np.mean(off[at] ** 2))) / max(m.noise, LEAST_NOISE * unchanged)
+            ratio = rms(off[at]) / max(m.noise, LEAST_NOISE * unchanged)
             found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), ratio)
     return found
 

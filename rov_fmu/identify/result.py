@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
-import numpy as np
-
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.vehicle.description import Word
@@ -102,7 +100,7 @@ class Prediction:
     @property
     def compared_error(self) -> float | None:
         """The RMS error of the vehicle to compare with."""
-        return None if self.compared is None else float(np.sqrt(np.mean((self.measured - self.compared) ** 2)))
+        return None if self.compared is None else rms(self.measured - self.compared)
 
     @property
     def is_judged(self) -> bool:
