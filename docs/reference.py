@@ -18,7 +18,7 @@ from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
-from rov_fmu.identify.likelihood.parameters import PRIORS
+from rov_fmu.identify.likelihood.kinds import PRIORS
 from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page import equations

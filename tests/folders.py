@@ -5,7 +5,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import YAW, Axis
-from rov_fmu.identify import beginning
+from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.given import Tests
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -78,11 +79,11 @@ def pulled(a: float, b: float) -> str:
     return f"{FORCE}\n" + "".join(f"{c},{(a * abs(c) + b) * c:.6f}\n" for c in COMMANDS)
 
 
-def read(folder: Path, rov: str, tables: Mapping[str, str]) -> beginning.Tests:
-    return beginning.load_tests(folder_of(folder, rov, tables))
+def read(folder: Path, rov: str, tables: Mapping[str, str]) -> Tests:
+    return load_tests(folder_of(folder, rov, tables))
 
 
-def rows_of(tests: beginning.Tests, kind: str) -> dict[str, list[Row]]:
+def rows_of(tests: Tests, kind: str) -> dict[str, list[Row]]:
     """Return the rows of all tables of a kind, `thrust`, `steady` or `time_constant`, by curve or axis."""
     return {subject: [*rows] for subject, rows in tests.rows(kind)}
 

@@ -10,7 +10,7 @@ from scipy.stats.qmc import Sobol
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.result import Answer
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
@@ -92,7 +92,7 @@ def answers(
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
             slopes = posterior.slopes(fitted)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        variances = np.einsum("ni,ij,nj->n", slopes, posterior.covariance, slopes).reshape(own.shape)
+        variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
         # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
         variances[:, :2] += (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2
         variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
@@ -101,16 +101,11 @@ def answers(
         ends += [middle - half, middle + half]
     for fit in fits:
         other = fitted(fit.z[:, None]).reshape(own.shape)
-        lost = np.einsum("ni,ij,nj->n", slopes, fit.covariance - posterior.covariance, slopes).reshape(own.shape)
+        lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
         ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
-    found = []
-    intervals = np.stack([low, high], axis=-1).tolist()
-    for command, (V, rise, stop), own_ends in zip(ANSWERED, of_file.tolist(), intervals, strict=True):
-        steady, of_rise, of_stop = map(tuple, own_ends)
-        signed = steady if V >= 0.0 else (-steady[1], -steady[0])
-        found.append(Answer(axis, command, (V, signed), (rise, of_rise), (stop, of_stop)))
-    return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
+    low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
+    return _finite(axis, of_file, low, high)
 
 
 def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:
@@ -140,13 +135,21 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
     pushed, rest = (NO_SHAPES.motions(rovs, axis, np.array(some)) for some in (ANSWERED, (0.0,)))
     responses = _responses(pushed, rest).reshape(len(ANSWERED), 3, -1)
+    values = responses[..., 0]
+    low, high = values, values
+    if known.names:
+        low, high = np.quantile(responses[..., 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=-1)
+    return _finite(axis, values, low, high)
+
+
+def _finite(axis: Axis, values: Array, low: Array, high: Array) -> tuple[Answer, ...]:
+    """Return the answers that are finite, for the usual commands: c x 3 values with the ends of their intervals."""
     found = []
-    for command, values in zip(ANSWERED, responses, strict=True):
-        ends = np.quantile(values[:, 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=1) if known.names else values.T
-        low, high = ends[0].tolist(), ends[-1].tolist()
-        steady, rise, stop = zip(values[:, 0].tolist(), zip(low, high, strict=True), strict=True)
-        found.append(Answer(axis, command, steady, rise, stop))
-    return tuple(a for a in found if a.steady[0] and isfinite(a.steady[0]) and isfinite(a.rise[0]))
+    for command, numbers in zip(ANSWERED, np.stack([values, low, high], axis=-1).tolist(), strict=True):
+        steady, rise, stop = ((value, (least, most)) for value, least, most in numbers)
+        if steady[0] and isfinite(steady[0]) and isfinite(rise[0]):
+            found.append(Answer(axis, command, steady, rise, stop))
+    return tuple(found)
 
 
 def _responses(motions: Motions, rest: Motions) -> Array:

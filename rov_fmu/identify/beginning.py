@@ -10,9 +10,10 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import GivenVehicle, Narrowing, TestContents, narrowed, with_axes_alone
+from rov_fmu.identify.given import TestContents, Tests, narrowed, window_of, with_axes_alone
+from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG, PRIORS, USUAL_EXPONENT, Beginning
+from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
 from rov_fmu.identify.likelihood.records import (
     SampledLog,
@@ -29,7 +30,7 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
-from rov_fmu.tank.folder import KINDS, Folder, file_hash, read_folder
+from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -54,33 +55,6 @@ QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
 """What the tables of each kind measure."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tests:
-    """All tests of a folder, and the vehicle that they concern."""
-
-    folder: Folder
-    given: GivenVehicle
-    tested: TestContents
-    inputs: Mapping[str, str]
-    """The SHA3-256 of every file that was read, by its name."""
-    findings: tuple[Finding, ...]
-    """What was left out of the vehicle and of the files."""
-
-    def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
-        """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
-        layout = self.given.vehicle.layout
-        names = {curve.name for curve in layout.curves} if kind == "thrust" else {*layout.by_name}
-        for (other, subject), some in self.folder.rows.items():
-            if other == kind and subject in names:
-                yield subject, some
-
-    def counts(self, kind: str, subject: str, command: float) -> bool:
-        """Return True if a command is inside the window of rov.toml."""
-        window = f"thrust_{subject}" if kind == "thrust" else subject
-        low, high = self.given.description.tables.windows.get(window, (-1.0, 1.0))
-        return low <= command <= high
-
-
 def load_tests(
     folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
 ) -> Tests:
@@ -96,24 +70,22 @@ def load_tests(
     useless = [one.refusal(folder) for one in logs] if not tested.axes else []
     if not tested.thrust:
         found.mistakes += useless
-    vehicle = Narrowing(None)
+    tests = None
     # If no axis was found, it may be in a file that could not be read.
     if description and (tested.axes or not found.mistakes):
-        vehicle = narrowed(description, tested, folder, useless)
+        tests = narrowed(found, description, tested, useless)
     found.rov_file_mistakes += _wrong_priors(found)
     found.mistakes += _without_force(found)
-    in_tests = [*found.mistakes, *vehicle.test_mistakes]
-    mistakes = [*found.rov_file_mistakes, *found.mistakes, *vehicle.rov_file_mistakes, *vehicle.test_mistakes]
-    if mistakes:
-        raise (DataFileError if in_tests else VehicleFileError)(*mistakes)
-    assert vehicle.given
-    path = vehicle.given.description.tables.base
-    of_base = {vehicle.given.description.base_name: file_hash(path)} if path else {}
+    if mistakes := [*found.rov_file_mistakes, *found.mistakes]:
+        raise (DataFileError if found.mistakes else VehicleFileError)(*mistakes)
+    assert tests
+    path = tests.description.tables.base
+    of_base = {tests.description.base_name: file_hash(path)} if path else {}
     inputs = {ROV_FILE: found.inputs[ROV_FILE]} | of_base | found.inputs
     of_logs = [finding for one in logs for finding in one.told]
-    of_vehicle = _not_pushed(vehicle.findings, of_logs) if not path else vehicle.findings
+    of_vehicle = tests.findings if path else _not_pushed(tests.findings, of_logs)
     findings = (*of_vehicle, *found.findings, *of_logs, *_driven_together(found))
-    return Tests(found, vehicle.given, tested, inputs, findings)
+    return replace(tests, inputs=inputs, findings=findings)
 
 
 def _wrong_priors(found: Folder) -> list[str]:
@@ -181,14 +153,12 @@ def _driven_together(found: Folder) -> Iterator[Finding]:
 
 def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
     """Return what the files test. A log that could not be read may test the axis in its name."""
-    description = found.rov_file.description
-    windows = description.tables.windows if description else {}
 
     def subjects(kind: str) -> list[str]:
         return [subject for other, subject in found.files if other == kind]
 
     def has_backward_rows(kind: str, subject: str) -> bool:
-        low, _ = windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+        low, _ = window_of(found.rov_file.description, kind, subject)
         return any(low <= row.command < 0.0 for row in found.rows.get((kind, subject), ()))
 
     unread = filter(None, subjects("log")) if found.mistakes else ()
@@ -220,16 +190,15 @@ def _layout_of(log: Log, of: Folder | Layout) -> Layout:
 
 def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
-    given = tests.given
-    deviations = given.description.tables.priors
+    deviations = tests.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
     dives = [log for log in tests.folder.logs if not log.axis]
-    shown = {axis for log in dives for axis in shown_axes(log, given.vehicle.layout)}
-    vehicle = _extended(given.vehicle, measured, tests, shown)
+    shown = {axis for log in dives for axis in shown_axes(log, tests.vehicle.layout)}
+    vehicle = _extended(tests.vehicle, measured, tests, shown)
     logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.thrusters_along(axis)}
-    given_thrust = {name for name, quantity in given.description.known.items() if not quantity.interval}
+    given_thrust = {name for name, quantity in tests.description.known.items() if not quantity.interval}
     driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
         curve
@@ -239,30 +208,43 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     ]
     values = dict(vehicle.coefficients)
     for name, rows in tests.rows("thrust"):
-        rough = _rough_thrust(vehicle, next(c for c in vehicle.layout.curves if c.name == name), rows)
-        values |= {key: value for key, value in rough.items() if key not in given.known}
+        rough = _rough_thrust(vehicle, vehicle.layout.curves_by_name[name], rows)
+        values |= {key: value for key, value in rough.items() if key not in tests.known}
     vehicle = Vehicle(vehicle.layout, values)
     full = {form.axis.name: vehicle.strongest(form.axis) for form in vehicle.layout.axes}
     guessed = []
     for axis in fitted:
-        if any(axis.coefficient(key) not in given.base for key in ("a_d", "b_d")):
+        if any(axis.coefficient(key) not in tests.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
-    has_lag = any(name.startswith("T_") for name in given.base)
     moved = {form.axis for one in logs for form in one.layout.axes}
-    exact = _exact(given, vehicle.layout, measured, moved, shown)
-    errors = _thrust_errors(given, curves)
-    bent = frozenset(curve.name for curve in curves if curve.name not in measured)
     known = Beginning(
-        vehicle.layout, values, fitted, curves, measured, has_lag, guessed, full, deviations, exact, errors
+        vehicle.layout,
+        values,
+        fitted,
+        curves,
+        measured,
+        with_lag=any(name.startswith("T_") for name in tests.base),
+        guessed=guessed,
+        full=full,
+        deviations=deviations,
+        exact=_exact(tests, vehicle.layout, measured, moved, shown),
+        thrust_errors=_thrust_errors(tests, curves),
+        unseen=[form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}],
+        has_times=bool(tests.tested.time_constants),
+        bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
-    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
-    known = replace(known, unseen=unseen, bent=bent, has_times=bool(tests.tested.time_constants))
-    return known, logs, [*_table_rows(tests, vehicle)]
+    counted = [
+        one
+        for kind in QUANTITIES
+        for row, one in table_rows(tests, vehicle.layout, kind)
+        if tests.counts(kind, one.subject.name, row.command)
+    ]
+    return known, logs, counted
 
 
 def _exact(
-    given: GivenVehicle, layout: Layout, measured: Collection[str], moved: Collection[Axis], shown: Collection[Axis]
+    tests: Tests, layout: Layout, measured: Collection[str], moved: Collection[Axis], shown: Collection[Axis]
 ) -> frozenset[str]:
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
     leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, the drag
@@ -272,8 +254,8 @@ def _exact(
     keys = ("beta", *(f"{key}{end}" for key in ("a_d", "b_d") for end in ("", REVERSE)))
     uncertain |= {axis.coefficient(key) for axis in moved for key in keys}
     uncertain |= {axis.coefficient("F_0") for axis in shown} | {*_centres(layout, shown)}
-    own = given.description.known
-    return frozenset(n for n in given.known if n not in uncertain or (n in own and not own[n].interval))
+    own = tests.description.known
+    return frozenset(n for n in tests.known if n not in uncertain or (n in own and not own[n].interval))
 
 
 def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
@@ -282,11 +264,11 @@ def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
     return [key for key, axes in needed.items() if layout.restoring and axes & {*shown}]
 
 
-def _thrust_errors(given: GivenVehicle, curves: Sequence[Curve]) -> dict[str, float]:
+def _thrust_errors(tests: Tests, curves: Sequence[Curve]) -> dict[str, float]:
     """Return the relative standard error of the forces of a curve whose a_t rov.toml gives with an interval."""
     found = {}
     for curve in curves:
-        quantity = given.description.known.get(curve.coefficient("a_t"))
+        quantity = tests.description.known.get(curve.coefficient("a_t"))
         if quantity and quantity.interval:
             low, high = quantity.interval
             found[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
@@ -294,7 +276,7 @@ def _thrust_errors(given: GivenVehicle, curves: Sequence[Curve]) -> dict[str, fl
 
 
 def _is_fitted(axis: Axis, tests: Tests) -> bool:
-    given, tested = tests.given.known, tests.tested.axes
+    given, tested = tests.known, tests.tested.axes
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
@@ -304,7 +286,7 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
     `measured` has the curves whose forces were measured, and whether astern, too. `shown` has the axes that dives show:
     a load along them stays from dive to dive. About roll and pitch, it is that of the centre of buoyancy.
     """
-    base, deviations = tests.given.base, tests.given.description.tables.priors
+    base, deviations = tests.base, tests.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
     vehicle = Vehicle(
         replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
@@ -321,7 +303,7 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
         is_loaded = axis.name in logged or tests.tested.steady.get(axis.name) or axis in shown
         if is_loaded and not (centres and axis in (ROLL, PITCH)):
-            more[form.name_of("F_0")] = 0.0
+            more[form.name_of("F_0")] = ABSENT["F_0"]
     vehicle = _with_voltage(vehicle, base, tests)
     layout = vehicle.layout
     values = {**vehicle.coefficients, **values}
@@ -331,13 +313,13 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             for key in ("a_t", "b_t"):
                 more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
             if logged or curve.name in tests.tested.thrust:
-                more[curve.coefficient("c_0")] = 0.0
+                more[curve.coefficient("c_0")] = ABSENT["c_0"]
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
         if logged or tests.tested.time_constants:
-            more[curve.coefficient("T")] = LEAST_LAG
+            more[curve.coefficient("T")] = ABSENT["T"]
         if logged and not (layout.has_wrench or curve.tables):
-            more[curve.coefficient("d")] = 0.0
+            more[curve.coefficient("d")] = ABSENT["d"]
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 
@@ -347,7 +329,7 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
 
     Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
     """
-    requests = tests.given.requests
+    requests = tests.requests
     values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
     if not values or vehicle.layout.voltage is not None:
         return vehicle
@@ -355,13 +337,13 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
     if not requests.voltage and max(float(np.ptp(some)) for some in values) < _SAG * mean:
         return vehicle
     more = {}
-    is_exact = tests.given.description.tables.priors.get("voltage") == 0.0
+    is_exact = tests.description.tables.priors.get("voltage") == 0.0
     curves = [curve for curve in vehicle.layout.curves if len(curve.tables) < 2]
     told = {c.name: base[c.name_of("V_0")] for c in curves if c.name_of("V_0") in base}
-    known = {**tests.given.description.measured_at, **told}
+    known = {**tests.description.measured_at, **told}
     for curve in curves:
         more[curve.name_of("V_0")] = known.get(curve.name, mean)
-        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else 0.0
+        more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else ABSENT["n_V"]
     source = "Voltage of the measured thrust" if known else "Mean voltage of the logs"
     layout = replace(vehicle.layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
     return _with(layout, vehicle.coefficients, more)
@@ -418,7 +400,7 @@ def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[Sampl
     return {
         name: value
         for key, value in pairs.items()
-        if (name := axis.coefficient(key)) in vehicle.layout.coefficients and name not in tests.given.known
+        if (name := axis.coefficient(key)) in vehicle.layout.coefficients and name not in tests.known
     }
 
 
@@ -441,19 +423,12 @@ def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> flo
     return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.by_name[axis.name]) * largest
 
 
-def _table_rows(tests: Tests, vehicle: Vehicle) -> Iterator[TableRow]:
-    """Yield all rows of tables that count."""
-    curves = {curve.name: curve for curve in vehicle.layout.curves}
-    for kind in KINDS:
-        if kind == "log":
-            continue
-        quantity = QUANTITIES[kind]
-        for subject, rows in tests.rows(kind):
-            largest = max(abs(row.value) for row in rows)
-            for row in rows:
-                if not tests.counts(kind, subject, row.command):
-                    continue
-                of = curves[subject] if kind == "thrust" else AXES[subject]
-                scale = largest if kind == "thrust" else abs(row.value)
-                noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
-                yield TableRow(noise, of, quantity, row.command, row.value, scale)
+def table_rows(tests: Tests, layout: Layout, kind: str) -> Iterator[tuple[Row, TableRow]]:
+    """Yield the rows of the tables of a kind, with what J reads of them."""
+    for subject, rows in tests.rows(kind):
+        largest = max(abs(row.value) for row in rows)
+        of = layout.curves_by_name[subject] if kind == "thrust" else AXES[subject]
+        for row in rows:
+            scale = largest if kind == "thrust" else abs(row.value)
+            noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
+            yield row, TableRow(noise, of, QUANTITIES[kind], row.command, row.value, scale)

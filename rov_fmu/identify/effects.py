@@ -8,10 +8,11 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
-from rov_fmu.identify.likelihood.posterior import QUANTILE, around, number
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
-from rov_fmu.identify.result import EFFECTS, Effect, Logging, Sensor
+from rov_fmu.identify.result import Effect, Logging, Sensor
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -25,7 +26,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             continue
         assert p.null is not None
         posterior = fit.posterior if n in file.absent else file
-        value, error, unit = number(p, posterior.z[n]), posterior.errors[n], p.unit
+        value, error, unit = float(posterior.z[n]), posterior.errors[n], p.unit
         if p.kind == "dead band":
             error = max(error, EXACT_BAND / QUANTILE)
         if p.kind == "load":
@@ -34,9 +35,9 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if p.kind == "centre of buoyancy":
             value += file.table.base[CENTRE[p.part]]
         low, high = around(value, error)
-        if EFFECTS[p.kind].is_ratio:
+        if KINDS[p.kind].is_ratio:
             value, low, high = np.exp([value, low, high]).tolist()
-        name = EFFECTS[p.kind].words + (f" {p.part}" if p.part else "")
+        name = KINDS[p.kind].words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, (low, high), unit, evidence, float(beyond), least)

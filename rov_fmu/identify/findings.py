@@ -12,9 +12,9 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
     DISAGREEMENT,
-    EFFECTS,
     MOST_UNKNOWN,
     Answer,
     AxisOfBase,
@@ -32,6 +32,7 @@ from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant, with_interval
 from rov_fmu.tank import findings
+from rov_fmu.tank.arrays import rms
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
@@ -219,9 +220,9 @@ _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
 """The kinds in the order in which they are told under their heading."""
 
 
-def sentences(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of findings; similar findings share one sentence."""
-    return findings.sentences(found, SENTENCES)
+def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
+    """Return the sentences of findings, if given only of those of a kind; similar findings share one sentence."""
+    return findings.sentences((one for one in found if kind in ("", one.kind)), SENTENCES)
 
 
 def heading(finding: Finding) -> Heading:
@@ -235,11 +236,6 @@ def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     for finding in found:
         groups[heading(finding)].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
-
-
-def not_read(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences about files that are not read, although nothing is wrong with them."""
-    return sentences(finding for finding in found if finding.kind == "other files")
 
 
 def told(identification: Identification) -> Identification:
@@ -392,7 +388,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     pushed: dict[str, list[str]] = {}
     for d in identification.disturbances:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
-        most = max((float(np.sqrt(np.mean(force**2))) for force in forces), default=inf)
+        most = max((rms(force) for force in forces), default=inf)
         if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
             size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
             pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
@@ -497,7 +493,7 @@ def size_in_words(value: float, unit: str) -> str:
 
 def effect_in_words(effect: Effect) -> str:
     """Return the size of an effect; a ratio has two digits of how far it is from 1."""
-    if not EFFECTS[effect.kind].is_ratio or effect.value == 1.0:
+    if not KINDS[effect.kind].is_ratio or effect.value == 1.0:
         return size_in_words(effect.value, effect.unit)
     return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
@@ -599,11 +595,6 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
             yield Finding("assumed thrust", curve=curve)
 
 
-def assumed_thrust(identification: Identification) -> tuple[str, ...]:
-    """Return a sentence for each curve whose thrust is an assumption: it says in which units the forces are."""
-    return sentences(finding for finding in identification.findings if finding.kind == "assumed thrust")
-
-
 _REMEDIES = {
     "the voltage": ": `voltage = true` in [fit] takes it into account",
     "the depth": ", as when the buoyancy changes with the pressure, or a tether pulls",
@@ -688,6 +679,6 @@ def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]
     if effect.is_unusual:
         yield Finding("unusual effect", "", "", "", names)
     if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
-        names["note"] = EFFECTS[effect.kind].why_not
+        names["note"] = KINDS[effect.kind].why_not
     axis = of if of in AXES else ""
     yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

@@ -1,8 +1,7 @@
 """Reduce the vehicle that rov.toml describes to the part that can be identified from the tests."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 
 from rov_fmu.equation.catalogue import (
     ARM,
@@ -15,10 +14,12 @@ from rov_fmu.equation.catalogue import (
     Axis,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.messages import listed
+from rov_fmu.io.messages import lines_on, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.description import Description, Requests
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.folder import Folder
+from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
@@ -26,27 +27,6 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
-
-
-@dataclass(frozen=True)
-class GivenVehicle:
-    """What is known about the vehicle before the identification."""
-
-    description: Description
-    """The vehicle as rov.toml describes it."""
-    head: Head
-    vehicle: Vehicle
-    """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
-    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
-    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
-    known: Mapping[str, Quantity]
-    """The coefficients that are given, not identified."""
-    base: Mapping[str, float]
-    """The coefficients of the base and those that are known: the centre of the prior."""
-    requests: Requests
-    """The requests that concern the remaining curves."""
-    thrusters: Layout | None = None
-    """The thrusters that give the forces of a wrench along these axes; None where rov.toml does not say."""
 
 
 @dataclass(frozen=True)
@@ -68,31 +48,66 @@ class TestContents:
         return {*self.steady, *self.time_constants, *self.logs}
 
 
-@dataclass(frozen=True)
-class Narrowing:
-    """The vehicle that can be identified from the tests, or the mistakes that prevent it."""
+@dataclass(frozen=True, eq=False)
+class Tests:
+    """All tests of a folder, and what is known about their vehicle before the identification."""
 
-    given: GivenVehicle | None
-    rov_file_mistakes: tuple[str, ...] = ()
-    """Lines about rov.toml."""
-    test_mistakes: tuple[str, ...] = ()
-    """Lines about missing tests, and about coefficients that are both given and tested."""
-    findings: tuple[Finding, ...] = ()
-    """What is left out of the vehicle."""
+    folder: Folder
+    description: Description
+    """The vehicle as rov.toml describes it."""
+    head: Head
+    vehicle: Vehicle
+    """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
+    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
+    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
+    known: Mapping[str, Quantity]
+    """The coefficients that are given, not identified."""
+    base: Mapping[str, float]
+    """The coefficients of the base and those that are known: the centre of the prior."""
+    requests: Requests
+    """The requests that concern the remaining curves."""
+    thrusters: Layout | None
+    """The thrusters that give the forces of a wrench along these axes; None where rov.toml does not say."""
+    tested: TestContents
+    findings: tuple[Finding, ...]
+    """What was left out of the vehicle and of the files."""
+    inputs: Mapping[str, str] = field(default_factory=dict)
+    """The SHA3-256 of every file that was read, by its name."""
+
+    def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
+        """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
+        layout = self.vehicle.layout
+        names = layout.curves_by_name if kind == "thrust" else layout.by_name
+        for (other, subject), some in self.folder.rows.items():
+            if other == kind and subject in names:
+                yield subject, some
+
+    def counts(self, kind: str, subject: str, command: float) -> bool:
+        """Return True if a command is inside the window of rov.toml."""
+        low, high = window_of(self.description, kind, subject)
+        return low <= command <= high
 
 
-def narrowed(description: Description, tested: TestContents, folder: Path, useless: Sequence[str] = ()) -> Narrowing:
+def window_of(description: Description | None, kind: str, subject: str) -> tuple[float, float]:
+    """Return the least and the largest command of a table that count by rov.toml."""
+    windows = description.tables.windows if description else {}
+    return windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+
+
+def narrowed(found: Folder, description: Description, tested: TestContents, useless: Sequence[str]) -> Tests | None:
     """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
 
-    `useless` has a line for each log that tests nothing.
+    The mistakes are added to those of the folder, and there is no vehicle then. `useless` has a line for each log that
+    tests nothing.
     """
     known = {**_kept_from_base(description, tested), **description.known}
     wide = _without_unknown_options(description.layout, known)
     axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
     layout = with_axes_alone(wide, axes)
     if not layout.axes:
-        line = f"{folder}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
-        return Narrowing(None, test_mistakes=tuple(useless) or (line,))
+        line = f"{found.path}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
+        found.mistakes += useless or [line]
+        return None
     hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
     own = None
     if description.thrusters:
@@ -103,23 +118,23 @@ def narrowed(description: Description, tested: TestContents, folder: Path, usele
             own = with_axes_alone(own, axes)
             hardware += check_layout(own, tested.axes)
     hardware += _missing_hardware(description, layout, known)
-    tests = [*_missing_or_doubled_tests(description, tested, layout, known)]
-    if hardware or tests or description.tables.vehicle is None:
-        in_rov_file = tuple(f"{description.path}: {mistake}" for mistake in hardware)
-        return Narrowing(None, in_rov_file, tuple(f"{folder}: {mistake}" for mistake in tests))
-    given = replace(_given(description, description.tables.vehicle, layout, known), thrusters=own)
-    return Narrowing(given, findings=tuple(_left_out(description, tested, layout)))
-
-
-def _given(description: Description, head: Head, layout: Layout, known: Mapping[str, Quantity]) -> GivenVehicle:
+    tests, head = [*_missing_or_doubled_tests(description, tested, layout, known)], description.tables.vehicle
+    if hardware or tests or head is None:
+        found.rov_file_mistakes += lines_on(description.path, hardware)
+        found.mistakes += lines_on(found.path, tests)
+        return None
     names = layout.coefficients
-    return GivenVehicle(
+    return Tests(
+        folder=found,
         description=description,
         head=head,
         vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
-        requests=description.requests.of({curve.name for curve in layout.curves}),
+        requests=description.requests.of(layout.curves_by_name),
+        thrusters=own,
+        tested=tested,
+        findings=tuple(_left_out(description, tested, layout)),
     )
 
 
@@ -205,7 +220,7 @@ def _left_out(description: Description, tested: TestContents, layout: Layout) ->
     if description.layout.coupled and not layout.coupled:
         yield Finding("not coupled")
     for name, (file, _) in tested.thrust.items():
-        if name not in {curve.name for curve in layout.curves}:
+        if name not in layout.curves_by_name:
             yield Finding("unused curve", curve=name, file=file)
 
 

@@ -10,18 +10,18 @@ from math import inf, log
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import Axis
-from rov_fmu.equation.parts import Curve
+from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.identify.assess import logarithms
-from rov_fmu.identify.beginning import QUANTITIES, Tests
+from rov_fmu.identify.beginning import table_rows
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
-from rov_fmu.identify.likelihood.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import LEAST_NOISE, Point, Prediction
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -60,7 +60,7 @@ class HeldOut:
     """With all effects."""
 
 
-class Known:
+class Knowledge:
     """How much of what all data tell of some numbers a part of them tells."""
 
     def __init__(self, objective: Objective, best: Minimum) -> None:
@@ -92,7 +92,7 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
     other logs and the other half. Where that does not know enough either, nothing is held out.
     """
     logs, rows = objective.whole.logs, objective.whole.rows
-    known, found = Known(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], Part]]()
+    known, found = Knowledge(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], Part]]()
     for n in logs:
         others = [m for m in logs if m != n]
         words = "the other log" if len(others) == 1 else f"the other {len(others)} logs"
@@ -201,7 +201,7 @@ def _predicted(
                 deviation=deviation,
                 unchanged=_unchanged(record.time[at], measured, span),
                 noise=objective.table.get(z, "white noise", m.channel.quantity.name),
-                error=float(np.sqrt(np.mean(off**2))),
+                error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 loss=cost(off, deviation**2) / len(off),
                 compared=measured - compared.innovations[at] if compared else None,
@@ -226,31 +226,23 @@ def ahead(
     noise and the uncertainty of the parameters. Raises DivergedError.
     """
     run = objective.run(z, number, begin=begin, span=span)
-    slopes = _slopes(objective, number, z, covariance, run, begin, span)
-    deviations = np.sqrt(run.variances + np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+    parameters = enumerate(objective.table.parameters)
+    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
+    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
+    slopes = np.zeros((len(run.innovations), len(z)))
+    slopes[:, places] = objective.changes(z, number, places, steps, run, begin, span)
+    deviations = np.sqrt(run.variances + variances_of(slopes, covariance))
     wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
     lost = wraps[objective.records[number].sensor]
     return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
 
 
-def _slopes(
-    objective: Objective, number: int, z: Array, covariance: Array, run: Run, begin: float, span: float
-) -> Array:
-    """Return the derivatives of the predictions of a log with respect to the parameters of the motion, n x p."""
-    found = np.zeros((len(objective.records[number].time), len(z)))
-    parameters = enumerate(objective.table.parameters)
-    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
-    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
-    found[:, places] = objective.changes(z, number, places, steps, run, begin, span)
-    return found
-
-
 def _unchanged(time: Array, values: Array, span: float) -> float:
     """Return the RMS change of a quantity since the start of its prediction."""
     if span == inf:
-        return float(np.sqrt(np.mean((values - values[0]) ** 2)))
+        return rms(values - values[0])
     first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
-    return float(np.sqrt(np.mean((values - values[first]) ** 2)))
+    return rms(values - values[first])
 
 
 def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
@@ -271,7 +263,7 @@ def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
             if at.sum() < 10:
                 continue
             unchanged = _unchanged(record.time[at], record.value[at], AHEAD)
-            ratio = float(np.sqrt(np.mean(off[at] ** 2))) / max(m.noise, LEAST_NOISE * unchanged)
+            ratio = rms(off[at]) / max(m.noise, LEAST_NOISE * unchanged)
             found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), ratio)
     return found
 
@@ -281,22 +273,15 @@ def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
 
 def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
-    quantity = QUANTITIES[kind]
-    for subject, rows in tests.rows(kind):
+    for row, one in table_rows(tests, vehicle.layout, kind):
+        subject = one.subject.name
         if only and subject != only:
             continue
-        for row in rows:
-            of: Curve | Axis = (
-                next(c for c in vehicle.layout.curves if c.name == subject)
-                if kind == "thrust"
-                else vehicle.layout.by_name[subject].axis
-            )
-            one = TableRow(f"{quantity} of {subject}", of, quantity, row.command, row.value, 1.0)
-            unit = {"thrust": "N", "time_constant": "s"}.get(kind) or vehicle.layout.by_name[subject].axis.unit
-            out = values.get((quantity, subject, row.command), np.nan)
-            counts = tests.counts(kind, subject, row.command)
-            numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
-            yield Point(subject, quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+        unit = {"thrust": "N", "time_constant": "s"}.get(kind) or AXES[subject].unit
+        out = values.get((one.quantity, subject, row.command), np.nan)
+        counts = tests.counts(kind, subject, row.command)
+        numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
+        yield Point(subject, one.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
 def held_out_rows(objective: Objective, best: Minimum) -> Values:
@@ -304,7 +289,7 @@ def held_out_rows(objective: Objective, best: Minimum) -> Values:
 
     It is NaN where the other data do not know enough of it.
     """
-    rows, known = objective.rows, Known(objective, best)
+    rows, known = objective.rows, Knowledge(objective, best)
     found: dict[tuple[str, str, float], float] = {}
     groups: dict[tuple[str, str, float], list[int]] = {}
     for n, row in enumerate(rows):

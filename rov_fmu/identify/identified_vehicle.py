@@ -14,13 +14,12 @@ import numpy as np
 from rov_fmu import __version__
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Part, VehicleAxis
-from rov_fmu.identify.beginning import Tests
-from rov_fmu.identify.given import GivenVehicle
+from rov_fmu.equation.parts import Part
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF
 from rov_fmu.identify.likelihood.objective import changed
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Interval
 from rov_fmu.tank.arrays import Array
@@ -48,21 +47,21 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
 
     These have intervals where the tests determine them.
     """
-    given, file = tests.given, fit.file.posterior
+    file = fit.file.posterior
     layout = _layout(tests, fit)
     values = {name: float(value) for name, value in file.table.coefficients(file.z).items()}
-    rov = Vehicle(layout, {name: values.get(name, given.base.get(name, 1.0)) for name in layout.coefficients})
-    known = {name: q for name, q in given.known.items() if name in layout.coefficients}
+    rov = Vehicle(layout, {name: values.get(name, tests.base.get(name, 1.0)) for name in layout.coefficients})
+    known = {name: q for name, q in tests.known.items() if name in layout.coefficients}
     changed = _changed(file, rov)
     coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
     forms = (form for form in layout.axes if form.axis in fit.known.unseen)
     unseen = {form.coefficient(key) for form in forms for key in (*form.keys, "beta")}
     identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
-    base = given.description.base_quantities
+    base = tests.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
     for curve in (c for c in layout.curves if "n_V" in c.keys):
-        asked = given.description.tables.known.get(curve.coefficient("V_0"))
+        asked = tests.description.tables.known.get(curve.coefficient("V_0"))
         reference = asked.source if asked else layout.voltage_source
         for key, source in (("V_0", reference), ("n_V", "The usual exponent, which [priors] takes as exact")):
             if sources[curve.coefficient(key)] == NOT_GIVEN:
@@ -95,16 +94,16 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 error=float(errors[n]) * QUANTILE / NORMAL,
                 correlation=others,
             )
-    validity = given.description.tables.validity
+    validity = tests.description.tables.validity
     made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.inputs))
     vehicle = replace(
         rov,
-        **dict(given.head),
+        **dict(tests.head),
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
         data=None,
-        limits=given.description.limits,
+        limits=tests.description.limits,
         intervals=intervals,
         estimates=estimates,
         provenance=made,
@@ -113,7 +112,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     return vehicle, coefficients
 
 
-def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
+def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
     """Return the vehicle of the file: in place of the forces of a wrench, it has the thrusters of rov.toml.
 
     Without these, its inputs are the loads from outside, X_ext ... Other vehicles are returned as they are. The curves
@@ -121,7 +120,7 @@ def with_own_inputs(vehicle: Vehicle, given: GivenVehicle) -> Vehicle:
     """
     if not vehicle.layout.has_wrench:
         return vehicle
-    own, tables = given.thrusters or Layout((), (), ()), given.description.tables
+    own, tables = tests.thrusters or Layout((), (), ()), tests.description.tables
     layout = replace(vehicle.layout, curves=own.curves, thrusters=own.thrusters, mix=own.mix)
     kept, places = layout.coefficients, layout.keys_in_file
     thrust = {
@@ -267,38 +266,32 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     file = fit.file.posterior
     table = file.table
     present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in file.absent}
-    base, own = tests.given.base, tests.given.description.known
+    base, own = tests.base, tests.description.known
     coefficients: dict[str, float] = table.coefficients(file.z)
 
     def has(part: Part, key: str) -> bool:
         name = part.coefficient(key)
         if key not in part.keys or name in own:
             return key in part.keys
-        value = coefficients[name]
-        by_value = {"V_0": with_voltage, "n_V": with_voltage, "F_0": value != 0.0, "T": value != LEAST_LAG}
-        by_value |= dict.fromkeys(("d", f"d{REVERSE}"), value > 0.0)
-        if key in by_value:
-            return by_value[key]
-        if isinstance(part, Curve) and key in _DEAD_BAND:
-            is_kept = key == "c_0" or name in base or ("dead band astern", part.name) in present
-            return is_kept and value > 0.0
-        if isinstance(part, VehicleAxis) and key.endswith(REVERSE):
-            return name in base or ("drag astern", part.axis.name) in present
-        if isinstance(part, Curve) and key in (f"a_t{REVERSE}", f"b_t{REVERSE}"):
-            is_measured = name in tests.given.known or fit.known.measured_curves.get(part.name, False)
-            return name in base or is_measured or ("reverse thrust", part.name) in present
-        return True
+        if key in ("V_0", "n_V"):
+            return with_voltage
+        if coefficients[name] == ABSENT.get(key.removesuffix(REVERSE)):
+            return False
+        if name in base or not key.endswith(REVERSE) or key not in EFFECT_OF:
+            return True
+        effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
+        return (effect, of) in present or (effect == "reverse thrust" and fit.known.measured_curves.get(of, False))
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
-    with_voltage = tests.given.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    with_voltage = tests.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     return replace(
         layout.with_keys(has),
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
-        mix=tests.given.vehicle.layout.mix,
-        pulse=tests.given.vehicle.layout.pulse,
-        has_dead_time=tests.given.vehicle.layout.has_dead_time,
+        mix=tests.vehicle.layout.mix,
+        pulse=tests.vehicle.layout.pulse,
+        has_dead_time=tests.vehicle.layout.has_dead_time,
     )
 
 

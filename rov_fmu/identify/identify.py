@@ -11,9 +11,10 @@ from threadpoolctl import threadpool_limits
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
-from rov_fmu.identify.beginning import Tests, begin, load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.findings import beyond_thrusters, may_rock, told
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions, structure
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -49,12 +50,12 @@ def identify(tests: Tests, on_progress: Progress = silent) -> Identification:
 
 
 def _identify(tests: Tests, on_progress: Progress) -> Identification:
-    path = tests.given.description.tables.against
+    path = tests.description.tables.against
     against = load_vehicle(path) if path else None
     on_progress("reading the logs", 0.0)
     known, logs, rows = begin(tests)
     if not (known.fitted or known.curves):
-        own = ", ".join(sorted(tests.given.description.known))
+        own = ", ".join(sorted(tests.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
     fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
     show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
@@ -75,7 +76,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     values = held_out_rows(fit.objective, fit.best)
     errors = structure(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
-    of_file = with_own_inputs(vehicle, tests.given)
+    of_file = with_own_inputs(vehicle, tests)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
@@ -138,7 +139,7 @@ def _axis(
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
-    limits = tests.given.description.tables.limits
+    limits = tests.description.tables.limits
     shown = replace(fit.posterior, z=fit.file.posterior.z)
     known = _those_of(coefficients, vehicle.layout.by_name[axis.name], "beta")
     evidence = Evidence(
@@ -174,7 +175,7 @@ def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them."""
-    description = tests.given.description
+    description = tests.description
     shown = {m.sensor.axis for one in fit.objective.logs for m in one.measured}
     for axis in (form.axis for form in vehicle.layout.axes if form.axis not in fit.known.fitted):
         is_of_file = axis.coefficient("a_d") in description.known

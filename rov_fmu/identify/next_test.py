@@ -12,7 +12,7 @@ from rov_fmu.identify.assess import COMMANDS, EXACT
 from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
-from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
@@ -74,7 +74,7 @@ def next_test(
 
 def _widths(slopes: Array, covariance: Array) -> Array:
     """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
-    return np.asarray(np.maximum(QUANTILE * np.sqrt(np.einsum("ni,ij,nj->n", slopes, covariance, slopes)), EXACT))
+    return np.asarray(np.maximum(QUANTILE * np.sqrt(variances_of(slopes, covariance)), EXACT))
 
 
 def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float:

@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
-import numpy as np
-
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.vehicle.description import Word
@@ -21,8 +19,6 @@ Interval = tuple[float, float]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
-PLACED = {True: "velocity sensor", False: "position sensor"}
-"""The sensors that may be beside the origin: those of velocities, and those of positions."""
 _UNUSUAL = 2.5
 """An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 
@@ -36,40 +32,6 @@ LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
 DISAGREEMENT = 40.0
 """The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
-
-
-@dataclass(frozen=True)
-class EffectKind:
-    """What is told of a kind of effect."""
-
-    words: str
-    why_not: str = ""
-    """Why the vehicle file does not have it, after a full stop."""
-    is_ratio: bool = False
-    """True if its coordinate is the logarithm of a ratio."""
-
-
-_WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
-EFFECTS = {
-    "reverse thrust": EffectKind("thrust astern relative to thrust ahead", is_ratio=True),
-    "dead band": EffectKind("dead band"),
-    "dead band astern": EffectKind("dead band astern relative to dead band ahead", is_ratio=True),
-    "advance": EffectKind("loss of thrust with the speed of advance, relative to full thrust"),
-    "lag": EffectKind("time constant of the thrusters"),
-    "dead time": EffectKind(
-        "dead time of the commands", ". The vehicle file does not have it; T_d in [commands] would add it"
-    ),
-    "drag astern": EffectKind("drag astern relative to drag ahead", is_ratio=True),
-    "load": EffectKind("constant load"),
-    "centre of buoyancy": EffectKind("centre of buoyancy"),
-    "current": EffectKind("current", ". It belongs to the water, so the vehicle file does not have it"),
-    **{kind: EffectKind(f"place of the {kind}", _WITHOUT_PLACES) for kind in PLACED.values()},
-    "sensor lag": EffectKind(
-        "time constant", ". The vehicle file does not have it, because it describes the vehicle without its sensors"
-    ),
-    "voltage": EffectKind("exponent of thrust over voltage"),
-}
-"""The kinds of effects, by the kinds of their parameters."""
 
 
 @dataclass(frozen=True)
@@ -138,7 +100,7 @@ class Prediction:
     @property
     def compared_error(self) -> float | None:
         """The RMS error of the vehicle to compare with."""
-        return None if self.compared is None else float(np.sqrt(np.mean((self.measured - self.compared) ** 2)))
+        return None if self.compared is None else rms(self.measured - self.compared)
 
     @property
     def is_judged(self) -> bool:
@@ -392,11 +354,6 @@ class AxisResult:
             key=lambda p: (not p.is_judged, not p.is_position, -p.error / max(p.noise, 1e-12)),
             default=None,
         )
-
-    @property
-    def coverage(self) -> float:
-        """The share of all samples inside their 95 % bands, over the predictions that are judged; NaN without any."""
-        return coverage_of(self.predictions)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,15 +8,14 @@ from rov_fmu.identify.findings import (
     SHARES,
     STOPPING,
     answer_at,
-    assumed_thrust,
     by_heading,
     driven_aside,
     effect_in_words,
     extrapolated,
     name_of,
     next_tests,
-    not_read,
     repairs,
+    sentences,
     size_in_words,
     with_error,
     with_lag,
@@ -87,13 +86,13 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     if kept := [effect for effect in identification.effects if effect.kept]:
         words = (f"{e.name} ({f'{e.of} {effect_in_words(e)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
-    yield from (f"{sentence}." for sentence in assumed_thrust(identification))
+    yield from (f"{sentence}." for sentence in sentences(identification.findings, "assumed thrust"))
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
-    others = not_read(identification.findings)
+    others = sentences(identification.findings, "other files")
     yield from others
-    others += assumed_thrust(identification)
+    others += sentences(identification.findings, "assumed thrust")
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))

@@ -23,3 +23,8 @@ def spread(values: Array) -> float:
     """Return the distance between the smallest and the largest finite value, or 0."""
     there = values[np.isfinite(values)]
     return float(np.ptp(there)) if len(there) else 0.0
+
+
+def rms(values: Array) -> float:
+    """Return the root of the mean of the squares of values."""
+    return float(np.sqrt(np.mean(np.square(values))))

@@ -11,7 +11,8 @@ import tomlkit
 from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records
-from rov_fmu.identify.result import EFFECTS, MOST_UNKNOWN
+from rov_fmu.identify.likelihood.kinds import EFFECTS
+from rov_fmu.identify.result import MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
 from rov_fmu.identify.verdict import RULES, _largest
 from tests.commands import ROOT

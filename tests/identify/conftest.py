@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
-from rov_fmu.identify.beginning import Tests, begin, load_tests
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.result import Identification

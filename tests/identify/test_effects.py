@@ -11,7 +11,7 @@ from scipy.stats import t
 
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
-from rov_fmu.identify import beginning
+from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
 from rov_fmu.identify.held_out import ahead, cautious
@@ -41,9 +41,7 @@ def found(fit: Fit, **others: float) -> Fit:
     return replace(fit, posterior=replace(posterior, z=kept), file=replace(fit.file, posterior=file))
 
 
-def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
-    fit: Fit, short: beginning.Tests
-) -> None:
+def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(fit: Fit, short: given.Tests) -> None:
     """A number is determined where its error is at most 0.8 times that of its prior, which is 0.5 for the inertia."""
     clear = found(fit, dead_band_astern=0.0)
     inertia = {"heave": 0.79 * 0.5, "yaw": 0.81 * 0.5}
@@ -84,7 +82,7 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
 
 
-def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: beginning.Tests) -> None:
+def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: given.Tests) -> None:
     bare = dict.fromkeys(("dead_time", "dead_band", "advance", "drag_astern", "load"), 0.0)
     plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
     assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2

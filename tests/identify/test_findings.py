@@ -30,6 +30,7 @@ from rov_fmu.identify.result import (
     Point,
     Slip,
     UnknownForce,
+    coverage_of,
 )
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -273,7 +274,7 @@ def test_the_main_prediction_is_that_of_a_position_over_10_s_with_the_largest_er
     assert axis.main is one
     short = replace(one, time=TIME[:60], coverage=0.5)
     (axis,) = surge(predictions=(whole, short, one)).axes
-    assert axis.coverage == pytest.approx((0.5 * 60 + 0.95 * 600) / 660)
+    assert coverage_of(axis.predictions) == pytest.approx((0.5 * 60 + 0.95 * 600) / 660)
     assert quiet().seconds == pytest.approx(2 * 60.0, rel=0.01)
 
 

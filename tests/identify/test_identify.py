@@ -11,12 +11,12 @@ from scipy.stats import binom
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify import beginning
+from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import facts, warnings
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood.parameters import PRIORS, USUAL_EXPONENT
-from rov_fmu.identify.result import AxisResult, Identification
+from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
+from rov_fmu.identify.result import AxisResult, Identification, coverage_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
@@ -137,7 +137,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     base = load_vehicle(REFIT)
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
     tests = read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', responses(TRUTH, YAW))
-    assert tests.given.vehicle.layout == base.layout
+    assert tests.vehicle.layout == base.layout
     assert tests.inputs.keys() == {"rov.toml", "videoray_refit", "steady_yaw.csv", "time_constant_yaw.csv"}
     result = identify(tests)
     about = {finding.axis or finding.curve for finding in result.findings}
@@ -247,7 +247,7 @@ def test_the_file_of_a_measured_curve_tells_how_far_off_its_forces_are(
 def of_logs(identified: Identified) -> Identification:
     """Identify heave from forces, two logs, and one that teaches nothing."""
 
-    def tests(folder: Path) -> beginning.Tests:
+    def tests(folder: Path) -> given.Tests:
         (with_logs(folder, HEAVE, 2) / "log_heave_2.csv").write_text(STILL, encoding="utf-8")
         return load_tests(folder)
 
@@ -288,7 +288,7 @@ def test_unseen_logs_are_predicted_and_the_noise_of_the_sensor_is_found(of_logs:
         off = p.measured - p.predicted
         assert p.error == pytest.approx(np.sqrt(np.mean(off**2)))
         assert p.coverage == pytest.approx(np.mean(np.abs(off) < 1.96 * p.deviation))
-    assert of_axis(of_logs, HEAVE).coverage > 0.9
+    assert coverage_of(of_axis(of_logs, HEAVE).predictions) > 0.9
     (sensor,) = of_logs.sensors
     assert (sensor.axis, sensor.quantity, sensor.unit, sensor.samples) == (HEAVE, "depth", "m", 2 * 300)
     assert np.hypot(sensor.white, sensor.coloured) == pytest.approx(0.005, rel=0.15)
@@ -337,7 +337,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"
     assert all(p.error < share * p.unchanged for p in heave.predictions)
-    assert heave.coverage > 0.75
+    assert coverage_of(heave.predictions) > 0.75
 
 
 # ---- What rov.toml says ----------------------------------------------------------------------------------------------

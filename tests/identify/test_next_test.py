@@ -113,4 +113,4 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
 def test_percent_are_a_fraction(tmp_path: Path) -> None:
     rov = f'base = "videoray"\n{HEAD}[limits]\ncommand_max = "60 %"\n'
     tests = read(tmp_path, rov, {"steady_heave.csv": f"{SPEED}\n0.3,0.163\n"})
-    assert tests.given.description.tables.limits == TankLimits(command_max=0.6)
+    assert tests.description.tables.limits == TankLimits(command_max=0.6)

@@ -95,7 +95,7 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
         load_tests(tmp_path)
     weigh(tmp_path)
     tests = load_tests(tmp_path)
-    assert tests.given.vehicle["m_rov"] == 12.0
+    assert tests.vehicle["m_rov"] == 12.0
     assert axes <= {*tests.tested.logs}
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
@@ -168,7 +168,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace("[axes.yaw]", "")  # its column may stay
     thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
     (tmp_path / "rov.toml").write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
-    assert [*load_tests(tmp_path).given.vehicle.layout.by_name] == ["heave"]
+    assert [*load_tests(tmp_path).vehicle.layout.by_name] == ["heave"]
 
 
 def test_a_log_in_another_language_lacks_only_what_units_do_not_tell(tmp_path: Path, inspect: Inspect) -> None:

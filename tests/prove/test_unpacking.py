@@ -60,7 +60,7 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
     "the same path with two slashes": (_member("binaries//a.so"), f"member 'binaries//a.so': {_PATH}"),
     "the same path with capital letters": (
         _member("MODELDescription.xml"),
-        "member 'modelDescription.xml': is the path of another member, too, on systems where",
+        "member 'modelDescription.xml': is the path of another member, too, where",
     ),
     "a device of Windows": (_member("resources/con.txt"), f"member 'resources/con.txt': {_PATH}"),
     "a blank at the end": (_member("resources/x "), f"member 'resources/x ': {_PATH}"),

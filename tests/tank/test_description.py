@@ -45,8 +45,8 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", run(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
-    assert tests.given.vehicle.layout.by_name["heave"].keys == ("m_a", "a_d", "b_d")
-    assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.given.known}
+    assert tests.vehicle.layout.by_name["heave"].keys == ("m_a", "a_d", "b_d")
+    assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.known}
     found = identify(tests).vehicle
     for name in ("a_d_w", "b_d_w", "beta_w"):
         assert found[name] == pytest.approx(true[name], rel=0.05)
@@ -63,7 +63,7 @@ def test_thrust_ahead_leaves_reverse_as_it_is(
     curve = base.layout.curves[0]
     rows = "".join(f"{c},{1.1 * base.curve_force(curve, c):.6f}\n" for c in commands)
     tests = read(tmp_path, BLUEROV2, {"thrust_T200.csv": f"{FORCE}\n{rows}"})
-    assert tests.given.vehicle.layout.curves[0].keys == keys
+    assert tests.vehicle.layout.curves[0].keys == keys
     if len(commands) == 2:
         found = identify(tests).vehicle
         assert found.curve_force(curve, 0.6) == pytest.approx(1.1 * base.curve_force(curve, 0.6), rel=2e-3)
@@ -81,8 +81,8 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
         limits = LIMITS.format(-1, 1, 0.2, 0.21, 0, 1e4, 1e4)
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}{limits}', responses(k, SWAY))
-        assert [*tests.given.vehicle.layout.by_name] == ["surge", "sway", "heave", "yaw"]
-        assert tests.given.vehicle.layout.by_name["sway"].keys == keys
+        assert [*tests.vehicle.layout.by_name] == ["surge", "sway", "heave", "yaw"]
+        assert tests.vehicle.layout.by_name["sway"].keys == keys
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
     assert folder / "old.toml" in inputs
@@ -96,7 +96,7 @@ def test_the_coupling_of_the_base_can_be_changed(base: str, coupling: bool | Non
     own = "" if coupling is None else f"[body]\ncoupling = {str(coupling).lower()}\n"
     tests = read(tmp_path, f'base = "{base}"\n{HEAD}{own}', responses(vehicle, HEAVE))
     wanted = vehicle.layout.coupled if coupling is None else coupling
-    assert tests.given.vehicle.layout.coupled == (wanted and base != "videoray")
+    assert tests.vehicle.layout.coupled == (wanted and base != "videoray")
     assert ("not coupled" in [finding.kind for finding in tests.findings]) == (wanted and base == "videoray")
 
 
@@ -115,8 +115,8 @@ def test_the_base_of_the_command_line_may_lie_anywhere(
     tests = load_tests(folder, inputs.extend, elsewhere)
     assert elsewhere in inputs
     assert [*tests.inputs][:2] == [ROV_FILE, "mine.toml"]
-    assert not tests.given.vehicle.layout.coupled
-    assert load_tests(folder, base=SHIPPED["bluerov2"]).given.description.base_name == "bluerov2"
+    assert not tests.vehicle.layout.coupled
+    assert load_tests(folder, base=SHIPPED["bluerov2"]).description.base_name == "bluerov2"
     for given, target, message in (
         (elsewhere, elsewhere, "would overwrite"),
         (tmp_path / "none.toml", tmp_path / "out.toml", f"{tmp_path / 'none.toml'}: there is no such file"),
@@ -146,7 +146,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     header = ",".join([*names, "surge distance [m]", "depth [m]"])
     tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
     tests = read(tmp_path, f"{rov}[axes.heave]\n", tables)
-    assert [*tests.given.vehicle.layout.by_name] == tests.tested.logs == ["surge"]
+    assert [*tests.vehicle.layout.by_name] == tests.tested.logs == ["surge"]
     assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.findings
     assert any(
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line
@@ -162,7 +162,7 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
     tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
         file.write(f"\n[fit]\nlag = {lag}\n")
-    assert load_tests(tests).given.requests.lag == curves
+    assert load_tests(tests).requests.lag == curves
 
 
 GIVEN = {"a_d_w": 40.0, "F_0_w": -1.0, "T_t200": 0.3, "c_0_t200": 0.02}
@@ -185,6 +185,6 @@ def test_a_number_of_rov_toml_is_in_the_vehicle_as_it_is(names: tuple[str, ...],
 
 def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
     (text,) = re.findall(r"```toml\n(base = .*?)```", (DOCS / "identify.md").read_text(encoding="utf-8"), re.DOTALL)
-    given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"}).given
+    given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"})
     assert given.head.name == "Our BlueROV2"
     assert given.vehicle.layout == load_vehicle(SHIPPED["bluerov2"]).layout

@@ -44,7 +44,7 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
         }
     upward = [(row.command, row.value) for row in steady["heave"] if row.command < 0.0]
     assert upward == [(-0.7, -0.37), (-0.5, -0.25), (-0.3, -0.17), (-0.2, -0.13)][::-1]
-    known = found.given.known
+    known = found.known
     assert {name: q.value for name, q in known.items()} == {
         name: vehicle[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
     }

@@ -14,7 +14,8 @@ from typing import Protocol
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.beginning import Tests, begin, load_tests
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded

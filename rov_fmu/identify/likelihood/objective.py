@@ -30,7 +30,8 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
-from rov_fmu.identify.likelihood.parameters import LEAST_LAG, Parameter, Table
+from rov_fmu.identify.likelihood.kinds import LEAST_LAG
+from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -154,6 +155,16 @@ def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
     return found
 
 
+def derivatives(function: Callable[[Array], Array], z: Array, places: Sequence[int], steps: Array) -> Array:
+    """Return the derivatives of m numbers with respect to k of the coordinates, by steps to both sides: m x k.
+
+    The function returns m x n numbers for p x n coordinates.
+    """
+    moves = [(k, sign * step) for k, step in zip(places, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
+    found = function(changed(z, moves))
+    return np.asarray((found[:, ::2] - found[:, 1::2]) / (2.0 * steps))
+
+
 def cost(innovations: Array, variances: Array) -> float:
     """Return the sum over the samples of log S + rho(eps^2 / S)."""
     u = innovations**2 / variances
@@ -232,17 +243,19 @@ class Objective:
 
         They are those of `run`, whose gains the filter keeps. Raises DivergedError.
         """
-        moves = [(k, sign * step) for k, step in zip(places, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
 
-        def some(first: int) -> list[Run | None]:
-            sets = self.table.of_log(changed(z, moves[first : first + _TOGETHER]), self.logs[n])
-            return self.filters[n].run_many(self.records[n], sets, run, frozen=True, begin=begin, span=span)
+        def innovations(sets: Array) -> Array:
+            def some(first: int) -> list[Run | None]:
+                parameters = self.table.of_log(sets[:, first : first + _TOGETHER], self.logs[n])
+                return self.filters[n].run_many(self.records[n], parameters, run, frozen=True, begin=begin, span=span)
 
-        jobs = [partial(some, first) for first in range(0, len(moves), _TOGETHER)]
-        ends = [one.innovations for runs in in_threads(jobs) for one in runs if one]
-        if len(ends) < len(moves):
-            raise DivergedError
-        return np.array([(up - down) / (2.0 * h) for up, down, h in zip(ends[::2], ends[1::2], steps, strict=True)]).T
+            jobs = [partial(some, first) for first in range(0, sets.shape[1], _TOGETHER)]
+            ends = [one.innovations for runs in in_threads(jobs) for one in runs if one]
+            if len(ends) < sets.shape[1]:
+                raise DivergedError
+            return np.reshape(ends, (len(ends), len(run.innovations))).T
+
+        return derivatives(innovations, z, places, steps)
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
         """Return False where a parameter certainly does not change what is predicted of a log."""
@@ -389,16 +402,14 @@ class Objective:
 
     def _rows_data(self, z: Array) -> Data:
         places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
-        moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps, strict=True)]
-        off, _ = self.row_values(changed(z, [(0, 0.0), *moves]))
-        _, variances = self.row_values(z)
+        off, variances = self.row_values(z)
+        of_motion = derivatives(lambda sets: self.row_values(sets)[0], z, places, steps)
         noises = [k for k, one in enumerate(self.table.parameters) if one.kind == "row noise"]
         names = [self.table.parameters[k].of for k in noises]
-        up, down = np.split(off[:, 1:], 2, axis=1)
         of_noise = np.array([[2.0 * (row.noise == name) for name in names] for row in self.rows])
-        slopes = np.hstack([(up - down) / (2.0 * steps), np.zeros_like(of_noise)])
+        slopes = np.hstack([of_motion, np.zeros_like(of_noise)])
         log_slopes = np.hstack([np.zeros((len(off), len(places))), of_noise])
-        return Data(off[:, 0], variances, slopes, log_slopes, [*places, *noises], len(z))
+        return Data(off, variances, slopes, log_slopes, [*places, *noises], len(z))
 
     @cached_property
     def _of_rows(self) -> list[int]:

@@ -1,75 +1,23 @@
-"""The parameters of the likelihood: one table with what each is, its prior, and how it enters the model.
-
-Every parameter has a coordinate z with a normal prior, z ~ N(mean, deviation). A positive number enters as exp(z). The
-deviations are those that an engineer would accept; PRIORS has them with their reasons, and [priors] of rov.toml may
-change them. No deviation is estimated from one effect.
-"""
+"""The parameters of the likelihood: their priors, of the kinds of kinds.py, and how they enter the model."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
-from math import inf, log
+from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
+from math import log
 from typing import Any
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import CURVE, HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
+from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SLOW, Coordinate
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.result import PLACED
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
-
-@dataclass(frozen=True)
-class Prior:
-    """A deviation that priors use, with its reason."""
-
-    deviation: float
-    words: str
-    """What deviates."""
-    reason: str
-
-
-PRIORS = {
-    "thrust": Prior(0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
-    "thrust_shape": Prior(0.10, "the shape of a curve, relative to its force", "published curves differ so"),
-    "thrust_reverse": Prior(0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"),
-    "dead_band": Prior(0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
-    "dead_band_astern": Prior(0.3, "ln of the dead band astern to that ahead", "propellers are made for one direction"),
-    "advance": Prior(0.2, "the share of full thrust lost per m/s ahead", "propellers give no thrust at 3 to 10 m/s"),
-    "lag": Prior(0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
-    "dead_time": Prior(0.05, "the time from a command to its effect, s", "links of one or two control periods"),
-    "inertia": Prior(0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
-    "quadratic_drag": Prior(1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"),
-    "linear_drag": Prior(1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"),
-    "drag_astern": Prior(0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
-    "buoyancy": Prior(0.02, "each coordinate of the centre of buoyancy, m", "floats and ballast are moved so far"),
-    "load": Prior(0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
-    "current": Prior(0.1, "the current, m/s", "tests are made in calm water"),
-    "sensor_lag": Prior(0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
-    "sensor_place": Prior(0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"),
-    "voltage": Prior(0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
-    "slow_force": Prior(2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
-    "slow_gain": Prior(
-        0.35, "ln of the size of a slow change of thrust", "1 %, to a factor of 2, or it acts as thrust"
-    ),
-    "slow_velocity": Prior(2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"),
-    "white_noise": Prior(0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
-    "coloured_noise": Prior(1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"),
-}
-"""All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is
-absent. The noise of a sensor is never exact."""
-
-_SIZES = {"force": (0.001, 1e-7, 0.1), "gain": (0.01, 1e-6, 0.2), "velocity": (0.001, 1e-7, 0.3)}
-"""The usual, the least and the largest size of each slow process: relative to full thrust, a fraction, and m/s."""
-SLOW = {"slow force": 8.0, "slow gain": 60.0, "slow velocity": 8.0}
-"""The time constants of the slow processes, s."""
-_COLOURED = (0.3, 2.0)
-"""The usual coloured noise relative to the white noise, and its usual correlation time, s."""
 _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
 _LINEAR = 0.3
@@ -80,45 +28,25 @@ _PLACES = ("forward", "to starboard", "down")
 """The parts of the place of a sensor."""
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
-USUAL_EXPONENT = 1.5
-"""The usual exponent of thrust over voltage."""
-_USUAL_LAG = 0.05
-"""The usual time constant of the lag of thrusters, s."""
+DRAG = {"quadratic drag": "a_d", "linear drag": "b_d"}
+"""The kinds of drag, and the keys of their coefficients."""
 _MOTION_STEP = 3e-6
 """The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
 less than a per cent."""
-LEAST_LAG = 0.02
-"""The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
-
-_ABSENT = {"F_0": 0.0, "c_0": 0.0, "d": 0.0, "n_V": 0.0, "T": LEAST_LAG}
-"""The values of coefficients that a vehicle file may lack. Those astern are then equal to those ahead."""
 
 
 @dataclass(frozen=True)
-class Parameter:
+class Parameter(Coordinate):
     """One parameter of the likelihood."""
 
     kind: str
-    """What it is, such as `quadratic drag`. Those with a `null` are effects."""
+    """Its key in KINDS, such as `quadratic drag`. Those with a `null` are effects."""
     of: str
     """The name of the axis, the curve or the file that has it; empty for the vehicle."""
     part: str = ""
     """Which of several, such as `north` or a quantity."""
-    mean: float = 0.0
-    deviation: float = 1.0
-    """The prior of its coordinate z."""
-    is_log: bool = False
-    """True if the number is exp(z)."""
-    low: float = -inf
-    high: float = inf
-    """The bounds of z."""
-    null: float | None = None
-    """The z at which an effect is absent."""
-    of_motion: bool = True
-    """False for noise and slow processes, which change the covariance of the filter and not its mean."""
     log: int | None = None
     """The index of the log that alone has it."""
-    unit: str = "1"
 
     @property
     def is_effect(self) -> bool:
@@ -149,10 +77,6 @@ def with_same_lag(sensor: Sensor) -> str:
         return "of the turn rate sensor" if sensor.axis.is_rotation else "of the velocity sensor"
     own = {HEAVE: "depth", YAW: "heading", ROLL: "attitude", PITCH: "attitude"}
     return f"of the {own.get(sensor.axis, 'position')} sensor"
-
-
-_noise = partial(Parameter, is_log=True, of_motion=False)
-"""The parameter of a noise or of the size of a slow process."""
 
 
 @dataclass(frozen=True)
@@ -202,7 +126,7 @@ class Table:
 
     def _axis(self, found: dict[str, Any], z: Array, form: VehicleAxis) -> None:
         axis = form.axis
-        for key, kind in (("a_d", "quadratic drag"), ("b_d", "linear drag")):
+        for kind, key in DRAG.items():
             name = axis.coefficient(key)
             found[name] = self.get(z, kind, axis.name, default=found[name])
             astern = f"{key}{REVERSE}"
@@ -278,7 +202,7 @@ class Table:
         names = {keys: name for name, keys in places.items()}
         for name, (*part, key) in places.items():  # a coefficient astern stands after that ahead
             ahead = values.get(names.get((*part, key.removesuffix(REVERSE)), ""))
-            if name not in values and tuple(part) in parts and (value := _ABSENT.get(key, ahead)) is not None:
+            if name not in values and tuple(part) in parts and (value := ABSENT.get(key, ahead)) is not None:
                 values[name] = value
         return replace(self, base={**self.base, **values}, exact=frozenset(values), shape_deviation=0.0)
 
@@ -371,74 +295,88 @@ def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[
     return Table(known.layout, known.coefficients, known.full, found, shape, known.exact)
 
 
+Make = Callable[..., Iterator[Parameter]]
+"""A function that yields a parameter of a kind, unless its prior is exact."""
+
+
 def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
     def prior(key: str) -> float:
         """Return a deviation. Where the thrust is exact, so is its shape."""
         is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
-    found = [*_of_curves(known, prior), *_advance(known, prior("advance")), *_of_axes(known, prior)]
-    if (logs or known.has_times) and prior("lag"):
+    def make(
+        kind: str, of: str = "", part: str = "", deviation: float | None = None, **own: Any
+    ) -> Iterator[Parameter]:
+        usual = {one.name: getattr(KINDS[kind], one.name) for one in fields(Coordinate)} | own
+        if deviation is None:
+            deviation = prior(declared.key) if (declared := KINDS[kind].prior) else usual["deviation"]
+        if deviation > 0.0:
+            yield Parameter(kind, of, part, **usual | {"deviation": deviation})
+
+    if logs or known.has_times:
         T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
-        mean, width = (T, max(prior("lag"), T)) if known.with_lag else (_USUAL_LAG, prior("lag"))
-        yield Parameter("lag", "", mean=mean, deviation=width, low=LEAST_LAG, null=LEAST_LAG, unit="s")
+        width = prior("lag")
+        yield from make("lag", deviation=width and max(width, T), mean=T) if known.with_lag else make("lag")
     if logs:
         for part, key in CENTRE.items():
-            if prior("buoyancy") and key in {*known.layout.restoring} - known.exact:
-                yield Parameter("centre of buoyancy", "", part, deviation=prior("buoyancy"), null=0.0, unit="m")
-        if prior("dead_time"):
-            yield Parameter("dead time", "", deviation=prior("dead_time"), low=0.0, null=0.0, unit="s")
-        if prior("voltage") and any("n_V" in c.keys for c in known.curves):
-            low, high = CURVE["n_V"].minimum, CURVE["n_V"].maximum  # an effect that is absent is below
-            yield Parameter(
-                "voltage", "", mean=USUAL_EXPONENT, deviation=prior("voltage"), low=low, high=high, null=0.0
-            )
-        yield from _of_sensors(logs, prior)
-    yield from (p for p in found if p.deviation > 0.0)
+            if key in {*known.layout.restoring} - known.exact:
+                yield from make("centre of buoyancy", "", part)
+        yield from make("dead time")
+        if any("n_V" in c.keys for c in known.curves):
+            yield from make("voltage")
+        yield from _of_sensors(logs, make)
+    yield from _of_curves(known, make, prior("thrust_shape"))
+    yield from _advance(known, make)
+    yield from _of_axes(known, make)
     for number, one in enumerate(logs):
-        yield from _of_one_log(one, number, prior)
-    yield from _of_noise(known, logs, prior)
+        yield from _of_one_log(one, number, make)
+    yield from _of_noise(known, logs, make)
     for name in row_noises:
-        yield _noise("row noise", name, mean=log(0.03), deviation=1.0, low=log(1e-3))
+        yield from make("row noise", name)
 
 
-def _of_curves(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_curves(known: Beginning, make: Make, shape: float) -> Iterator[Parameter]:
     for curve in known.curves:
         name = curve.name
         is_measured = name in known.measured_curves
-        scale = 1.0 if is_measured else known.thrust_errors.get(name, prior("thrust"))
-        shape = prior("thrust_shape")
-        yield Parameter("thrust scale", name, deviation=scale, is_log=True)
+        yield from make("thrust scale", name, deviation=1.0 if is_measured else known.thrust_errors.get(name))
         if curve.tables:
             continue
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
-            shapes = [Parameter("thrust shape", name, str(n + 1)) for n in range(COUNT)]
-            ends = ("", REVERSE) if is_told_astern else ("",)
-            linear = [_linear(curve, known.coefficients, end, _LINEAR if is_measured else shape) for end in ends]
+            shapes = [one for n in range(COUNT) for one in make("thrust shape", name, str(n + 1), deviation=1.0)]
+            linear = [
+                one
+                for end in (("", REVERSE) if is_told_astern else ("",))
+                for one in make(
+                    "linear thrust",
+                    name,
+                    "astern" if end else "",
+                    low=_least_linear(curve, known.coefficients, end),
+                    deviation=_LINEAR if is_measured else None,
+                )
+            ]
             bends = name in known.bent
             yield from shapes if bends else map(_held, shapes)
             yield from map(_held, linear) if bends else linear
         if has_reverse:
-            ratio = 0.5 if is_measured else prior("thrust_reverse")
             # Forces that were measured astern are data, and not an effect that may be absent.
-            yield Parameter("reverse thrust", name, deviation=ratio, null=None if is_told_astern else 0.0)
+            null = {"null": None} if is_told_astern else {}
+            yield from make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
-            mean = known.coefficients[curve.coefficient("c_0")]
-            width = prior("dead_band")
-            yield Parameter("dead band", name, mean=mean, deviation=width, low=0.0, high=0.5, null=0.0)
+            yield from make("dead band", name, mean=known.coefficients[curve.coefficient("c_0")])
             astern = curve.coefficient(f"c_0{REVERSE}")
             if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
-                yield Parameter("dead band astern", name, deviation=prior("dead_band_astern"), null=0.0)
+                yield from make("dead band astern", name)
 
 
-def _advance(known: Beginning, deviation: float) -> Iterator[Parameter]:
+def _advance(known: Beginning, make: Make) -> Iterator[Parameter]:
     """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
     for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
-            mean = _lost(curve, known.coefficients)
-            yield Parameter("advance", curve.name, mean=mean, deviation=deviation, low=0.0, null=0.0, unit="s/m")
+            yield from make("advance", curve.name, mean=_lost(curve, known.coefficients))
 
 
 def _lost(curve: Curve, c: Mapping[str, float]) -> float:
@@ -446,14 +384,13 @@ def _lost(curve: Curve, c: Mapping[str, float]) -> float:
     return c[curve.coefficient("d")] / (c[curve.coefficient("a_t")] + c[curve.coefficient("b_t")])
 
 
-def _linear(curve: Curve, c: Mapping[str, float], end: str, deviation: float) -> Parameter:
-    """Return the parameter of the linear share of a thrust.
+def _least_linear(curve: Curve, c: Mapping[str, float], end: str) -> float:
+    """Return the least linear share of a thrust beside that of its prior, with which it is not negative.
 
-    It is not negative. A negative share would take the place of a dead band d, because a (c - d)^2 is almost
-    a c^2 - 2 a d c.
+    A negative share would take the place of a dead band d, because a (c - d)^2 is almost a c^2 - 2 a d c.
     """
     a, b = (c[curve.name_of(f"{key}{end}")] for key in ("a_t", "b_t"))
-    return Parameter("linear thrust", curve.name, "astern" if end else "", deviation=deviation, low=-b / (a + b))
+    return -b / (a + b)
 
 
 def _held(p: Parameter) -> Parameter:
@@ -461,37 +398,31 @@ def _held(p: Parameter) -> Parameter:
     return replace(p, deviation=1e-3, low=0.0, high=0.0)
 
 
-def _of_axes(known: Beginning, prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_axes(known: Beginning, make: Make) -> Iterator[Parameter]:
+    c, free = known.coefficients, {*known.layout.coefficients} - known.exact
     for axis in (*known.fitted, *known.unseen):
-        name, c = axis.name, known.coefficients
+        name = axis.name
         if axis.coefficient("beta") not in known.exact:
-            yield Parameter("inertia", name, deviation=prior("inertia"), is_log=True)
-        for key, kind, width in (
-            ("a_d", "quadratic drag", prior("quadratic_drag")),
-            ("b_d", "linear drag", prior("linear_drag")),
-        ):
+            yield from make("inertia", name)
+        for kind, key in DRAG.items():
             if axis.coefficient(key) not in known.exact:
-                mean = log(max(c[axis.coefficient(key)], 1e-9))
-                yield Parameter(kind, name, mean=mean, deviation=width, is_log=True)
-        free = {*known.layout.coefficients} - known.exact
+                yield from make(kind, name, mean=log(max(c[axis.coefficient(key)], 1e-9)))
         if axis in known.fitted and axis.coefficient(f"a_d{REVERSE}") in free:
-            yield Parameter("drag astern", name, deviation=prior("drag_astern"), null=0.0)
+            yield from make("drag astern", name)
         if (load := known.layout.by_name[name].coefficient("F_0")) in free and known.full[name]:
-            null = -c[load] / known.full[name]
-            yield Parameter("load", name, deviation=prior("load"), null=null)
+            yield from make("load", name, null=-c[load] / known.full[name])
 
 
-def _of_one_log(one: SampledLog, number: int, prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
     file, half = one.log.file, 0.5 * one.interval
-    least = max(half, 0.005)
-    yield Parameter("logging offset", file, mean=-half, deviation=least, log=number, unit="s")
-    yield Parameter("logging width", file, mean=0.5, deviation=0.5, low=0.0, high=1.0, of_motion=False, log=number)
-    if (one.has_positions or one.has_velocities) and prior("current"):
+    yield from make("logging offset", file, mean=-half, deviation=max(half, 0.005), log=number)
+    yield from make("logging width", file, log=number)
+    if one.has_positions or one.has_velocities:
         for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
-            yield Parameter("current", file, part, deviation=prior("current"), null=0.0, log=number, unit="m/s")
+            yield from make("current", file, part, log=number)
 
 
-def _of_sensors(logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:
+def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     """Yield the places of the sensors whose velocity or position changes as the vehicle turns, and all lags."""
     for is_velocity, kind in PLACED.items():
         turns = {
@@ -500,40 +431,29 @@ def _of_sensors(logs: Sequence[SampledLog], prior: Callable[[str], float]) -> It
             for form in one.layout.axes
             if form.axis.is_rotation and any(s.is_velocity == is_velocity and has_place(s) for s in one.record.sensors)
         }
-        parts = _PLACES if turns - {YAW} else _PLACES[:2] if turns else ()
-        for part in parts if prior("sensor_place") else ():
-            yield Parameter(kind, "", part, deviation=prior("sensor_place"), null=0.0, unit="m")
-    lags = {with_same_lag(sensor) for one in logs for sensor in one.record.sensors}
-    for part in sorted(lags) if prior("sensor_lag") else ():
-        yield Parameter("sensor lag", "", part, deviation=prior("sensor_lag"), low=0.0, null=0.0, unit="s")
+        for part in _PLACES if turns - {YAW} else _PLACES[:2] if turns else ():
+            yield from make(kind, "", part)
+    for part in sorted({with_same_lag(sensor) for one in logs for sensor in one.record.sensors}):
+        yield from make("sensor lag", "", part)
 
 
-def _of_noise(known: Beginning, logs: Sequence[SampledLog], prior: Callable[[str], float]) -> Iterator[Parameter]:
-    def size(kind: str, of: str, key: str) -> Iterator[Parameter]:
-        """Yield the size of a slow process, unless it is exactly 0."""
-        usual, least, largest = _SIZES[key]
-        if deviation := prior(f"slow_{key}"):
-            mean, low, high = log(usual), log(least), log(largest)
-            yield _noise(kind, of, mean=mean, deviation=deviation, low=low, high=high, null=low)
-
+def _of_noise(known: Beginning, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in (form.axis for form in known.layout.axes):
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
-            yield from size("slow force", axis.name, "force")
+            yield from make("slow force", axis.name)
     if logs and not known.layout.fins:
-        yield from size("slow gain", "", "gain")
+        yield from make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
-        yield from size("slow velocity", HEAVE.name, "velocity")
+        yield from make("slow velocity", HEAVE.name)
     if any(one.has_positions or one.has_velocities for one in logs):
-        yield from size("slow velocity", "horizontal", "velocity")
+        yield from make("slow velocity", "horizontal")
     noises: dict[str, list[float]] = {}
     for one in logs:
         for m in one.measured:
             noises.setdefault(m.channel.quantity.name, []).append(m.noise)
     for quantity, some in noises.items():
-        white, coloured = prior("white_noise"), prior("coloured_noise")
         mean = log(sorted(some)[len(some) // 2])
-        yield _noise("white noise", quantity, mean=mean, deviation=white, low=mean - _QUIETER)
-        usual, time = _COLOURED
-        yield _noise("coloured noise", quantity, mean=log(usual), deviation=coloured)
-        yield _noise("correlation time", quantity, mean=log(time), deviation=coloured, unit="s")
+        yield from make("white noise", quantity, mean=mean, low=mean - _QUIETER)
+        yield from make("coloured noise", quantity)
+        yield from make("correlation time", quantity)

@@ -11,8 +11,8 @@ from math import log
 
 import numpy as np
 
-from rov_fmu.identify.likelihood.objective import changed
-from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.objective import derivatives
+from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.result import Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
@@ -66,10 +66,9 @@ class Posterior:
         """
         places = [*self.of_vehicle]
         steps = 0.05 * self.errors[places] + 1e-9
-        moves = [(k, sign * step) for sign in (1.0, -1.0) for k, step in zip(places, steps.tolist(), strict=True)]
-        up, down = np.split(function(changed(self.z, moves)), 2, axis=1)
-        found = np.zeros((len(up), len(self.z)))
-        found[:, places] = (up - down) / (2.0 * steps)
+        some = derivatives(function, self.z, places, steps)
+        found = np.zeros((len(some), len(self.z)))
+        found[:, places] = some
         return found
 
     @cached_property
@@ -87,6 +86,11 @@ class Posterior:
         return values(self.z[:, None])[:, 0], G @ self.covariance @ G.T, (G * prior) @ G.T
 
 
+def variances_of(slopes: Array, covariance: Array) -> Array:
+    """Return the variances of m numbers with these derivatives (m x p) with respect to coordinates, m."""
+    return np.asarray(np.einsum("ni,ij,nj->n", slopes, covariance, slopes))
+
+
 def around(value: float, error: float, *, positive: bool = False) -> Interval:
     """Return the 95 % interval of a number. For a positive number, its logarithm has the symmetric distribution."""
     half = QUANTILE * error
@@ -94,11 +98,6 @@ def around(value: float, error: float, *, positive: bool = False) -> Interval:
         factor = float(np.exp(min(half / value, 50.0)))
         return value / factor, value * factor
     return value - half, value + half
-
-
-def number(p: Parameter, z: float) -> float:
-    """Return the number that a coordinate stands for."""
-    return float(np.exp(z)) if p.is_log else float(z)
 
 
 def hull(*intervals: Interval) -> Interval:

@@ -8,13 +8,14 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import SLOW, Parameter
+from rov_fmu.identify.likelihood.parameters import Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 
 _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
@@ -87,12 +88,12 @@ def _disturbance(
     size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))
     time, unit, usual = objective.records[number].time, "1", 1.0
     if parameter.kind == "slow gain":
-        size = _rms(np.expm1(states))
+        size = rms(np.expm1(states))
     elif parameter.kind == "slow force":
         assert axis
         unit = axis.load
         usual = max(
-            _rms(thrust_along(objective, z, number, time[::10], axis)), _LITTLE * objective.table.full[axis.name]
+            rms(thrust_along(objective, z, number, time[::10], axis)), _LITTLE * objective.table.full[axis.name]
         )
     elif parameter.kind == "slow velocity":
         unit = "m/s"
@@ -101,7 +102,7 @@ def _disturbance(
             for n, form in enumerate(one.layout.axes)
             if not form.axis.is_rotation and (form.axis is HEAVE) == (axis is HEAVE)
         ]
-        usual = max(_rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
+        usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
     clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
     since = float(time[clear[0]] - time[0]) if len(clear) else None
     kind = _KINDS[parameter.kind]
@@ -125,7 +126,3 @@ def _place(objective: Objective, number: int, parameter: Parameter) -> int:
     if parameter.kind == "slow velocity":
         return filter_of.drift + (2 if parameter.of == HEAVE.name else 0)
     return filter_of.force + names.index(parameter.of) if parameter.of in names else -1
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -25,7 +25,8 @@ from math import hypot, log, pi
 import numpy as np
 
 from rov_fmu.equation.catalogue import REVERSE, Axis
-from rov_fmu.identify.beginning import Tests, begin
+from rov_fmu.identify.beginning import begin
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
 from rov_fmu.identify.likelihood.objective import Objective

@@ -8,7 +8,7 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.held_out import Known, held_out, predictions, structure, unseen_current
+from rov_fmu.identify.held_out import Knowledge, held_out, predictions, structure, unseen_current
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, Part
@@ -34,7 +34,7 @@ def test_the_current_of_an_unseen_log_is_about_that_of_the_others() -> None:
 def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit) -> None:
     """A log of heave and one of yaw: neither knows anything of the other's axis (e12 and e13 of the experience)."""
     objective, best = fit.objective, fit.best
-    known = Known(objective, best)
+    known = Knowledge(objective, best)
     for n, (axis, other) in enumerate(((HEAVE, YAW), (YAW, HEAVE))):
         alone = Part([n], objective.whole.rows)
         assert known.informs(axis, alone)

@@ -5,7 +5,7 @@ from threadpoolctl import threadpool_limits
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify import assess, held_out
-from rov_fmu.identify.beginning import Tests
+from rov_fmu.identify.given import Tests
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
