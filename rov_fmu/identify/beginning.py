@@ -70,12 +70,12 @@ def load_tests(
     useless = [one.refusal(folder) for one in logs] if not tested.axes else []
     if not tested.thrust:
         found.mistakes += useless
+    found.mistakes += _without_force(found)
     tests = None
     # If no axis was found, it may be in a file that could not be read.
     if description and (tested.axes or not found.mistakes):
         tests = narrowed(found, description, tested, useless)
     found.rov_file_mistakes += _wrong_priors(found)
-    found.mistakes += _without_force(found)
     if mistakes := [*found.rov_file_mistakes, *found.mistakes]:
         raise (DataFileError if found.mistakes else VehicleFileError)(*mistakes)
     assert tests
