@@ -98,7 +98,10 @@ def build(
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
     beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
     key = private_key(sign) if sign else None
-    targets = [output, *(other.path for other in beside), *([signature_path(output)] if key else [])]
+    signature = signature_path(output)
+    if not key and not force and signature.is_file():
+        raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
+    targets = [output, *(other.path for other in beside), *([signature] if key else [])]
     check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])])
     check_written(output, FMU)
     if output.suffix.lower() != ".fmu":
@@ -123,7 +126,7 @@ def build(
     packed = archive(files, partial(meta_data, vehicle, files))
     lost = sorted(_platforms_in(output) - _folders(files))
     if key:
-        beside.append(Output(signature_path(output), signed(packed, key)))
+        beside.append(Output(signature, signed(packed, key)))
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
     write_whole(draft, *beside, force=force, is_ours=_is_as_built)

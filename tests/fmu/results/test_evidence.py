@@ -444,6 +444,24 @@ def test_bad_keys_and_signatures_are_one_line(
         assert refused(fmu, code=2) == expected
 
 
+def test_an_fmu_without_a_signature_does_not_take_the_place_of_a_signed_one(
+    signed_fmu: Path, tmp_path: Path, capsys: Capsys
+) -> None:
+    fmu = Path(shutil.copy(signed_fmu, tmp_path))
+    signature = Path(shutil.copy(f"{signed_fmu}.sig", tmp_path))
+    before = fmu.read_bytes()
+    assert main(["build", str(_REFIT), "-o", str(fmu)]) == 2
+    said = f"rov-fmu: {signature}: signs the FMU that this one replaces: sign again, or remove the signature\n"
+    assert capsys.readouterr().err == said
+    assert fmu.read_bytes() == before
+
+
+def test_without_hashes_prove_says_so(videoray_fmu: Path, tmp_path: Path, capsys: Capsys) -> None:
+    files = {name: content for name, content in _read(videoray_fmu).items() if name != META_DATA}
+    assert main(["prove", str(_write(tmp_path / "bare.fmu", files))]) == 0
+    assert "The FMU has no hashes of its files, and it is not signed" in " ".join(capsys.readouterr().out.split())
+
+
 def test_without_the_library_a_line_says_what_to_install(
     signed_fmu: Path, keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
