@@ -141,6 +141,11 @@ def test_no_answer_of_an_axis_of_the_base_is_told_but_how_to_identify_it(
         assert test in texts["terminal"]
         assert test.casefold() in texts["report"].casefold()
     assert "depth" in test
+    rows = html.fromstring(documentation_page(result.vehicle)).xpath("//table[.//th='Motion']/tbody/tr")
+    cells = [[cell.text_content() for cell in row.xpath("td")] for row in rows]
+    assert {("Surge", "not identified"), ("Heave", "not identified")} == {tuple(row) for row in cells if len(row) == 2}
+    assert {row[0].split()[0] for row in cells if len(row) > 2} == {"Yaw"}
+    assert result.vehicle.shown_axis is YAW
     heads = html.fromstring(report_page(result)).xpath("//th[@scope='row']")
     assert {f"{SURGE.positive}{SURGE.name}", f"{HEAVE.positive}{HEAVE.name}"}.isdisjoint(
         one.text_content().casefold() for one in heads
