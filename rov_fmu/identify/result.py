@@ -319,17 +319,19 @@ def with_stop(sentence: str) -> str:
 
 @dataclass(frozen=True)
 class AxisOfBase:
-    """An axis of the vehicle that no test identifies."""
+    """An axis of the base or of rov.toml that no test identifies."""
 
     axis: Axis
     source: str
-    """The base, or rov.toml."""
+    """The base, or rov.toml; empty where nothing is known about the axis, so that the vehicle lacks it."""
     reason: str
     """Such as `nothing in the logs shows it`."""
 
     @property
     def verdict(self) -> Verdict:
         """The word, with where its coefficients are from."""
+        if not self.source:
+            return Verdict("not identified", (f"{self.reason}, so the vehicle has no {self.axis.name}",))
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
 
 
@@ -428,13 +430,13 @@ class Identification:
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
-    """The other axes of the vehicle."""
+    """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()
     """What to tell, in the order of its weight. The sentences and severities are in findings.py."""
 
     @property
     def verdicts(self) -> dict[Axis, Verdict]:
-        """The verdict of every axis of the vehicle, those that are identified first."""
+        """The verdict of every axis of the base and of rov.toml, those that are identified first."""
         found = {one.axis: one.verdict for one in self.axes}
         return found | {one.axis: one.verdict for one in self.axes_of_base}
 
