@@ -30,7 +30,7 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
-from rov_fmu.io.numbers import significant, with_interval
+from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank import findings
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
@@ -454,7 +454,7 @@ def with_error(known: tuple[float, Interval], unit: str) -> str:
         return "-"
     half = max(abs(end / value - 1.0) for end in interval)
     words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{half:.0%}" if half < 1.0 else f"{words} ±>100%"
+    return f"{words} ±{percent(half, '>')}"
 
 
 def _ranges(identification: Identification) -> Iterator[Range]:
@@ -617,11 +617,11 @@ _REMEDIES = {
 def _disturbance(d: Disturbance) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.size, d.unit), f"{d.share:.0%}"
+    size, share = size_in_words(d.size, d.unit), percent(d.share)
     push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
     where = axis or "surge and sway"
     kind, what = {
-        "gain": ("change of thrust", f"the thrust changes slowly by {d.size:.0%} (RMS)"),
+        "gain": ("change of thrust", f"the thrust changes slowly by {percent(d.size)} (RMS)"),
         "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
         "force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
     }[d.kind]
