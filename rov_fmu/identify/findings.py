@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.result import (
     DISAGREEMENT,
@@ -289,7 +289,9 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     found += [*_on_forces(identification), *_on_scale(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
-    found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
+    found += [
+        _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
+    ]
     for log_of in identification.folder.logs:
         found += _on_log(identification, log_of)
     found += filter(None, map(_logging, identification.logging))
@@ -614,12 +616,12 @@ _REMEDIES = {
 """What each cause means, or what takes it into account."""
 
 
-def _disturbance(d: Disturbance) -> Finding:
+def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
     size, share = size_in_words(d.size, d.unit), percent(d.share)
     push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
-    where = axis or "surge and sway"
+    where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     kind, what = {
         "gain": ("change of thrust", f"the thrust changes slowly by {percent(d.size)} (RMS)"),
         "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),

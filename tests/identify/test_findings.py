@@ -140,7 +140,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "velocity over ground",
         disturbance("velocity", axis=None, since=0.9),
-        "surge and sway: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
+        "surge: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
         None,
     ),
     (
