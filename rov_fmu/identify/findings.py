@@ -26,6 +26,7 @@ from rov_fmu.identify.result import (
     Interval,
     Logging,
     Prediction,
+    half_width,
     relative_error,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
@@ -348,14 +349,17 @@ def how_to_identify(one: AxisOfBase) -> str:
 def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
-        f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
+        f"{test.axis.name}: {test.words}. {test.target[:1].upper()}{test.target[1:]}, now ±{percent(test.now, '>')}, "
+        f"becomes ±{percent(test.then, '>')}."
         for test in tests
         if test.is_useful
     ]
-    nothing = "no single test would make an interval a tenth narrower. The widest is that of {}: {}, ±{:.0%}."
+    nothing = (
+        "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, ±{}."
+    )
     if not useful and repairs(identification):
         return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
-    return useful or [nothing.format(test.axis.name, test.target, test.now) for test in tests[:1]]
+    return useful or [nothing.format(test.axis.name, test.target, percent(test.now, ">")) for test in tests[:1]]
 
 
 def repairs(identification: Identification) -> list[str]:
@@ -454,9 +458,8 @@ def with_error(known: tuple[float, Interval], unit: str) -> str:
     value, interval = known
     if not 0.0 < abs(value) < inf:
         return "-"
-    half = max(abs(end / value - 1.0) for end in interval)
     words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{percent(half, '>')}"
+    return f"{words} ±{percent(half_width(known), '>')}"
 
 
 def _ranges(identification: Identification) -> Iterator[Range]:

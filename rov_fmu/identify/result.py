@@ -335,6 +335,12 @@ class AxisOfBase:
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
 
 
+def half_width(known: tuple[float, Interval]) -> float:
+    """Return the larger half of the interval of a number, relative to the number."""
+    value, interval = known
+    return max(abs(end / value - 1.0) for end in interval)
+
+
 @dataclass(frozen=True)
 class NextTest:
     """The test that would narrow an axis's most uncertain answer most."""
@@ -351,8 +357,8 @@ class NextTest:
 
     @property
     def is_useful(self) -> bool:
-        """True if the interval would become at least a tenth narrower."""
-        return self.then < 0.9 * self.now
+        """True if the interval would become at least a tenth narrower, and in whole percent, too."""
+        return self.then < 0.9 * self.now and f"{self.then:.0%}" != f"{self.now:.0%}"
 
 
 @dataclass(frozen=True)
