@@ -436,20 +436,7 @@ def extrapolated(vehicle: Vehicle) -> list[str]:
 
 def with_lag(identification: Identification) -> list[str]:
     """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
-    from rov_fmu.identify.likelihood.curves import NO_SHAPES  # `tune` has no need of the filter, which these load
-    from rov_fmu.identify.likelihood.objective import TableRow, modelled
-
-    vehicle, told = identification.vehicle, []
-    for result in identification.axes:
-        axis, half = result.axis, answer_at(result, 0.5)
-        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.thrusters_along(axis)}
-        T = max(({*lags} & vehicle.coefficients.keys()), key=lambda name: vehicle[name], default="")
-        if half and T:
-            row = TableRow("", axis, "Tau", half.command, half.rise[0], 1.0)
-            time = float(modelled([row], vehicle, NO_SHAPES)[0])
-            ends = zip(half.rise[1], vehicle.intervals.get(T, (vehicle[T],) * 2), strict=True)
-            low, high = (time + end - half.rise[0] + lag - vehicle[T] for end, lag in ends)
-            told.append(f"{with_error((time, (low, high)), 's')} ({axis.name})")
+    told = [f"{with_error(one.lagged, 's')} ({one.axis.name})" for one in identification.axes if one.lagged]
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 

@@ -164,6 +164,7 @@ def _axis(
         predictions=own,
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        lagged=assess.time_with_lag(fit.posteriors, axis, vehicle, pushes, fits) if answers else None,
     )
 
 

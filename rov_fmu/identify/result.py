@@ -387,6 +387,8 @@ class AxisResult:
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[Point, ...]
     next_test: NextTest | None
+    lagged: tuple[float, Interval] | None = None
+    """The time to 63 % of the steady velocity at half command with the lag of the thrusters, s; None without a lag."""
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
 
