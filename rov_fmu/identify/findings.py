@@ -105,6 +105,7 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
             "Munk forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
         ),
+        "do not use": "{axes}: the model must not be used, and its verdict tells why",
         "implausible tuned alpha": (
             "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "
             "that of the thrust curves, which tests give to better than a factor of 2. Check the wanted V_ss and its "
@@ -283,6 +284,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for result in identification.axes:
         found += [*_on_predictions(result), *_on_coefficients(identification, result)]
         found += [*_on_points(result)]
+        if result.verdict.word == "do not use":
+            found.append(Finding("do not use", result.axis.name))
         if may_rock(identification.folder, result.axis):
             found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():

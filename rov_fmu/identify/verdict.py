@@ -234,7 +234,8 @@ RULES = (
         lambda e: e.inertia,
         None,
         1.0,
-        "The inertia is at most {share} of that of the vehicle in air, which cannot be.",
+        "The inertia is at most {share} of that of the vehicle in air, which cannot be: check the unit of velocity, "
+        "the mass, and a thrust that is assumed.",
         is_least=True,
     ),
     Rule(

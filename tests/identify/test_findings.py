@@ -30,6 +30,7 @@ from rov_fmu.identify.result import (
     Point,
     Slip,
     UnknownForce,
+    Verdict,
 )
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -106,6 +107,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),
     ("second start", quiet(agreement=41.0), "two fits from different starts ended at", quiet(agreement=39.0)),
+    (
+        "do not use",
+        surge(verdict=Verdict("do not use", ("It is not right.",))),
+        "surge: the model must not be used, and its verdict tells why",
+        surge(verdict=Verdict("usable", ("It is not quite right.",))),
+    ),
     (
         "implausible inertia",
         surge(known=(BETA,)),

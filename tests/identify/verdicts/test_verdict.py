@@ -83,7 +83,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"inertia": 0.8},
             "do not use",
-            "The inertia is at most 80% of that of the vehicle in air, which cannot be.",
+            "The inertia is at most 80% of that of the vehicle in air, which cannot be: check the unit of velocity, "
+            "the mass, and a thrust that is assumed.",
         ),
     ],
 )
