@@ -221,10 +221,13 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
         return "The FMU is valid. It was not run, because it has no binary that FMPy loads on this machine.", False
     with temporary_folder("fmu-") as folder:
         fmpy.extract(str(path), unzipdir=folder)
-        axis = vehicle.layout.axes[0].axis
+        axis, others = vehicle.shown_axis, vehicle.unidentified
         start = vehicle.layout.example(axis)
         result = fmpy.simulate_fmu(folder, start_values=start)
     by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
     commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())
     end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {result['time'][-1]:g} s"
-    return f"The FMU is valid. In a run, {commands} gives {end}.", True
+    run = "It runs." if axis in others else f"In a run, {commands} gives {end}."
+    return " ".join(
+        ["The FMU is valid.", run, *(f"{other.name.capitalize()}: not identified." for other in others)]
+    ), True

@@ -9,9 +9,10 @@ from scipy.stats.qmc import Sobol
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
+from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import Answer
+from rov_fmu.identify.result import Answer, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -85,17 +86,43 @@ def answers(
     of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-    narrowest = np.array([least, EXACT, EXACT])
+
+    def more(posterior: Posterior) -> Array:
+        # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
+        of_gain = (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2 * np.array([1.0, 1.0, 0.0])
+        return np.asarray(of_gain + ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None])
+
+    low, high = _intervals(
+        own,
+        posteriors,
+        lambda table: logarithms(table, axis, pushes=pushes),
+        more,
+        fits,
+        np.array([least, EXACT, EXACT]),
+    )
+    low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
+    return _finite(axis, of_file, low, high)
+
+
+def _intervals(
+    own: Array,
+    posteriors: Sequence[Posterior],
+    logarithms_of: Callable[[Table], Callable[[Array], Array]],
+    more: Callable[[Posterior], Array],
+    fits: Sequence[Posterior],
+    narrowest: Array,
+) -> tuple[Array, Array]:
+    """Return both ends of the intervals of numbers with the logarithms `own`, as `answers` tells.
+
+    `more` returns the variances of the logarithms beside those of a posterior.
+    """
     ends = [own - narrowest, own + narrowest]
     for posterior in posteriors:
-        fitted = logarithms(posterior.table, axis, pushes=pushes)
+        fitted = logarithms_of(posterior.table)
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
             slopes = posterior.slopes(fitted)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
-        # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-        variances[:, :2] += (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2
-        variances += ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None]
+        variances = variances_of(slopes, posterior.covariance).reshape(own.shape) + more(posterior)
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
         ends += [middle - half, middle + half]
@@ -104,8 +131,37 @@ def answers(
         lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
         ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
-    low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
-    return _finite(axis, of_file, low, high)
+    return low, high
+
+
+def time_with_lag(
+    posteriors: Sequence[Posterior],
+    axis: Axis,
+    vehicle: Vehicle,
+    pushes: Sequence[float] = (),
+    fits: Sequence[Posterior] = (),
+) -> tuple[float, Interval] | None:
+    """Return the time from rest to 63 % of V_ss at half command, s, with the lag of the thrusters; None without one.
+
+    The lag and the time without it share what the tests tell about their sum, so the interval of the sum is its own.
+    Thrusters beside logs with a wrench have none: no test shows their lag.
+    """
+    curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
+    if pushes or not any(curve.has_lag for curve in curves):
+        return None
+    row = TableRow("", axis, "Tau", 0.5, 1.0, 1.0)
+    time = modelled([row], vehicle, NO_SHAPES).reshape(1)
+    if not np.isfinite(time).all():
+        return None
+
+    def logarithms_of(table: Table) -> Callable[[Array], Array]:
+        return lambda z: np.log(modelled([row], *table.model(z))).reshape(1, -1)
+
+    def more(posterior: Posterior) -> Array:
+        return np.array([(_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2])
+
+    low, high = _intervals(np.log(time), posteriors, logarithms_of, more, fits, np.array([EXACT]))
+    return float(time[0]), (float(low[0]), float(high[0]))
 
 
 def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:

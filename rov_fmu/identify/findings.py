@@ -10,7 +10,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
@@ -26,11 +26,12 @@ from rov_fmu.identify.result import (
     Interval,
     Logging,
     Prediction,
+    half_width,
     relative_error,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
-from rov_fmu.io.numbers import significant, with_interval
+from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank import findings
 from rov_fmu.tank.arrays import rms
 from rov_fmu.tank.catalogue import Quantity
@@ -105,6 +106,7 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "{files}: the vehicle turns while it moves in surge or sway, but the model leaves out the Coriolis and "
             "Munk forces of such a motion: `coupling = true` in [body] of rov.toml adds them"
         ),
+        "do not use": "{axes}: the model must not be used, and its verdict tells why",
         "implausible tuned alpha": (
             "{alpha} = {value:.3g} is not within the usual {low:g} ... {high:g}: the {push} would be {value:.3g} times "
             "that of the thrust curves, which tests give to better than a factor of 2. Check the wanted V_ss and its "
@@ -278,6 +280,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for result in identification.axes:
         found += [*_on_predictions(result), *_on_coefficients(identification, result)]
         found += [*_on_points(result)]
+        if result.verdict.word == "do not use":
+            found.append(Finding("do not use", result.axis.name))
         if may_rock(identification.folder, result.axis):
             found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -285,7 +289,9 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     found += [*_on_forces(identification), *_on_scale(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
-    found += [_disturbance(d) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE]
+    found += [
+        _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
+    ]
     for log_of in identification.folder.logs:
         found += _on_log(identification, log_of)
     found += filter(None, map(_logging, identification.logging))
@@ -342,14 +348,17 @@ def how_to_identify(one: AxisOfBase) -> str:
 def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
-        f"{test.axis.name}: {test.words}. {test.target}, now ±{test.now:.0%}, becomes ±{test.then:.0%}."
+        f"{test.axis.name}: {test.words}. {test.target[:1].upper()}{test.target[1:]}, now ±{percent(test.now, '>')}, "
+        f"becomes ±{percent(test.then, '>')}."
         for test in tests
         if test.is_useful
     ]
-    nothing = "no single test would make an interval a tenth narrower. The widest is that of {}: {}, ±{:.0%}."
+    nothing = (
+        "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, ±{}."
+    )
     if not useful and repairs(identification):
         return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
-    return useful or [nothing.format(test.axis.name, test.target, test.now) for test in tests[:1]]
+    return useful or [nothing.format(test.axis.name, test.target, percent(test.now, ">")) for test in tests[:1]]
 
 
 def repairs(identification: Identification) -> list[str]:
@@ -426,20 +435,7 @@ def extrapolated(vehicle: Vehicle) -> list[str]:
 
 def with_lag(identification: Identification) -> list[str]:
     """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
-    from rov_fmu.identify.likelihood.curves import NO_SHAPES  # `tune` has no need of the filter, which these load
-    from rov_fmu.identify.likelihood.objective import TableRow, modelled
-
-    vehicle, told = identification.vehicle, []
-    for result in identification.axes:
-        axis, half = result.axis, answer_at(result, 0.5)
-        lags = {vehicle.layout.curve_of[t.name].coefficient("T") for t in vehicle.layout.thrusters_along(axis)}
-        T = max(({*lags} & vehicle.coefficients.keys()), key=lambda name: vehicle[name], default="")
-        if half and T:
-            row = TableRow("", axis, "Tau", half.command, half.rise[0], 1.0)
-            time = float(modelled([row], vehicle, NO_SHAPES)[0])
-            ends = zip(half.rise[1], vehicle.intervals.get(T, (vehicle[T],) * 2), strict=True)
-            low, high = (time + end - half.rise[0] + lag - vehicle[T] for end, lag in ends)
-            told.append(f"{with_error((time, (low, high)), 's')} ({axis.name})")
+    told = [f"{with_error(one.lagged, 's')} ({one.axis.name})" for one in identification.axes if one.lagged]
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
@@ -448,9 +444,8 @@ def with_error(known: tuple[float, Interval], unit: str) -> str:
     value, interval = known
     if not 0.0 < abs(value) < inf:
         return "-"
-    half = max(abs(end / value - 1.0) for end in interval)
     words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{half:.0%}" if half < 1.0 else f"{words} ±>100%"
+    return f"{words} ±{percent(half_width(known), '>')}"
 
 
 def _ranges(identification: Identification) -> Iterator[Range]:
@@ -605,14 +600,14 @@ _REMEDIES = {
 """What each cause means, or what takes it into account."""
 
 
-def _disturbance(d: Disturbance) -> Finding:
+def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.size, d.unit), f"{d.share:.0%}"
+    size, share = size_in_words(d.size, d.unit), percent(d.share)
     push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
-    where = axis or "surge and sway"
+    where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     kind, what = {
-        "gain": ("change of thrust", f"the thrust changes slowly by {d.size:.0%} (RMS)"),
+        "gain": ("change of thrust", f"the thrust changes slowly by {percent(d.size)} (RMS)"),
         "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
         "force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
     }[d.kind]

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf, isclose
 from os.path import commonpath
 from pathlib import Path
 from typing import Any
@@ -34,6 +35,8 @@ _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 _DIGITS = (6, 9, 17)
 """The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1:
 more than most tests give, and few enough to be equal on every machine. The others are for very exact data."""
+_UNCHANGED = 1e-5
+"""The relative difference from the base below which a coefficient is that of the base: less than people print."""
 _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 _SAME = 0.1
@@ -70,7 +73,10 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     estimates: dict[str, Estimated] = {}
     names = [name for name in changed if name in identified or name in intervals]
     for name in changed:
-        sources[name] = _SOURCE if name in identified else f"{sources[name]}; adapted to the tests"
+        if name in identified:
+            sources[name] = _SOURCE
+        elif not isclose(rov[name], tests.base.get(name, inf), rel_tol=_UNCHANGED):
+            sources[name] += "; adapted to the tests"
         if name not in {*names, *unseen}:
             sources[name] = "Assumed: the tests do not determine it"
     if names:

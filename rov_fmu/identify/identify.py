@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.equation.catalogue import AXES, SURGE, SWAY, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
@@ -165,6 +165,7 @@ def _axis(
         predictions=own,
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        lagged=assess.time_with_lag(fit.posteriors, axis, vehicle, pushes, fits) if answers else None,
     )
 
 
@@ -174,17 +175,21 @@ def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
-    """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them."""
+    """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them, and those
+    of rov.toml that it lacks, because nothing is known about them."""
     description = tests.description
-    shown = {m.sensor.axis for one in fit.objective.logs for m in one.measured}
-    for axis in (form.axis for form in vehicle.layout.axes if form.axis not in fit.known.fitted):
+    shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
+    shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
+    lacking = [AXES[f.axis] for f in tests.findings if f.kind in ("axis left out", "axis not pushed")]
+    for axis in (*(one.axis for one in vehicle.layout.axes if one.axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known
         told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
         if axis.name in tests.tested.axes:
             told = "no test changes it"
         elif axis in shown:
             told = "nothing in the logs drives it"
-        yield AxisOfBase(axis, ROV_FILE if is_of_file else description.base_name, told)
+        source = ROV_FILE if is_of_file else description.base_name
+        yield AxisOfBase(axis, "" if axis in lacking else source, told)
 
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:

@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import Answer, NextTest
+from rov_fmu.identify.result import Answer, NextTest, half_width
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 
@@ -48,9 +48,9 @@ def next_test(
         return None
     slopes = posterior.slopes(logarithms)
     known = _widths(slopes, posterior.covariance)
-    shown = {a.command: 0.5 * (a.steady[1][1] - a.steady[1][0]) / abs(a.steady[0]) for a in answers}
-    rest = np.array([max(shown.get(c, 0.0) ** 2 - one**2, 0.0) for c, one in zip(COMMANDS, known, strict=True)])
-    now = np.sqrt(known**2 + rest)
+    shown = {a.command: half_width(a.steady) for a in answers}
+    now = np.array([shown.get(c, one) for c, one in zip(COMMANDS, known, strict=True)])
+    rest = np.maximum(now**2 - known**2, 0.0)
     worst = int(np.argmax(now))
     values, vectors = np.linalg.eigh(posterior.covariance / np.outer(posterior.errors, posterior.errors))
     root = posterior.errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))

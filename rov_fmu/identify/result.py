@@ -283,18 +283,26 @@ def with_stop(sentence: str) -> str:
 
 @dataclass(frozen=True)
 class AxisOfBase:
-    """An axis of the vehicle that no test identifies."""
+    """An axis of the base or of rov.toml that no test identifies."""
 
     axis: Axis
     source: str
-    """The base, or rov.toml."""
+    """The base, or rov.toml; empty where nothing is known about the axis, so that the vehicle lacks it."""
     reason: str
     """Such as `nothing in the logs shows it`."""
 
     @property
     def verdict(self) -> Verdict:
         """The word, with where its coefficients are from."""
+        if not self.source:
+            return Verdict("not identified", (f"{self.reason}, so the vehicle has no {self.axis.name}",))
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+
+
+def half_width(known: tuple[float, Interval]) -> float:
+    """Return the larger half of the interval of a number, relative to the number."""
+    value, interval = known
+    return max(abs(end / value - 1.0) for end in interval)
 
 
 @dataclass(frozen=True)
@@ -313,8 +321,8 @@ class NextTest:
 
     @property
     def is_useful(self) -> bool:
-        """True if the interval would become at least a tenth narrower."""
-        return self.then < 0.9 * self.now
+        """True if the interval would become at least a tenth narrower, and in whole percent, too."""
+        return self.then < 0.9 * self.now and f"{self.then:.0%}" != f"{self.now:.0%}"
 
 
 @dataclass(frozen=True)
@@ -343,6 +351,8 @@ class AxisResult:
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[Point, ...]
     next_test: NextTest | None
+    lagged: tuple[float, Interval] | None = None
+    """The time to 63 % of the steady velocity at half command with the lag of the thrusters, s; None without a lag."""
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
 
@@ -387,13 +397,13 @@ class Identification:
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
-    """The other axes of the vehicle."""
+    """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()
     """What to tell, in the order of its weight. The sentences and severities are in findings.py."""
 
     @property
     def verdicts(self) -> dict[Axis, Verdict]:
-        """The verdict of every axis of the vehicle, those that are identified first."""
+        """The verdict of every axis of the base and of rov.toml, those that are identified first."""
         found = {one.axis: one.verdict for one in self.axes}
         return found | {one.axis: one.verdict for one in self.axes_of_base}
 

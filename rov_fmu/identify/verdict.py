@@ -21,6 +21,7 @@ from rov_fmu.identify.result import (
     score_of,
 )
 from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import percent
 from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -95,7 +96,7 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with the value, and with what `names` tells."""
+    """The reason, with the value, with `share`, the value in percent, and with what `names` tells."""
     names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
@@ -123,11 +124,19 @@ def _largest(e: Evidence) -> dict[str, str]:
     largest = max(e.unknown, key=lambda d: d.share)
     is_turn = largest.axis is not None and largest.axis.is_rotation
     what = {
-        "gain": "The thrust changes for an unknown reason by {:.0%}",
-        "force": f"An unknown slow {'torque' if is_turn else 'force'} is as large as {{:.0%}} of the thrusters'",
-        "velocity": "An unknown slow velocity over ground is as large as {:.0%} of the vehicle's",
+        "gain": "The thrust changes for an unknown reason by {}",
+        "force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
+        "velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
     }
-    return {"what": what[largest.kind].format(largest.share), "file": largest.file}
+    return {"what": what[largest.kind].format(percent(largest.share)), "file": largest.file}
+
+
+def _reach(e: Evidence) -> dict[str, str]:
+    """Return how good the predictions are, as the end of a sentence."""
+    score = score_of(e.moving)
+    if score < 0.0:
+        return {"reach": "are worse than no change"}
+    return {"reach": f"reach {percent(score)} of the way from no change (0%) to the noise of the sensors (100%)"}
 
 
 RULES = (
@@ -145,7 +154,7 @@ RULES = (
         lambda e: coverage_of(e.predictions),
         0.8,
         0.6,
-        "The 95% bands contain {value:.0%} of the unseen samples.",
+        "The 95% bands contain {share} of the unseen samples.",
         is_least=True,
         is_told=True,
     ),
@@ -154,7 +163,8 @@ RULES = (
         lambda e: score_of(e.moving),
         0.5,
         0.25,
-        "The predictions reach {value:.0%} of the way from no change (0%) to the noise of the sensors (100%).",
+        "The predictions {reach}.",
+        _reach,
         is_least=True,
     ),
     Rule(
@@ -202,21 +212,21 @@ RULES = (
         lambda e: e.half_width("steady"),
         0.15,
         0.3,
-        "A steady velocity is known to no better than {value:.0%}.",
+        "A steady velocity is known to no better than {share}.",
     ),
     Rule(
         "the same of times and stopping distances",
         lambda e: e.half_width("rise", "stop"),
         0.3,
         None,
-        "A time or a stopping distance is known to no better than {value:.0%}.",
+        "A time or a stopping distance is known to no better than {share}.",
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
         lambda e: e.error_of_tables,
         0.2,
         0.4,
-        "The other commands predict a V_ss of the tables with an error of {value:.0%} (RMS).",
+        "The other commands predict a V_ss of the tables with an error of {share} (RMS).",
         is_told=True,
     ),
     Rule(
@@ -224,7 +234,8 @@ RULES = (
         lambda e: e.inertia,
         None,
         1.0,
-        "The inertia is at most {value:.0%} of that of the vehicle in air, which cannot be.",
+        "The inertia is at most {share} of that of the vehicle in air, which cannot be: check the unit of velocity, "
+        "the mass, and a thrust that is assumed.",
         is_least=True,
     ),
     Rule(
@@ -261,7 +272,7 @@ def verdict(e: Evidence) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
-        rule.sentence.format(value=value, **rule.names(e))
+        rule.sentence.format(value=value, share=percent(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]

@@ -44,6 +44,11 @@ def significant(number: float, digits: int) -> str:
     return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
 
 
+def percent(share: float, beyond: str = "more than ") -> str:
+    """Return a share in percent: `17%`; how far it is above 100 % tells nobody more: `more than 100%`."""
+    return f"{share:.0%}" if share <= 1.0 else f"{beyond}100%"
+
+
 def _plain(number: Decimal) -> str:
     """Return a decimal number with its digits, and with an exponent only where it is very small or very large."""
     return f"{number:f}" if not number or -5 <= number.adjusted() < 6 else f"{number:e}"

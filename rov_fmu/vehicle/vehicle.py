@@ -259,6 +259,18 @@ class Vehicle:
         found = {axis: words.get(axis, "not identified") for axis in self.layout.by_name}
         return [f"{axis}: {word}" for axis, word in found.items() if word not in ("good", "usable")]
 
+    @property
+    def unidentified(self) -> list[Axis]:
+        """The axes that the verdicts call *not identified*, so that no number of their motion is told."""
+        words = self.provenance.words if self.provenance else {}
+        return [form.axis for form in self.layout.axes if words.get(form.axis.name) == "not identified"]
+
+    @property
+    def shown_axis(self) -> Axis:
+        """The axis of examples: the first one that is identified, or without any the first one."""
+        axes = [form.axis for form in self.layout.axes]
+        return next((axis for axis in axes if axis not in self.unidentified), axes[0])
+
     def picture(self, name: str) -> Path | None:
         """Return the path of the vehicle's own picture with this name, or None."""
         own = self.pictures / name if self.pictures else None

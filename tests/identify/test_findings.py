@@ -30,6 +30,7 @@ from rov_fmu.identify.result import (
     Point,
     Slip,
     UnknownForce,
+    Verdict,
     coverage_of,
 )
 from rov_fmu.tank import findings as reading
@@ -108,6 +109,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),
     ("second start", quiet(agreement=41.0), "two fits from different starts ended at", quiet(agreement=39.0)),
     (
+        "do not use",
+        surge(verdict=Verdict("do not use", ("It is not right.",))),
+        "surge: the model must not be used, and its verdict tells why",
+        surge(verdict=Verdict("usable", ("It is not quite right.",))),
+    ),
+    (
         "implausible inertia",
         surge(known=(BETA,)),
         "surge: the vehicle moves as if its inertia were 0.67 times m_rov.",
@@ -141,7 +148,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "velocity over ground",
         disturbance("velocity", axis=None, since=0.9),
-        "surge and sway: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
+        "surge: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
         None,
     ),
     (
@@ -290,17 +297,19 @@ def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
 
 def test_the_next_tests_begin_with_the_widest_interval() -> None:
     tests = [
-        NextTest(axis, f"do {n}", "V_ss at 50%", now, 0.1)
+        NextTest(axis, f"do {n}", "the speed at 50%", now, 0.1)
         for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 0.5), (YAW, 0.1)))
     ]
     axes = [replace(one, next_test=test) for one, test in zip(example().axes, tests, strict=True)]
     assert next_tests(replace(example(), axes=tuple(axes))) == [
-        "heave: do 1. V_ss at 50%, now ±50%, becomes ±10%.",
-        "surge: do 0. V_ss at 50%, now ±20%, becomes ±10%.",
+        "heave: do 1. The speed at 50%, now ±50%, becomes ±10%.",
+        "surge: do 0. The speed at 50%, now ±20%, becomes ±10%.",
     ]
     only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
     fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
-    widest = "no single test would make an interval a tenth narrower. The widest is that of {}: V_ss at 50%, ±{}%."
+    nothing = "no single test would make an interval up to half command a tenth narrower."
+    widest = nothing + " The widest is that of {}: the speed at 50%, ±{}%."
+    assert not replace(tests[0], now=0.034, then=0.026).is_useful, "both are told as 3 %"
     useless = [replace(axis, next_test=replace(test, then=test.now)) for axis, test in zip(axes, tests, strict=True)]
     assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", 50)]
     assert next_tests(fine) == [widest.format("yaw", 10)]
@@ -407,7 +416,7 @@ def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     [
         (0.62, 0.5, 0.64, "m/s", "0.62 m/s ±19%"),
         (0.5, 0.001, 0.7, "rad/s", "29 deg/s ±100%"),
-        (0.5, 0.0, 0.7, "rad", "29 deg ±>100%"),
+        (0.5, -0.1, 0.7, "rad", "29 deg ±>100%"),
         (-0.5, -0.6, -0.4, "1", "-0.50 ±20%"),
         (0.0, 0.0, 0.0, "m", "-"),
         (np.inf, 0.0, np.inf, "m", "-"),

@@ -76,8 +76,9 @@ def documentation_page(
     layout = vehicle.layout
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
-    first = layout.axes[0].axis
+    first = vehicle.shown_axis
     driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
+    told = [axis for axis in driven if axis not in vehicle.unidentified]
     start = layout.example(first)
     return page(
         "index.html.j2",
@@ -110,7 +111,7 @@ def documentation_page(
         moved=float(simulate(vehicle, np.array([0.0, 10.0]), start, [first.velocity]).values[0, 0, -1]),
         moves_at_rest=any(vehicle.derivatives(layout.usual_inputs, layout.at_rest).values()),
         held=held,
-        motions=[motion for axis in driven for motion in _motions(vehicle, axis, held)],
+        motions=[motion for axis in told for motion in _motions(vehicle, axis, held)],
         frames=[image(label, path) for name, label in _PICTURES.items() if (path := vehicle.picture(name))],
         thrusters=[
             _plot(f"Thrusters {view}", partial(draw_thrusters, vehicle=vehicle, scene=scene), scene.inches)
@@ -122,14 +123,14 @@ def documentation_page(
                 f"V_ss over the command: {a.name}",
                 partial(plot_steady, vehicle=vehicle, axis=a, table=tables.get(a.name)),
             )
-            for a in driven
+            for a in told
         ],
         steps=[
             _plot(
                 f"Step responses: {a.name}",
                 partial(plot_steps, vehicle=vehicle, axis=a, commands=held, table=tables.get(a.name)),
             )
-            for a in driven
+            for a in told
         ],
     )
 

@@ -7,9 +7,10 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE
-from rov_fmu.identify.assess import answers, answers_of_file
+from rov_fmu.identify.assess import answers, answers_of_file, time_with_lag
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.result import half_width
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
 from tests.vehicles import VIDEORAY, extended
@@ -51,6 +52,28 @@ def test_answers_are_as_uncertain_as_the_drag_the_thrust_and_the_vehicle_file() 
     for one in answers([of_drag(0.0, 1e-9)], SURGE, VIDEORAY):
         for value, (low, high) in (one.steady, one.rise):
             assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
+
+
+def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_parts() -> None:
+    """The tests tell the sum of both times, not how it is shared: a longer lag goes with less inertia."""
+    rov = extended(VIDEORAY, T_rear=0.2)
+    lag, inertia = Parameter("lag", ""), Parameter("inertia", "surge", is_log=True)
+    table = Table(rov.layout, rov.coefficients, {}, (lag, inertia))
+    z = np.array([0.2, np.log(rov.effective_inertia(rov.layout.by_name["surge"]))])
+
+    def half(posterior: Posterior) -> float:
+        found = time_with_lag([posterior], SURGE, rov)
+        assert found
+        assert found[1][0] < found[0] < found[1][1]
+        return half_width(found)
+
+    alone, opposed, equal = (
+        half(Posterior(table, z, np.array([[0.03**2, r * 0.03 * 0.1], [r * 0.03 * 0.1, 0.1**2]])))
+        for r in (0.0, -0.9, 0.9)
+    )
+    assert opposed < alone < equal
+    assert alone**2 == pytest.approx(0.5 * (opposed**2 + equal**2), rel=0.05), "as variances add"
+    assert time_with_lag([of_drag(0.04, 0.05)], SURGE, VIDEORAY) is None, "it has no lag"
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:

@@ -1,5 +1,6 @@
 """Whether a model may be trusted: every rule lowers a verdict beyond its limits, and says why."""
 
+import re
 from dataclasses import replace
 from math import log
 from typing import Any
@@ -45,14 +46,14 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"disturbances": [FORCE]},
             "do not use",
-            "An unknown slow force is as large as 6% of the thrusters' in log.csv.",
+            "An unknown slow force of 6% of the thrusters' acts in log.csv.",
         ),
         ({"disturbances": [replace(FORCE, evidence=5.0)]}, "good", ""),
         ({"disturbances": [replace(FORCE, cause="the distance")]}, "good", ""),
         (
             {"disturbances": [replace(FORCE, share=0.02), replace(FORCE, axis=YAW, share=0.04)]},
             "do not use",
-            "An unknown slow torque is as large as 4% of the thrusters' in log.csv.",
+            "An unknown slow torque of 4% of the thrusters' acts in log.csv.",
         ),
         (
             {"disturbances": [replace(FORCE, kind="gain", axis=None)]},
@@ -62,7 +63,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"disturbances": [replace(FORCE, kind="velocity")]},
             "do not use",
-            "An unknown slow velocity over ground is as large as 6% of the vehicle's in log.csv.",
+            "An unknown slow velocity over ground of 6% of the vehicle's acts in log.csv.",
         ),
         ({"answers": results.answers(1.0, 0.2)}, "usable", "A steady velocity is known to no better than 20%."),
         ({"answers": ()}, "do not use", "No steady velocity is determined."),
@@ -82,7 +83,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"inertia": 0.8},
             "do not use",
-            "The inertia is at most 80% of that of the vehicle in air, which cannot be.",
+            "The inertia is at most 80% of that of the vehicle in air, which cannot be: check the unit of velocity, "
+            "the mass, and a thrust that is assumed.",
         ),
     ],
 )
@@ -132,6 +134,16 @@ def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
         inside, outside = (verdict(Evidence(**(USUAL | made(x)))).word for x in (limit - 0.01 * step, limit + step))
         assert outside == word
         assert WORDS.index(inside) < WORDS.index(outside)
+
+
+@pytest.mark.parametrize("size", [1.7, 1e20])
+def test_no_reason_has_a_percentage_beyond_0_and_100(size: float) -> None:
+    kinds = ("unknown dist", "half-width of the widest V_ss", "the same of times", "held-out V_ss")
+    for made in [*(MADE[kind](size) for kind in kinds), MADE["score G"](-size)]:
+        reasons = " ".join(verdict(Evidence(**(USUAL | made))).reasons)
+        shares = [float(number) for number in re.findall(r"(-?[\d.]+)%", reasons)]
+        assert all(0.0 <= share <= 100.0 for share in shares), reasons
+        assert "more than 100%" in reasons or "worse than no change" in reasons
 
 
 def test_the_score_is_0_for_no_change_and_1_for_the_noise() -> None:
