@@ -98,14 +98,14 @@ def build(
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
     beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
     key = private_key(sign) if sign else None
-    signature = signature_path(output)
-    if not key and not force and signature.is_file():
-        raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
-    targets = [output, *(other.path for other in beside), *([signature] if key else [])]
+    targets = [output, *(other.path for other in beside), *([signature_path(output)] if key else [])]
     check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])])
     check_written(output, FMU)
     if output.suffix.lower() != ".fmu":
         raise FileError(f"{output}: the name must end with .fmu")
+    signature = signature_path(output)
+    if not key and not force and signature.is_file():
+        raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
     check_replaced(targets, force=force, is_ours=_is_as_built)
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, native=native, fmi=fmi, interface=interface)
