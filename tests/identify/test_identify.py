@@ -165,7 +165,7 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
             noisy = (f"{c},{float(y) * (1.0 + share * random.standard_normal())}" for c, y in rows)
             tables[name] = "\n".join([header, *noisy, ""])
         found = identify(read(tmp_path / str(n), KNOWN, tables))
-        for name in ("a_d_w", "b_d_w", "beta_w"):
+        for name in {"a_d_w", "b_d_w", "beta_w"} & found.vehicle.intervals.keys():  # a lag may hide the inertia
             low, high = found.vehicle.intervals[name]
             covered.setdefault(name, []).append(low <= TRUTH[name] <= high)
         for answer in found.axes[0].answers:
@@ -173,7 +173,8 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
             for name, (_, (low, high)), true in (("V_ss", answer.steady, V_ss), ("Tau", answer.rise, Tau)):
                 covered.setdefault(f"{name} {answer.command}", []).append(low <= true <= high)
     assert len(covered) == 3 + 2 * 6
-    assert min(map(sum, covered.values())) >= binom.ppf(0.001, 20, 0.95), {k: sum(v) for k, v in covered.items()}
+    missed = {key: (sum(v), len(v)) for key, v in covered.items() if sum(v) < binom.ppf(0.001, len(v), 0.95)}
+    assert not missed
 
 
 @pytest.mark.long

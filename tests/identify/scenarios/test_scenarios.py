@@ -15,7 +15,7 @@ from tests.report.results import without_findings
 BY_DEFAULT = {"load of 0.1 N in heave": 1}
 """The quick scenarios of the default tests, and the number of their seeds."""
 OFTEN = ("clean", "delay and lag", "gaps while turning", "pilot", "tether", "tilt with roll and pitch")
-"""The scenarios that the long tests run with 5 seeds. All of them are run with more seeds once a week."""
+"""The scenarios that the long tests run with 2 seeds. All of them are run with more seeds once a week."""
 WEEKLY = {
     **dict.fromkeys(SCENARIOS, 200),
     **dict.fromkeys(OWNERS, 20),
@@ -32,7 +32,7 @@ def judged() -> Iterator[object]:
     for name in SCENARIOS:
         yield pytest.param(name, WEEKLY[name], marks=pytest.mark.weekly, id=f"{name}-{WEEKLY[name]}")
     for name in OFTEN:
-        yield pytest.param(name, 5, marks=pytest.mark.long, id=f"{name}-5")
+        yield pytest.param(name, 2, marks=pytest.mark.long, id=f"{name}-2")
     for name, seeds in BY_DEFAULT.items():
         yield pytest.param(name, seeds, id=f"{name}-{seeds}")
 

@@ -20,7 +20,7 @@ def test_a_right_model_is_good(name: str) -> None:
     assert line.far == (0, 0)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(2))
 def test_verdicts_keep_what_they_promise(seed: int) -> None:
     """The command of `verdicts.py` has the numbers of many seeds."""
