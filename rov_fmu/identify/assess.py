@@ -155,7 +155,11 @@ def time_with_lag(
         return None
 
     def logarithms_of(table: Table) -> Callable[[Array], Array]:
-        return lambda z: np.log(modelled([row], *table.model(z))).reshape(1, -1)
+        def of(z: Array) -> Array:
+            with np.errstate(divide="ignore", invalid="ignore"):  # far from the fit, a time may be no number
+                return np.asarray(np.log(modelled([row], *table.model(z)))).reshape(1, -1)
+
+        return of
 
     def more(posterior: Posterior) -> Array:
         return np.array([(_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2])

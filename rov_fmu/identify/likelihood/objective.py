@@ -398,7 +398,8 @@ class Objective:
                 raise DivergedError
             width = own.step if below is run else 2.0 * own.step
             into.slopes[:, column] = (above.innovations - below.innovations) / width
-            into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
+            with np.errstate(invalid="ignore"):  # a variance that is lost in rounding makes the step diverge
+                into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
         places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
