@@ -104,7 +104,6 @@ def names(lines: Sequence[str], file: str, words: str) -> bool:
 @pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=[pytest.mark.long] * (n >= BY_DEFAULT)) for n, kind in enumerate(SLIPS)]
 )
-@pytest.mark.xfail(strict=False, reason="to be repaired: a hundredfold distance makes a variance that is no number")
 def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) -> None:
     slip = SLIPS[kind]
     logs = recordings(slip.axis)

@@ -108,9 +108,6 @@ def true_motion(k: Vehicle) -> dict[str, Array]:
         pytest.param("recordings", 15, 0.1, marks=pytest.mark.weekly),
     ],
 )
-@pytest.mark.xfail(
-    strict=False, reason="to be repaired: an identified axis is *do not use*, so its estimates are refused"
-)
 def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, scheduler: str, tmp_path: Path) -> None:
     """`width` is the largest relative width of the band of the stopping distance.
 

@@ -198,29 +198,37 @@ class Motions:
 def measured_time_constant(motions: Motions, load: Array, T: Array) -> Array:
     """Return the times from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
 
-    There is no closed form: the motions take Runge-Kutta steps whose length is proportional to Tau + T. The result is
-    infinite if V_ss is not reached.
+    There is no closed form: the motions take Runge-Kutta steps whose length is proportional to Tau + T. The steps are
+    those of w = v - ahead, where ahead = (C - load) T exp(-t/T) is the velocity that the lag still withholds: w' is the
+    acceleration without a lag, so that a lag much shorter than a step does not spoil them, nor derivatives for T. The
+    result is infinite if V_ss is not reached.
     """
     V_ss, Tau = motions.response()
     goal, h, lagging = RISE * V_ss, (Tau + T) / 50.0, motions.of["C"] - load
-    v, found = np.zeros(goal.shape), np.full(goal.shape, inf)
 
-    def rate(t: Array, v: Array) -> Array:
-        return np.asarray(motions.acceleration(v) - lagging * np.exp(-t / T))
+    def ahead(t: Array) -> Array:
+        return np.asarray(lagging * T * np.exp(-t / T))
 
-    waits = np.isfinite(Tau)
+    def rate(t: Array, w: Array) -> Array:
+        return np.asarray(motions.acceleration(w + ahead(t)))
+
+    def slope(t: Array, w: Array) -> Array:
+        return np.asarray(h * (rate(t, w) - ahead(t) / T))
+
+    w, found, waits = -ahead(0.0 * h), np.full(goal.shape, inf), np.isfinite(Tau)
     for n in range(1000):
         t = n * h
-        k_1 = rate(t, v)
-        k_2 = rate(t + 0.5 * h, v + 0.5 * h * k_1)
-        k_3 = rate(t + 0.5 * h, v + 0.5 * h * k_2)
-        after = v + h / 6.0 * (k_1 + 2.0 * (k_2 + k_3) + rate(t + h, v + h * k_3))
-        reached = waits & (np.abs(after) >= np.abs(goal)) & (after * goal > 0.0)
+        k_1 = rate(t, w)
+        k_2 = rate(t + 0.5 * h, w + 0.5 * h * k_1)
+        k_3 = rate(t + 0.5 * h, w + 0.5 * h * k_2)
+        after = w + h / 6.0 * (k_1 + 2.0 * (k_2 + k_3) + rate(t + h, w + h * k_3))
+        v = after + ahead(t + h)
+        reached = waits & (np.abs(v) >= np.abs(goal)) & (v * goal > 0.0)
         if reached.any():
-            share = _crossing(*(x[reached] for x in (v, after, h * k_1, h * rate(t + h, after), goal)))
-            found[reached] = t[reached] + h[reached] * share
+            ends = w + ahead(t), v, slope(t, w), slope(t + h, after), goal
+            found[reached] = t[reached] + h[reached] * _crossing(*(x[reached] for x in ends))
         waits &= ~reached
-        v = after
+        w = after
         if not waits.any():
             break
     return found

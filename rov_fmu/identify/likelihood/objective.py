@@ -404,7 +404,9 @@ class Objective:
     def _rows_data(self, z: Array) -> Data:
         places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
         off, variances = self.row_values(z)
-        of_motion = derivatives(lambda sets: self.row_values(sets)[0], z, places, steps)
+        inside = z.copy()  # a lag at its bound is absent, and a shorter one changes nothing
+        inside[places] = np.maximum(z[places], self.low[places] + steps)
+        of_motion = derivatives(lambda sets: self.row_values(sets)[0], inside, places, steps)
         noises = [k for k, one in enumerate(self.table.parameters) if one.kind == "row noise"]
         names = [self.table.parameters[k].of for k in noises]
         of_noise = np.array([[2.0 * (row.noise == name) for name in names] for row in self.rows])

@@ -92,7 +92,8 @@ def random_names(rng: random.Random, layout: Layout) -> Names:
     """Return new names for most parts: dangerous words, and pieces of the names in the equation."""
     equation = equation_of(layout)
     pieces = []
-    for name in (*layout.places, *equation.program, *equation.forces, *equation.tables):
+    places = filter(str.isidentifier, layout.places)  # der(u) is the name of no part
+    for name in (*places, *equation.program, *equation.forces, *equation.tables):
         cut = rng.choice([n for n, letter in enumerate(name) if letter == "_"] or [0])
         pieces.append(rng.choice([name[cut + 1 :], name[:cut], name])[:30] or name)
     found: Names = {}
@@ -224,7 +225,6 @@ def test_quantities_that_are_named_alike_stay_different(name: str, is_compiled: 
 
 
 @often("vehicles", 1, 12, 300)
-@pytest.mark.xfail(strict=False, reason="to be repaired: one of the drawn names collides with a word of the C")
 def test_random_names_change_nothing(vehicles: int) -> None:
     rng, compared = random.Random(8 + vehicles), 0
     while compared < vehicles:
