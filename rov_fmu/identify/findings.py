@@ -15,6 +15,7 @@ from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
     DISAGREEMENT,
+    LEAST_TESTED,
     MOST_UNKNOWN,
     Answer,
     AxisOfBase,
@@ -426,11 +427,18 @@ def driven_aside(identification: Identification) -> list[str]:
     return lines
 
 
-def extrapolated(vehicle: Vehicle) -> list[str]:
-    """Return a sentence if the tests had no full command, for which there is an answer, too."""
-    low, high = vehicle.command_range
-    words = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
-    return [words] if SHARES[-1] > high else []
+def extrapolated(identification: Identification) -> list[str]:
+    """Return sentences about answers to full command, and to commands in a direction, of which there was no test."""
+    low, high = identification.vehicle.command_range
+    full = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
+    untested = [
+        f"{direction} ({one.axis.name})"
+        for one in identification.axes
+        for direction, strongest in zip((one.axis.negative, one.axis.positive), one.tested, strict=True)
+        if strongest < LEAST_TESTED
+    ]
+    ways = f"No test drives the vehicle {listed(untested)}, so the numbers for that are extrapolated."
+    return [full] * (SHARES[-1] > high) + [ways] * bool(untested)
 
 
 def with_lag(identification: Identification) -> list[str]:

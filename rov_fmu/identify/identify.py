@@ -126,12 +126,12 @@ def _axis(
     errors: Mapping[Axis, float],
     pushes: Sequence[float],
 ) -> AxisResult:
-    own, strongest = tuple(p for p in predicted if p.axis is axis), fit.command_range[1]
+    own, tested = tuple(p for p in predicted if p.axis is axis), fit.tested(axis)
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
-    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, strongest, fits, least)
+    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, fit.command_range[1], fits, least)
     answers = answers if is_told and is_steady else ()
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
@@ -145,7 +145,7 @@ def _axis(
     evidence = Evidence(
         predictions=own,
         answers=answers,
-        strongest=strongest,
+        tested=tested,
         steady=steady,
         disturbances=unknown,
         effects=acting,
@@ -161,6 +161,7 @@ def _axis(
         axis=axis,
         verdict=verdict(evidence),
         answers=answers,
+        tested=tested,
         known=known,
         predictions=own,
         points=(*steady, *times),

@@ -28,6 +28,8 @@ _MOVING = 3.0
 MOST_UNKNOWN = 0.05
 """A model must not be used if unknown slow forces, changes of the thrust and velocities over ground together exceed
 this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
+LEAST_TESTED = 0.05
+"""A direction of an axis is tested by commands from this one."""
 LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
 DISAGREEMENT = 40.0
@@ -345,6 +347,8 @@ class AxisResult:
     axis: Axis
     verdict: Verdict
     answers: tuple[Answer, ...]
+    tested: tuple[float, float]
+    """The strongest command of the tests in the negative and in the positive direction."""
     known: tuple[Coefficient, ...]
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
     predictions: tuple[Prediction, ...]

@@ -7,6 +7,7 @@ from math import inf, isfinite, nan
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.result import (
     DISAGREEMENT,
+    LEAST_TESTED,
     MOST_UNKNOWN,
     Answer,
     Coefficient,
@@ -36,8 +37,9 @@ class Evidence:
 
     predictions: Sequence[Prediction] = ()
     answers: Sequence[Answer] = ()
-    strongest: float = 1.0
-    """The strongest command of the tests. Answers to stronger ones are extrapolated, and do not count."""
+    tested: tuple[float, float] = (1.0, 1.0)
+    """The strongest command of the tests in the negative and in the positive direction of the axis. Answers to stronger
+    ones, and those in a direction that no test has, are extrapolated, and do not count."""
     steady: Sequence[Point] = ()
     """The steady velocities of the tables of the axis."""
     disturbances: Sequence[Disturbance] = ()
@@ -78,7 +80,7 @@ class Evidence:
 
     def half_width(self, *of: str) -> float:
         """Return the largest relative half-width of some answers within the tests; NaN without any."""
-        within = [a for a in self.answers if abs(a.command) <= max(self.strongest, 0.5)]
+        within = [a for a in self.answers if not is_extrapolated(a.command, self.tested)] or self.answers
         known = [getattr(a, key) for a in within for key in of]
         return max((0.5 * (high - low) / abs(value) for value, (low, high) in known), default=nan)
 
@@ -266,6 +268,12 @@ RULES = (
     ),
 )
 """All rules, in the order in which their reasons are told."""
+
+
+def is_extrapolated(command: float, tested: tuple[float, float]) -> bool:
+    """Return True if an answer is to a command beyond half and beyond the tests, or in a direction without a test."""
+    strongest = tested[command > 0.0]
+    return abs(command) > max(strongest, 0.5) or strongest < LEAST_TESTED
 
 
 def verdict(e: Evidence) -> Verdict:

@@ -38,7 +38,7 @@ def print_identification(identification: Identification) -> None:
         paragraph(out, f"First: {words}")
     for axis, verdict in identification.verdicts.items():
         paragraph(out, f"- {verdict.of(axis)}")
-    asides = [*with_lag(identification), *driven_aside(identification), *extrapolated(vehicle)]
+    asides = [*with_lag(identification), *driven_aside(identification), *extrapolated(identification)]
     for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if found.rows:
             out.print()

@@ -12,6 +12,7 @@ from rov_fmu.identify.findings import (
     SENTENCES,
     SEVERITY,
     by_heading,
+    extrapolated,
     findings_of,
     heading,
     next_tests,
@@ -426,3 +427,15 @@ def test_an_error_is_the_larger_half_of_the_interval(
     value: float, low: float, high: float, unit: str, words: str
 ) -> None:
     assert with_error((value, (low, high)), unit) == words
+
+
+@pytest.mark.parametrize(
+    ("tested", "words"),
+    [
+        ((0.5, 0.7), []),
+        ((0.02, 0.7), ["No test drives the vehicle astern (surge), so the numbers for that are extrapolated."]),
+        ((0.7, 0.0), ["No test drives the vehicle forward (surge), so the numbers for that are extrapolated."]),
+    ],
+)
+def test_a_direction_without_a_test_is_extrapolated(tested: tuple[float, float], words: list[str]) -> None:
+    assert extrapolated(surge(tested=tested))[1:] == words

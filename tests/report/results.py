@@ -87,7 +87,7 @@ def axis_result(
     )
     next_test = NextTest(axis, "hold 0.6 for 8 s, then -0.6 for 8 s", "V_ss at 50 %", 2.0 * share, share)
     own = tuple(replace(answer, axis=axis) for answer in answers(scale, share))
-    return AxisResult(axis, verdict, own, known, tuple(predictions), points, next_test)
+    return AxisResult(axis, verdict, own, (0.7, 0.7), known, tuple(predictions), points, next_test)
 
 
 GOOD = Verdict("good", ("The bands contain 95 % of the unseen data",))

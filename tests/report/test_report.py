@@ -71,7 +71,7 @@ def without_plots(monkeypatch: pytest.MonkeyPatch) -> None:
 def bare() -> Identification:
     """A result of one axis without logs, tables, effects or anything else that a report shows."""
     result = without_findings()
-    axis = AxisResult(SURGE, GOOD, (), (), (), (), None)
+    axis = AxisResult(SURGE, GOOD, (), (0.0, 0.7), (), (), (), None)
     empty: dict[str, Any] = dict.fromkeys(("forces", "effects", "disturbances", "logging", "sensors"), ())
     folder = replace(result.folder, logs=[])
     correlation = (), result.correlation[1][:0, :0]

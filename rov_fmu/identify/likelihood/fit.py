@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
@@ -68,6 +69,23 @@ class Fit:
         used = [round(c, 6) for c in used if c > 1e-3]
         low, high = min(used, default=0.0), max(used, default=1.0)
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
+
+    def tested(self, axis: Axis) -> tuple[float, float]:
+        """Return the strongest command of the tests of an axis in its negative and in its positive direction.
+
+        That of a log is the mean of its thrusters' commands, each with the sign with which it drives the axis.
+        """
+        used = [np.array([row.command for row in self.objective.rows if row.subject is axis])]
+        signs = self.known.layout.signs(axis)
+        for log in (one.log for one in self.objective.logs):
+            assert log.commands
+            if log.follows_axis:
+                weights = np.array([float(log.axis is axis)])
+            else:
+                weights = np.array([signs.get(f"u_{name}", 0.0) for name in log.commands.thrusters])
+            used.append(log.commands.at(log.commands.rows) @ weights / max(np.abs(weights).sum(), 1.0))
+        every = np.concatenate(used)
+        return float(-every.min(initial=0.0)), float(every.max(initial=0.0))
 
 
 def fit_all(

@@ -136,6 +136,24 @@ def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
         assert WORDS.index(inside) < WORDS.index(outside)
 
 
+@pytest.mark.parametrize(
+    ("tested", "loose", "word"),
+    [
+        ((0.0, 0.7), (-1.0, -0.5, -0.3), "good"),
+        ((0.7, 0.0), (0.3, 0.5, 1.0), "good"),
+        ((0.7, 0.7), (-1.0, 1.0), "good"),
+        ((0.0, 0.7), (0.5,), "do not use"),
+        ((0.7, 0.7), (-0.3,), "do not use"),
+        ((1.0, 1.0), (1.0,), "do not use"),
+        ((0.0, 0.0), (-0.3,), "do not use"),
+    ],
+)
+def test_what_nobody_tested_does_not_decide(tested: tuple[float, float], loose: tuple[float, ...], word: str) -> None:
+    narrow, wide = results.answers(1.0, 0.02), results.answers(1.0, 0.4)
+    some = [w if n.command in loose else n for n, w in zip(narrow, wide, strict=True)]
+    assert verdict(Evidence(**(USUAL | {"answers": some, "tested": tested}))).word == word
+
+
 @pytest.mark.parametrize("size", [1.7, 1e20])
 def test_no_reason_has_a_percentage_beyond_0_and_100(size: float) -> None:
     kinds = ("unknown dist", "half-width of the widest V_ss", "the same of times", "held-out V_ss")
