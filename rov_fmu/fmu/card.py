@@ -14,7 +14,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
-from rov_fmu.vehicle.description import UNIT_OF_RANGE
+from rov_fmu.vehicle.description import UNIT_OF_RANGE, VERDICT
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
@@ -105,7 +105,8 @@ def read_card(text: str) -> dict[str, list[str]]:
 
 def not_to_use(headings: Mapping[str, Sequence[str]]) -> list[str]:
     """Return the paragraphs of a card about the axes that must not be used."""
-    return [paragraph for paragraph in headings.get("How far to trust it", ()) if ": do not use." in paragraph]
+    verdicts = map(VERDICT.fullmatch, headings.get("How far to trust it", ()))
+    return [found[0] for found in verdicts if found and found[2] == "do not use"]
 
 
 def reversing(layout: Layout, values: Mapping[str, float]) -> Iterator[tuple[str, float]]:

@@ -88,8 +88,7 @@ def answers(
         own = np.log(np.abs(of_file))
 
     def more(posterior: Posterior) -> Array:
-        # Thrust that changes slowly changes V_ss and Tau by at least half as much: V_ss² grows like the thrust.
-        of_gain = (_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2 * np.array([1.0, 1.0, 0.0])
+        of_gain = _variance_of_gain(posterior) * np.array([1.0, 1.0, 0.0])
         return np.asarray(of_gain + ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None])
 
     low, high = _intervals(
@@ -102,6 +101,11 @@ def answers(
     )
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
     return _finite(axis, of_file, low, high)
+
+
+def _variance_of_gain(posterior: Posterior) -> float:
+    """Return the variance of ln V_ss and of ln Tau by thrust that changes slowly: V_ss² grows like the thrust."""
+    return float((_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2)
 
 
 def _intervals(
@@ -162,7 +166,7 @@ def time_with_lag(
         return of
 
     def more(posterior: Posterior) -> Array:
-        return np.array([(_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2])
+        return np.array([_variance_of_gain(posterior)])
 
     low, high = _intervals(np.log(time), posteriors, logarithms_of, more, fits, np.array([EXACT]))
     return float(time[0]), (float(low[0]), float(high[0]))
@@ -193,8 +197,7 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
     rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
-    pushed, rest = (NO_SHAPES.motions(rovs, axis, np.array(some)) for some in (ANSWERED, (0.0,)))
-    responses = _responses(pushed, rest).reshape(len(ANSWERED), 3, -1)
+    responses = _responses_of(rovs, NO_SHAPES, axis, ANSWERED, ()).reshape(len(ANSWERED), 3, -1)
     values = responses[..., 0]
     low, high = values, values
     if known.names:

@@ -20,7 +20,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, Tab
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
-from rov_fmu.identify.result import LEAST_NOISE, Point, Prediction
+from rov_fmu.identify.result import Point, Prediction, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -262,8 +262,7 @@ def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
             at = usual & (record.sensor == number)
             if at.sum() < 10:
                 continue
-            unchanged = _unchanged(record.time[at], record.value[at], AHEAD)
-            ratio = rms(off[at]) / max(m.noise, LEAST_NOISE * unchanged)
+            ratio = rms(off[at]) / least_error(m.noise, _unchanged(record.time[at], record.value[at], AHEAD))
             found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), ratio)
     return found
 

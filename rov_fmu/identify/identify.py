@@ -20,6 +20,7 @@ from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inp
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import (
+    Answer,
     AxisOfBase,
     AxisResult,
     Coefficient,
@@ -131,8 +132,9 @@ def _axis(
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
-    answers = assess.answers(fit.posteriors, axis, vehicle, pushes, fit.command_range[1], fits, least)
-    answers = answers if is_told and is_steady else ()
+    answers: tuple[Answer, ...] = ()
+    if is_told and is_steady:
+        answers = assess.answers(fit.posteriors, axis, vehicle, pushes, fit.command_range[1], fits, least)
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
@@ -176,8 +178,11 @@ def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
-    """Yield the axes of the vehicle that the fit does not change, or only because other axes depend on them, and those
-    of rov.toml that it lacks, because nothing is known about them."""
+    """Yield the axes that no test identifies.
+
+    The vehicle has those of its base and of rov.toml, of which a fit may change the drag because other axes depend on
+    them. It lacks those about which nothing is known.
+    """
     description = tests.description
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
     shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}

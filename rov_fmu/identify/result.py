@@ -111,13 +111,21 @@ class Prediction:
 
     @property
     def least(self) -> float:
-        """The least error that counts: the noise, but at least a small share of the motion."""
-        return max(self.noise, LEAST_NOISE * self.unchanged)
+        """The least error that counts."""
+        return least_error(self.noise, self.unchanged)
 
     @property
     def moves(self) -> bool:
         """True if the quantity changes by clearly more than the noise of its sensor."""
         return self.unchanged > _MOVING * self.noise
+
+
+def least_error(noise: float, unchanged: float) -> float:
+    """Return the least error of predictions that counts: the noise, but at least a small share of the motion.
+
+    `unchanged` is the RMS error of a prediction of no change.
+    """
+    return max(noise, LEAST_NOISE * unchanged)
 
 
 def coverage_of(predictions: Iterable[Prediction]) -> float:

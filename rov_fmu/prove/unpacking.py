@@ -90,15 +90,12 @@ def refusal(zipped: zipfile.ZipFile) -> str:
         is_portable = all(map(_is_portable, name.removesuffix("/").split("/")))
         is_special = stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR)
         for is_wrong, reason in (
-            (not is_portable, "must be a relative path with forward slashes that every system has"),
+            (not is_portable, "must be a relative path with forward slashes, whose parts are names on every system"),
             (is_special, "is a link or a special file; an FMU must have files and folders only"),
             (member.compress_type not in _METHODS, "must be stored or deflated, the compression that FMI allows"),
             (member.flag_bits & _ENCRYPTED, "is encrypted"),
             (names[name] > 1, f"is {names[name]} times in the archive"),
-            (
-                times[place] > 1,
-                "is the path of another member, too, where capital letters are as small ones",
-            ),
+            (times[place] > 1, "is the path of another member, too, on systems that ignore case"),
             (place in folders and not member.is_dir(), "is a file, and a folder of other files"),
         ):
             if is_wrong:

@@ -40,7 +40,7 @@ def _zeros(megabytes: int) -> Callable[..., None]:
     return add
 
 
-_PATH = "must be a relative path with forward slashes that every system has"
+_PATH = "must be a relative path with forward slashes, whose parts are names on every system"
 BAD: dict[str, tuple[Callable[..., None], str]] = {
     "a path upwards": (_member("resources/../../evil"), f"member 'resources/../../evil': {_PATH}"),
     "an absolute path": (_member("/tmp/evil"), f"member '/tmp/evil': {_PATH}"),
@@ -60,7 +60,7 @@ BAD: dict[str, tuple[Callable[..., None], str]] = {
     "the same path with two slashes": (_member("binaries//a.so"), f"member 'binaries//a.so': {_PATH}"),
     "the same path with capital letters": (
         _member("MODELDescription.xml"),
-        "member 'modelDescription.xml': is the path of another member, too, where",
+        "member 'modelDescription.xml': is the path of another member, too, on",
     ),
     "a device of Windows": (_member("resources/con.txt"), f"member 'resources/con.txt': {_PATH}"),
     "a blank at the end": (_member("resources/x "), f"member 'resources/x ': {_PATH}"),
