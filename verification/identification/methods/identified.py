@@ -31,7 +31,7 @@ class Identified:
 
     def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
-        own = self.found.posterior
+        own = self.found.file.posterior
         table = table_of(self.found.known, [recording.log], [])
         z = np.array([p.mean for p in table.parameters])
         covariance = np.diag([p.deviation**2 for p in table.parameters])
