@@ -49,6 +49,8 @@ class Evidence:
     """The error over 10 s of predictions by the fit to all data, relative to the noise of the sensor."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
+    is_assumed: bool = False
+    """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
     difference: float = 0.0
     """How much larger J is at the end of the second start."""
 
@@ -255,6 +257,14 @@ RULES = (
         "The {quantity} in {file} seems to have another unit or sign, and all axes are fitted to this log.",
         lambda e: {"quantity": e.slips[0].quantity, "file": e.slips[0].file},
         "1",
+    ),
+    Rule(
+        "an assumed vehicle",
+        lambda e: float(e.is_assumed),
+        0.0,
+        None,
+        "The mass and the thrusters are assumed.",
+        unit="1",
     ),
     Rule(
         "difference of J to another vehicle of a second start",

@@ -239,7 +239,7 @@ def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
 def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
     """Return the name of the column that a header seems to mean, or an empty text.
 
-    `rotations` are the beginnings of headers of quaternions.
+    `rotations` are the beginnings of headers of quaternions. Nothing is measured in percent.
     """
     words, unit = _words(title), header_parts(title)[1]
     is_part = words.endswith((" x", " y", " z"))
@@ -247,6 +247,8 @@ def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
         return ""
     for name in _candidates(title, ("", "time", *QUANTITIES)):
         quantity = QUANTITIES.get(name)
+        if quantity and unit == "%":
+            continue
         if not (quantity and quantity.is_velocity) or unit in quantity.units or (is_part and not unit):
             return name
     return ""
@@ -264,7 +266,10 @@ def _is_command(title: str, numbers: Array, meant: str) -> bool:
     if not _may_be_command(title, numbers):
         return False
     given = numbers[~np.isin(numbers, NO_OUTPUT)]
-    if re.search(COMMANDS, _words(title)) or (header_parts(title)[1] == "%" and not meant):
+    unit = header_parts(title)[1]
+    if unit.startswith(PULSES) and _within(given, PULSE_RANGE):
+        return True
+    if re.search(COMMANDS, _words(title)) or (unit == "%" and not meant):
         return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
     values, counts = np.unique(given, return_counts=True)
     return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
