@@ -812,8 +812,10 @@ def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, f
     inspected, replaced, written = inspect_tests(tests, report, drafts=drafts, force=force)
     print_inspected(inspected, replaced, with_draft=not drafts)
     is_new = inspected.path in written and not inspected.own
-    steps = ["edit this draft"] * is_new + inspected.missing
-    print_end(written, ", then ".join([*steps, shell_words("rov-fmu", "identify", *tests)]))
+    steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
+    if not (drafts or inspected.is_enough):
+        steps = [shell_words("rov-fmu", "inspect", *tests, "--draft")]
+    print_end(written, ", then ".join(steps))
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -62,8 +62,10 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = tests.description.base_quantities
-    of_base = f"Assumed, as in {tests.description.base_name}: " if tests.description.assumed else ""
-    sources |= {n: f"{of_base}{base[n].source}" for n in layout.coefficients if n in base and n not in known}
+    sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    if tests.description.assumed:
+        of_base = {*base} & {*sources}
+        sources |= {name: f"Assumed, as in {tests.description.base_name}: {sources[name]}" for name in of_base}
     for curve in (c for c in layout.curves if "n_V" in c.keys):
         asked = tests.description.tables.known.get(curve.coefficient("V_0"))
         reference = asked.source if asked else layout.voltage_source

@@ -73,8 +73,12 @@ def test_a_log_alone_is_identified_with_a_vehicle_that_is_assumed(
 @pytest.mark.parametrize(
     ("title", "files", "words"),
     [
-        ("u_bow [1],u_stern [1]", ["a.csv"], "no vehicle that ships can stand in for one whose thrusters are bow and"),
-        ("depth [m]", ["a.csv"], "no vehicle that ships can stand in for one and the logs have no commands"),
+        (
+            "u_bow [1],u_stern [1]",
+            ["a.csv"],
+            "no vehicle that ships has the thrusters bow and stern: name a vehicle file by --base",
+        ),
+        ("depth [m]", ["a.csv"], "no log has commands of thrusters: name a vehicle file by --base, or describe"),
         ("u_1 [1]", ["a.csv", "b/a.csv"], "is not beside"),
     ],
 )

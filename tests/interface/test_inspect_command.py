@@ -475,7 +475,7 @@ def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: 
     still = [np.where(time < 20.0, 0.3, 0.0) for _ in range(4)] + [np.zeros(400)] * 2
     table(tmp_path / "dive.csv", titles, time, *still, np.sin(time), np.cos(time))
     told = inspect(option="")[0]
-    assert "the thrusters along yaw cancel each other all the time" in told
+    assert "the thrusters along surge and yaw cancel each other all the time" in told
     assert "momentary" not in told
 
 

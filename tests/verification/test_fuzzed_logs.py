@@ -45,5 +45,5 @@ def test_a_file_that_breaks_a_promise_is_kept(
     assert command.main(["--logs", "1", str(path)]) == 1
     told = capsys.readouterr().err
     assert "dive.csv, seed 0: ZeroDivisionError" in told
-    assert "again with: rov-fmu identify --inspect ./damaged.csv, in base64:" in told
+    assert "again with: rov-fmu inspect ./damaged.csv, in base64:" in told
     assert Path("damaged.csv").read_bytes() == damaged(path.read_bytes(), 0)

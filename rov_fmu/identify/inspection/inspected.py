@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from rov_fmu.equation.catalogue import EXTERNAL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.inspection.undetermined import undetermined
 from rov_fmu.io.csv_table import DataFileError
@@ -56,6 +57,11 @@ class Inspected:
         return [step for step, is_done in steps.items() if not is_done]
 
     @property
+    def is_enough(self) -> bool:
+        """True if `identify` needs no draft: there is a rov.toml, or a vehicle that ships can stand in for it."""
+        return bool(self.own or self.likely.base)
+
+    @property
     def completed(self) -> Output:
         """The file rov.toml: the draft, or the one that is there with what it lacks."""
         return Output(self.path, completed(self.own, self.text).encode())
@@ -85,12 +91,13 @@ class Inspected:
         """Return a rov.toml that nobody has to complete, with the vehicle that the logs seem to be of, or with a given
         one. Raises VehicleFileError if no vehicle that ships has such thrusters, and none is given."""
         if not (base or self.likely.base):
-            thrusters = listed(self.likely.thrusters)
-            has = f"whose thrusters are {thrusters}" if thrusters else "and the logs have no commands of thrusters"
+            own, instead = listed(self.likely.thrusters), "name a vehicle file by --base, or "
+            why = f"no vehicle that ships has the thrusters {own}" if own else "no log has commands of thrusters"
+            if not EXTERNAL.isdisjoint(self.likely.thrusters):
+                why, instead = "the logs have forces on the body, and none tells the mass", ""
             raise VehicleFileError(
-                f"{self.path}: there is no such file, and no vehicle that ships can stand in for one {has}: name a "
-                "vehicle file by --base, or describe the vehicle: `rov-fmu inspect --draft` writes the file with a "
-                '"?" wherever you have to decide'
+                f"{self.path}: there is no such file, and {why}: {instead}describe the vehicle: `rov-fmu inspect "
+                '--draft` writes the file with a "?" wherever you have to decide'
             )
         text = draft(self.name, self.logs, self.headers, self.likely, asks=False)
         return Draft(text, "" if base else self.likely.reason)
@@ -161,7 +168,6 @@ def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:
 
 
 def _drafted(inspected: Inspected) -> RovFile:
-    """Return what the draft says of the vehicle, if the logs tell which one it is."""
-    if not inspected.likely.base:
-        return NO_ROV_FILE
-    return read_description(inspected.path, draft=inspected.draft_for(None))
+    """Return what the draft says of the vehicle."""
+    draft = inspected.draft_for(None) if inspected.likely.base else Draft(inspected.text, "")
+    return read_description(inspected.path, draft=draft)

@@ -50,13 +50,13 @@ def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]
     tested = {axis for axes in driven.values() for axis in axes}
     groups: dict[tuple[str, str], list[Axis]] = {}
     for axis in (form.axis for form in layout.axes if form.axis not in tested):
-        groups.setdefault((_reason(axis, findings, logs), how_to_measure(axis, "<axis>")), []).append(axis)
-    for (reason, _), axes in groups.items():
+        groups.setdefault(_reason(axis, findings, logs), []).append(axis)
+    for (reason, sensor), axes in groups.items():
         named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
         stays = f"{'stay those' if are_many else 'stays that'} of {base}" if base else "cannot be identified"
         why = reason.replace("{it}", named)
-        how = how_to_measure(axes[0], "<axis>" if are_many else axes[0].name)
-        yield f"{named} {stays}: {why}. Command {'each' if are_many else 'it'} both ways, and log {how}"
+        log_it = f", and log {sensor if are_many else how_to_measure(axes[0], axes[0].name)}" if sensor else ""
+        yield f"{named} {stays}: {why}. Command {'each' if are_many else 'it'} both ways{log_it}"
     if not layout.has_wrench:
         weak: list[str] = []
         for axis in (form.axis for form in layout.axes if form.axis in tested):
@@ -75,16 +75,18 @@ def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]
             )
 
 
-def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> str:
-    """Return why no log tests an axis, which is {it} in the reason."""
+def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> tuple[str, str]:
+    """Return why no log tests an axis, which is {it} in the reason, and what would show its motion, or an empty text
+    where the logs do."""
+    sensor = how_to_measure(axis, "<axis>")
     kinds = dict.fromkeys(finding.kind for finding in findings if finding.axis == axis.name)
     if reasons := [_REASONS[kind] for kind in kinds if kind in _REASONS]:
-        return listed(reasons)
+        return listed(reasons), sensor if {*kinds} & {"constant motion", "too few samples"} else ""
     unused = [c for log in logs for c in log.channels if c.quantity.axis is axis and c.unused]
     if unused:
-        return f"{unused[0].quantity.name} from {unused[0].source} is left out ({unused[0].unused})"
+        return f"{unused[0].quantity.name} from {unused[0].source} is left out ({unused[0].unused})", sensor
     what = "an angle or a rate" if axis.is_rotation else "a velocity or a position"
-    return f"no log has {what} of {{it}}"
+    return f"no log has {what} of {{it}}", sensor
 
 
 def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[float, list[str]]:
