@@ -17,7 +17,6 @@ from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
     Answer,
-    AxisOfBase,
     AxisResult,
     Coefficient,
     Disturbance,
@@ -331,13 +330,20 @@ def next_tests(identification: Identification) -> list[str]:
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
     any test there is none. How to identify the other axes of the vehicle comes last.
     """
-    others = [f"{one.axis.name}: {how_to_identify(one)}." for one in identification.axes_of_base]
+    groups: dict[tuple[str, str], list[Axis]] = {}
+    for one in identification.axes_of_base:
+        groups.setdefault((one.reason, how_to_measure(one.axis, "<axis>")), []).append(one.axis)
+    others = [
+        f"{listed(axis.name for axis in axes)}: {reason}. {how_to_record(axes)}."
+        for (reason, _), axes in groups.items()
+    ]
     return [*_next_tests(identification), *others]
 
 
-def how_to_identify(one: AxisOfBase) -> str:
-    """Return what an owner can record, so that an axis of the base is identified."""
-    return f"{one.reason}. Command it both ways, and log {how_to_measure(one.axis, one.axis.name)}"
+def how_to_record(axes: Sequence[Axis]) -> str:
+    """Return what an owner can record, so that axes are identified whose motion the same kind of sensor shows."""
+    which, name = ("it", axes[0].name) if len(axes) == 1 else ("each", "<axis>")
+    return f"Command {which} both ways, and log {how_to_measure(axes[0], name)}"
 
 
 def how_to_measure(axis: Axis, name: str) -> str:

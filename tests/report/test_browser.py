@@ -88,8 +88,8 @@ def test_what_is_folded_opens_by_a_click_or_a_link_and_on_paper(report: Path, vi
     assert not table.is_visible()
     page.emulate_media(media="print")
     page.set_viewport_size({"width": 720, "height": 1000})
-    assert page.locator(".picture .broad svg").is_visible(), "a page of A4 is as wide as a screen"
-    assert not page.locator(".picture .narrow svg").is_visible()
+    assert page.locator(".picture .narrow svg").is_visible(), "beside the answers, there is half a page"
+    assert not page.locator(".picture .broad svg").is_visible()
     box = table.bounding_box()
     assert box is not None
     assert box["height"] > 50
@@ -114,3 +114,12 @@ def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, v
     seen.page.mouse.move(5, 5)
     assert seen.page.locator(".broad .values span").count() == 0
     assert (seen.problems(), seen.requests) == ([], [report.as_uri()])
+
+
+def test_the_answers_are_on_the_first_page_of_paper(report: Path, visit: Callable[..., Visit]) -> None:
+    """Verdicts, answers, picture, next test and warnings fit on A4 with its margins, 182 mm by 273 mm."""
+    seen = visit(width=688, height=1031)
+    seen.page.emulate_media(media="print")
+    seen.page.goto(report.as_uri())
+    bottom = seen.page.evaluate("document.querySelector('.overview').getBoundingClientRect().bottom")
+    assert 300.0 < bottom < 1031.0

@@ -7,7 +7,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
-from rov_fmu.identify.findings import how_to_measure
+from rov_fmu.identify.findings import how_to_measure, how_to_record
 from rov_fmu.identify.likelihood.records import driven_axes
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent
@@ -55,8 +55,8 @@ def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]
         named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
         stays = f"{'stay those' if are_many else 'stays that'} of {base}" if base else "cannot be identified"
         why = reason.replace("{it}", named)
-        log_it = f", and log {sensor if are_many else how_to_measure(axes[0], axes[0].name)}" if sensor else ""
-        yield f"{named} {stays}: {why}. Command {'each' if are_many else 'it'} both ways{log_it}"
+        how = how_to_record(axes) if sensor else f"Command {'each' if are_many else 'it'} both ways"
+        yield f"{named} {stays}: {why}. {how}"
     if not layout.has_wrench:
         weak: list[str] = []
         for axis in (form.axis for form in layout.axes if form.axis in tested):

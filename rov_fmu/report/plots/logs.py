@@ -25,20 +25,22 @@ _MOST_LINES = 8
 
 def height_of(log: Log | None, predictions: Sequence[Prediction] = (), *, measured: bool = True) -> float:
     """Return the height of the plot of a log, inches."""
-    panels = len(predictions) + (len(_unpredicted(log, predictions)) if log and measured else 0)
+    panels = len(_by_quantity(predictions)) + (len(_unpredicted(log, predictions)) if log and measured else 0)
     return _EDGES + _PANEL * max(panels, 1)
 
 
 def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] = (), *, measured: bool = True) -> None:
-    """Plot the predictions of a log with their bands and, if `measured`, its other channels, one panel each, above the
-    commands of its thrusters."""
+    """Plot the predictions of a log with their bands, those of both halves of it in one panel, and, if `measured`, its
+    other channels, above the commands of its thrusters."""
+    groups = _by_quantity(predictions)
     channels = _unpredicted(log, predictions) if log and measured else []
     commands = log.commands if log else None
-    heights = [1.0] * (len(predictions) + len(channels)) + [0.6] * bool(commands)
+    heights = [1.0] * (len(groups) + len(channels)) + [0.6] * bool(commands)
     panels = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
-    for panel, p in zip(panels, predictions, strict=False):
-        draw_prediction(panel, p)
-    for panel, channel in zip(panels[len(predictions) :], channels, strict=False):
+    for panel, own in zip(panels, groups, strict=False):
+        for n, p in enumerate(own):
+            _draw_prediction(panel, p, is_named=not n)
+    for panel, channel in zip(panels[len(groups) :], channels, strict=False):
         _draw_channel(panel, channel)
     if commands:
         time = np.linspace(float(commands.rows[0]), commands.end, MOST_SAMPLES)
@@ -59,10 +61,19 @@ def _is_absolute(log: Log | None) -> bool:
     return bool(log and log.commands and max(log.commands.largest.values(), default=0.0) > 1.0)
 
 
+def _by_quantity(predictions: Sequence[Prediction]) -> list[list[Prediction]]:
+    """Return the predictions of each quantity so far ahead together."""
+    groups: dict[tuple[str, float], list[Prediction]] = {}
+    for p in predictions:
+        groups.setdefault((p.quantity, p.span), []).append(p)
+    return [*groups.values()]
+
+
 def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:
-    """Return the channels that are used and of which there is no prediction."""
+    """Return the channels that are used, that change, and of which there is no prediction."""
     predicted = {p.quantity for p in predictions}
-    return [c for c in log.channels if not c.unused and c.count and c.quantity.name not in predicted]
+    used = (c for c in log.channels if not c.unused and c.count and c.quantity.name not in predicted)
+    return [c for c in used if np.ptp(c.samples[1]) > 0.0 and not (predictions and c.quantity.axis is None)]
 
 
 def _draw_channel(ax: Axes, channel: Channel) -> None:
@@ -77,17 +88,18 @@ def _draw_channel(ax: Axes, channel: Channel) -> None:
     name_axes(ax, channel.quantity.name, unit)
 
 
-def draw_prediction(ax: Axes, shown: Prediction) -> None:
+def _draw_prediction(ax: Axes, shown: Prediction, *, is_named: bool) -> None:
     """Draw what was measured of an unseen log and what was predicted, with the 95 % band."""
+    names = ("measured", "predicted, with 95 % band", "compared") if is_named else (None,) * 3
     factor, unit = in_degrees(shown.unit)
     some = slice(None, None, max(1, len(shown.time) // MOST_SAMPLES))
     time, half = shown.time[some], factor * NORMAL * shown.deviation[some]
     predicted = factor * shown.predicted[some]
     draw_band(ax, time, predicted - half, predicted + half)
-    ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label="measured")
-    ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label="predicted, with 95 % band")
+    ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label=names[0])
+    ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label=names[1])
     if shown.compared is not None:
-        ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label="compared")
+        ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label=names[2])
     ax.margins(x=0.0, y=0.12)
     ahead = f", {shown.span:g} s ahead" if isfinite(shown.span) else ""
     name_axes(ax, f"{shown.quantity}{ahead}", unit)
