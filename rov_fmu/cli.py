@@ -722,7 +722,7 @@ _tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type
 
 
 @_commands.command("identify")
-@_tests_argument(metavar="FOLDER | LOG...")
+@_tests_argument(metavar="TESTS...")
 @_output_option(metavar="VEHICLE.toml", help="Vehicle file to write.")
 @_file_option(
     "--report",
@@ -754,7 +754,7 @@ def _identify(
     inspects: bool,
     drafts: bool,
 ) -> None:
-    """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml, or from one LOG or several.
+    """Identify a vehicle from TESTS: a folder of tank tests or dive logs with its rov.toml, or one log or several.
 
     Without a rov.toml, the vehicle that the logs seem to be of is assumed, and the printout begins with what that is.
     """
