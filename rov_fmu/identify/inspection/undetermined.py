@@ -141,5 +141,5 @@ def _momentary(log: Log) -> str:
         return ""
     return (
         f"{log.file}: the commands are momentary values, because they change in {share:.0%} of the rows: what happens "
-        f"between rows, {commands.interval:.2g} s apart, is not known. Log at 50 Hz, or fly without a controller (MANUAL)"
+        f"between rows, {commands.interval:.2g} s apart, is not known. Log at 50 Hz, or fly without a controller"
     )
