@@ -327,7 +327,7 @@ def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterato
         interval = _interval(vehicle, name, n, numbers) if told <= _TOLD and error > 0.0 else None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         centre, _, _ = with_interval(began[name], (began[name] - before, began[name] + before))
-        yield Coefficient(name, value, interval, declaration.unit, f"{centre} ± {before:.2g}{unit}", told)
+        yield Coefficient(name, value, interval, declaration.unit, f"{float(centre):g} ± {before:.2g}{unit}", told)
 
 
 def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Numbers]) -> Interval:
