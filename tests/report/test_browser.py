@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.prove.claims import prove_claims
+from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from tests.report.conftest import Visit
 from tests.report.pages import UNFOLD
 from tests.report.results import example
+from tests.tank.readers.motion import DIVE
+from tests.tank.readers.writers import LOGS
 
 if TYPE_CHECKING:
     pass
@@ -47,9 +51,18 @@ def evidence(videoray_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
+@pytest.fixture(scope="module")
+def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `rov-fmu inspect --report` writes about a dive."""
+    folder = tmp_path_factory.mktemp("inspection")
+    path = folder / "logs.html"
+    path.write_text(inspection_page(inspect_logs([LOGS[".tlog"](folder, DIVE)])), encoding="utf-8")
+    return path
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [375, 1440])
-@pytest.mark.parametrize("name", ["documentation", "report", "evidence"])
+@pytest.mark.parametrize("name", ["documentation", "report", "evidence", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
 ) -> None:
