@@ -15,6 +15,7 @@ from lxml import html
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
+from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import VECTORED
@@ -22,7 +23,7 @@ from tests.report.pages import check_refers_to_itself_alone
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
-from tests.tank.readers.writers import LOGS, Ros, servos, table, write_tlog
+from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_tlog
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -271,6 +272,20 @@ def test_outputs_that_never_change_drive_no_thruster(tmp_path: Path, inspect: In
     out, draft = inspect()
     assert 'base = "bluerov2"\n' in draft
     assert "thruster 8" in out
+
+
+@pytest.mark.parametrize(("frame", "base"), [(0, ""), (1, "bluerov2")])
+def test_the_frame_of_the_autopilot_tells_the_base(frame: int, base: str, tmp_path: Path, inspect: Inspect) -> None:
+    """A BlueROV1 has six thrusters, too, and is no BlueROV2."""
+    messages = [parameter("FRAME_CONFIG", frame)]
+    pulses = np.transpose([1500 + 400 * c for c in THRUSTERS])
+    messages += [servos(100.0 + time, *map(round, row)) for time, row in zip(TIME, pulses, strict=True)]
+    write_tlog(tmp_path / "dive.tlog", messages)
+    assert parsed(inspect()[1]).get("base", "") == base
+    (tmp_path / "rov.toml").unlink()
+    if base:
+        reason = inspect_logs([tmp_path / "dive.tlog"]).draft_for(None).reason
+        assert reason == "the log has FRAME_CONFIG 1 (vectored)"
 
 
 def test_what_is_used_is_not_called_unrecognised(tmp_path: Path, inspect: Inspect) -> None:
