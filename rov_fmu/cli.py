@@ -1,4 +1,4 @@
-"""The command rov-fmu: build, simulate, fly, sitl, export, prove, study, identify, tune, schema, tables.
+"""The command rov-fmu: build, simulate, fly, sitl, export, prove, study, identify, inspect, tune, schema, tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -718,8 +718,11 @@ def _study(
 # ---- identify --------------------------------------------------------------------------------------------------------
 
 
+_tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type=_FILE)
+
+
 @_commands.command("identify")
-@click.argument("folder", type=_FILE)
+@_tests_argument(metavar="TESTS...")
 @_output_option(metavar="VEHICLE.toml", help="Vehicle file to write.")
 @_file_option(
     "--report",
@@ -739,21 +742,10 @@ def _study(
     shell_complete=_complete_vehicle,
 )
 @_force_option()
-@click.option(
-    "--inspect",
-    "inspects",
-    is_flag=True,
-    help="List what the log FOLDER, or each log in it, contains, and identify nothing. If there is no rov.toml beside "
-    "the logs, a draft of it is written there.",
-)
-@click.option(
-    "--draft",
-    "drafts",
-    is_flag=True,
-    help="Draft a rov.toml as --inspect does. It is an error if there is one already.",
-)
+@click.option("--inspect", "inspects", is_flag=True, help="The same as `rov-fmu inspect`.")
+@click.option("--draft", "drafts", is_flag=True, help="The same as `rov-fmu inspect --draft`.")
 def _identify(
-    folder: Path,
+    tests: tuple[Path, ...],
     output: Path | None,
     report: Path | None,
     mcap: Path | None,
@@ -762,68 +754,68 @@ def _identify(
     inspects: bool,
     drafts: bool,
 ) -> None:
-    """Identify a vehicle from a FOLDER with its tank tests or dive logs and its rov.toml.
+    """Identify a vehicle from TESTS: a folder of tank tests or dive logs with its rov.toml, or one log or several.
 
-    Without a rov.toml, the command lists what the logs contain, and --draft writes a draft of it.
+    Without a rov.toml, the vehicle that the logs seem to be of is assumed, and the printout begins with what that is.
     """
     from rov_fmu.identify.findings import by_heading
-    from rov_fmu.interface.identify_command import identify_folder
-    from rov_fmu.interface.inspect_command import lacks_description
+    from rov_fmu.interface.identify_command import identify_tests
     from rov_fmu.report.console import console, paragraph, print_end, shell_words
     from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import parts
 
-    writes = output or report or mcap or force
-    if (inspects or drafts) and (writes or base):
-        option = "--draft" if drafts else "--inspect"
-        raise click.UsageError(
-            f"identify: {option} writes only a draft of rov.toml: leave -o, --report, --mcap, --base, --force out"
-        )
-    if inspects or drafts or (not writes and lacks_description(folder)):
-        _inspect(folder, inspects=inspects, drafts=drafts)
+    if inspects or drafts:
+        if output or mcap or base:
+            option = "--draft" if drafts else "--inspect"
+            raise click.UsageError(f"identify: {option} identifies nothing: leave -o, --mcap, --base out")
+        _inspect_logs(tests, report, drafts=drafts, force=force)
         return
     with parts() as shown:
-        identification, replaced = identify_folder(
-            folder, output, report, mcap, base=base, force=force, begin=shown.begin
+        identification, replaced = identify_tests(
+            tests, output, report, mcap, base=base, force=force, begin=shown.begin
         )
     for line in replaced:
         paragraph(console(), line)
     print_identification(identification)
     name = identification.vehicle.identifier
     given = ["--base", shipped_name(base) or base] if base else []
-    whole = "identify", folder, *given, "-o", f"{name}.toml", "--report", report or f"{name}.html"
+    whole = "identify", *tests, *given, "-o", f"{name}.toml", "--report", report or f"{name}.html"
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
     print_end([path for path in (output, report, mcap) if path], following)
 
 
-def _inspect(path: Path, *, inspects: bool, drafts: bool) -> None:
-    """List what logs contain, and write a draft of rov.toml if it is asked for."""
-    from rov_fmu.interface.inspect_command import check_no_description, inspect_logs, write_draft
-    from rov_fmu.report.console import console, paragraph, print_end, shell_words
-    from rov_fmu.report.console_log import print_inspection
+# ---- inspect ---------------------------------------------------------------------------------------------------------
 
-    inspected = inspect_logs(path)
-    draft = inspected.draft
-    if drafts:
-        check_no_description(draft)
-    for inspection in inspected.logs:
-        print_inspection(inspection)
-    for line in inspected.warnings:
-        _warn(line)
-    for line in inspected.notes:
-        paragraph(console(), f"{line}.")
-    command = shell_words("rov-fmu", "identify", draft.parent)
-    if draft.exists():
-        paragraph(console(), f"There is a {draft} already, so no draft was written.")
-        print_end([], ", then ".join([*inspected.missing, command]))
-    elif inspects or drafts:
-        write_draft(draft, inspected.text)
-        print_end([draft], ", then ".join(["edit this draft", *inspected.missing, command]))
-    else:
-        paragraph(console(), f"There is no {draft}, which gives the vehicle's name and everything that no test tells.")
-        print_end([], f"{command} --draft writes a draft of it")
+
+@_commands.command("inspect")
+@_tests_argument(metavar="LOG...")
+@_file_option("--report", metavar="PAGE.html", help="Page to write, with pictures of the logs.")
+@click.option(
+    "--draft",
+    "drafts",
+    is_flag=True,
+    help="Write a draft of rov.toml beside the logs, or complete the one that is there.",
+)
+@_force_option()
+def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, force: bool) -> None:
+    """List what LOGs contain, or all logs in a folder, and what no fit can learn from them. Nothing is identified."""
+    _inspect_logs(tests, report, drafts=drafts, force=force)
+
+
+def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, force: bool) -> None:
+    from rov_fmu.interface.inspect_command import inspect_tests
+    from rov_fmu.report.console import print_end, shell_words
+    from rov_fmu.report.console_log import print_inspected
+
+    inspected, replaced, written = inspect_tests(tests, report, drafts=drafts, force=force)
+    print_inspected(inspected, replaced, with_draft=not drafts)
+    is_new = inspected.path in written and not inspected.own
+    steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
+    if not (drafts or inspected.is_enough):
+        steps = [shell_words("rov-fmu", "inspect", *tests, "--draft")]
+    print_end(written, ", then ".join(steps))
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.description import ROV_FILE, Draft
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
@@ -56,16 +56,20 @@ QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
 
 
 def load_tests(
-    folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
+    folder: Path,
+    check_inputs: Callable[[Sequence[Path]], None] = lambda _: None,
+    base: Path | None = None,
+    files: Collection[Path] = (),
+    draft: Draft | None = None,
 ) -> Tests:
-    """Read a folder. Raises DataFileError or VehicleFileError with a line for every mistake.
+    """Read a folder, or some `files` in it. Raises DataFileError or VehicleFileError with a line for every mistake.
 
     `check_inputs` is called with every file that the identification reads, before any test is read. `base` is the
-    vehicle to begin from, in place of that of rov.toml.
+    vehicle to begin from, in place of that of rov.toml, and `draft` stands in for rov.toml itself.
     """
-    found = read_folder(folder, check_inputs, base)
+    found = read_folder(folder, check_inputs, base, files, draft)
     description = found.rov_file.description
-    logs = [_Contents(log, *driven_axes(log, _layout_of(log, found))) for log in found.logs]
+    logs = [_Contents(log, *driven_axes(log, layout_of(log, found))) for log in found.logs]
     tested = _tested(found, logs)
     useless = [one.refusal(folder) for one in logs] if not tested.axes else []
     if not tested.thrust:
@@ -81,7 +85,8 @@ def load_tests(
     assert tests
     path = tests.description.tables.base
     of_base = {tests.description.base_name: file_hash(path)} if path else {}
-    inputs = {ROV_FILE: found.inputs[ROV_FILE]} | of_base | found.inputs
+    own = {name: digest for name, digest in found.inputs.items() if name == ROV_FILE}
+    inputs = own | of_base | found.inputs
     of_logs = [finding for one in logs for finding in one.told]
     of_vehicle = tests.findings if path else _not_pushed(tests.findings, of_logs)
     findings = (*of_vehicle, *found.findings, *of_logs, *_driven_together(found))
@@ -170,7 +175,7 @@ def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
     )
 
 
-def _layout_of(log: Log, of: Folder | Layout) -> Layout:
+def layout_of(log: Log, of: Folder | Layout) -> Layout:
     """Return the part of the vehicle that a log concerns: one axis alone for a test of this axis.
 
     Of a folder, it is that of the largest layout that the vehicle can have. A dive that does not show how the vehicle
@@ -195,7 +200,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
     dives = [log for log in tests.folder.logs if not log.axis]
     shown = {axis for log in dives for axis in shown_axes(log, tests.vehicle.layout)}
     vehicle = _extended(tests.vehicle, measured, tests, shown)
-    logs = [one for log in tests.folder.logs if (one := recorded(log, _layout_of(log, vehicle.layout)))]
+    logs = [one for log in tests.folder.logs if (one := recorded(log, layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     driving = {t.curve for axis in fitted for t in vehicle.layout.thrusters_along(axis)}
     given_thrust = {name for name, quantity in tests.description.known.items() if not quantity.interval}

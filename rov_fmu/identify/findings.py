@@ -18,7 +18,6 @@ from rov_fmu.identify.result import (
     LEAST_TESTED,
     MOST_UNKNOWN,
     Answer,
-    AxisOfBase,
     AxisResult,
     Coefficient,
     Disturbance,
@@ -126,6 +125,11 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
         "assumed thrust": (
             "{curve} thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A "
             "spring balance tells it: pull with full command, and write command and force into thrust_{curve}.csv"
+        ),
+        "assumed vehicle": (
+            "there is no rov.toml, so the vehicle is taken for {base}, because {reason}: its thrusters, their thrust "
+            "and its mass of {mass} are assumed. N, kg and β are relative to them; speeds, times and distances hardly "
+            "depend on them. `rov-fmu inspect --draft` writes a rov.toml for what you know"
         ),
         "not identified": "{of}: the tests do not determine {coefficients}{instead}",
         "points differ": "{axes}: {quantity} of the tables differs by {error:.0%} (RMS) from the model",
@@ -256,8 +260,8 @@ def told(identification: Identification) -> Identification:
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
     layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
-    units = " (in units of the assumed thrust)" if any(one.kind == "assumed thrust" for one in findings) else ""
-    data = vehicle.measured_from + units
+    scale = assumed_scale(identification)
+    data = vehicle.measured_from + (f" ({scale})" if scale else "")
     vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
 
@@ -287,7 +291,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
         found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += [*_on_forces(identification), *_on_scale(identification)]
+    found += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
     if identification.agreement > DISAGREEMENT:
         found.append(Finding("second start"))
     found += [
@@ -327,23 +331,34 @@ def next_tests(identification: Identification) -> list[str]:
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
     any test there is none. How to identify the other axes of the vehicle comes last.
     """
-    others = [f"{one.axis.name}: {how_to_identify(one)}." for one in identification.axes_of_base]
+    groups: dict[tuple[str, str], list[Axis]] = {}
+    for one in identification.axes_of_base:
+        groups.setdefault((one.reason, how_to_measure(one.axis, "<axis>")), []).append(one.axis)
+    others = [
+        f"{listed(axis.name for axis in axes)}: {reason}. {how_to_record(axes)}."
+        for (reason, _), axes in groups.items()
+    ]
     return [*_next_tests(identification), *others]
 
 
-def how_to_identify(one: AxisOfBase) -> str:
-    """Return what an owner can record, so that an axis of the base is identified."""
-    axis, sensor = one.axis, "its angle and its rate"
+def how_to_record(axes: Sequence[Axis]) -> str:
+    """Return what an owner can record, so that axes are identified whose motion the same kind of sensor shows."""
+    which, name = ("it", axes[0].name) if len(axes) == 1 else ("each", "<axis>")
+    return f"Command {which} both ways, and log {how_to_measure(axes[0], name)}"
+
+
+def how_to_measure(axis: Axis, name: str) -> str:
+    """Return what shows the motion along an axis; `name` is that in the name of a file."""
     if axis is HEAVE:
-        sensor = "the depth"
-    elif axis is YAW:
-        sensor = "the heading or the turn rate"
-    elif not axis.is_rotation:
-        sensor = (
-            "its velocity (a DVL). Without one, film the vehicle along a tape on the floor, and write time, command "
-            f"and distance into log_{axis.name}_1.csv; a track from a video does, too"
-        )
-    return f"{one.reason}. Command it both ways, and log {sensor}"
+        return "the depth"
+    if axis is YAW:
+        return "the heading or the turn rate"
+    if axis.is_rotation:
+        return "its angle and its rate"
+    return (
+        "its velocity (a DVL). Without one, film the vehicle along a tape on the floor, and write time, command "
+        f"and distance into log_{name}_1.csv; a track from a video does, too"
+    )
 
 
 def _next_tests(identification: Identification) -> list[str]:
@@ -588,6 +603,13 @@ def may_rock(folder: Folder, axis: Axis) -> bool:
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 
+def assumed_scale(identification: Identification, unit: str = "N") -> str:
+    """Return the words that belong beside a number in a unit if its scale is that of an assumed thrust, or an empty
+    text. No motion determines the scale of forces and masses."""
+    is_scaled = not {"N", "kg"}.isdisjoint(unit.split("."))
+    return "in units of the assumed thrust" if is_scaled and any(_on_scale(identification)) else ""
+
+
 def _on_scale(identification: Identification) -> Iterator[Finding]:
     """Yield a finding for each curve whose thrust is an assumption: neither a test nor rov.toml tells it."""
     layout, description = identification.vehicle.layout, identification.folder.rov_file.description
@@ -596,6 +618,14 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
         a_t = layout.curves_by_name[curve].coefficient("a_t") if curve in layout.curves_by_name else ""
         if a_t in {one.name for one in known} and not {curve, a_t} & told:
             yield Finding("assumed thrust", curve=curve)
+
+
+def _on_vehicle(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding if nobody described the vehicle."""
+    description, vehicle = identification.folder.rov_file.description, identification.vehicle
+    if description and description.assumed:
+        names = {"base": description.base_name, "reason": description.assumed, "mass": f"{vehicle['m_rov']:.3g} kg"}
+        yield Finding("assumed vehicle", names=names)
 
 
 _REMEDIES = {
@@ -683,5 +713,7 @@ def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]
         yield Finding("unusual effect", "", "", "", names)
     if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
         names["note"] = KINDS[effect.kind].why_not
+    if scale := assumed_scale(identification, effect.unit):
+        names["note"] += f", {scale}"
     axis = of if of in AXES else ""
     yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)

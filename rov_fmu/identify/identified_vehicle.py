@@ -23,6 +23,7 @@ from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Interval
+from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
@@ -63,6 +64,9 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = tests.description.base_quantities
     sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    if tests.description.assumed:
+        of_base = {*base} & {*sources}
+        sources |= {name: f"Assumed, as in {tests.description.base_name}: {sources[name]}" for name in of_base}
     for curve in (c for c in layout.curves if "n_V" in c.keys):
         asked = tests.description.tables.known.get(curve.coefficient("V_0"))
         reference = asked.source if asked else layout.voltage_source
@@ -322,7 +326,8 @@ def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterato
         declaration, value = vehicle.layout.coefficients[name], vehicle[name]
         interval = _interval(vehicle, name, n, numbers) if told <= _TOLD and error > 0.0 else None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-        yield Coefficient(name, value, interval, declaration.unit, f"{began[name]:.4g} ± {before:.2g}{unit}", told)
+        centre, _, _ = with_interval(began[name], (began[name] - before, began[name] + before))
+        yield Coefficient(name, value, interval, declaration.unit, f"{float(centre):g} ± {before:.2g}{unit}", told)
 
 
 def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Numbers]) -> Interval:

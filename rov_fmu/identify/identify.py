@@ -157,6 +157,7 @@ def _axis(
             (ratio for other, ratio in errors.items() if _share_thrusters(vehicle, axis, other)), default=0.0
         ),
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
+        is_assumed=bool(tests.description.assumed),
         difference=fit.difference,
     )
     return AxisResult(

@@ -23,7 +23,7 @@ from rov_fmu.identify.result import (
     score_of,
 )
 from rov_fmu.io.messages import listed
-from rov_fmu.io.numbers import percent
+from rov_fmu.io.numbers import percent, significant
 from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -52,6 +52,8 @@ class Evidence:
     """The error over 10 s of predictions by the fit to all data, relative to the noise of the sensor."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
+    is_assumed: bool = False
+    """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
     difference: float = 0.0
     """How much larger J is at the end of the second start."""
 
@@ -98,7 +100,7 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with the value, with `share`, the value in percent, and with what `names` tells."""
+    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells."""
     names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
@@ -190,7 +192,7 @@ RULES = (
         lambda e: e.structure,
         1.5,
         None,
-        "Predictions over 10 s are off by {value:.1f} times the noise of the sensor, so the model lacks something.",
+        "Predictions over 10 s are off by {size} times the noise of the sensor, so the model lacks something.",
         unit="1",
     ),
     Rule(
@@ -259,6 +261,14 @@ RULES = (
         "1",
     ),
     Rule(
+        "an assumed vehicle",
+        lambda e: float(e.is_assumed),
+        0.0,
+        None,
+        "The mass and the thrusters are assumed.",
+        unit="1",
+    ),
+    Rule(
         "difference of J to another vehicle of a second start",
         lambda e: e.difference,
         None,
@@ -280,7 +290,7 @@ def verdict(e: Evidence) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
-        rule.sentence.format(value=value, share=percent(value), **rule.names(e))
+        rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]

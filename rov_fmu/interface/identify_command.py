@@ -1,19 +1,22 @@
-"""The command `rov-fmu identify`: from a folder of tank tests to the vehicle file and the report."""
+"""The command `rov-fmu identify`: from logs and tank tests to the vehicle file and the report."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify.identify import identify, load_tests
+from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written, is_mcap
 from rov_fmu.io.messages import InputError, Progress
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.tank.description import ROV_FILE
+from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
 
-def identify_folder(
-    folder: Path,
+def identify_tests(
+    paths: Sequence[Path],
     vehicle: Path | None,
     report: Path | None,
     mcap: Path | None = None,
@@ -22,10 +25,11 @@ def identify_folder(
     force: bool,
     begin: Callable[[str], Progress],
 ) -> tuple[Identification, list[str]]:
-    """Identify a vehicle from a folder of tank tests, and write the files that are asked for.
+    """Identify a vehicle from a folder of tank tests, or from logs in one folder, and write the files that are asked
+    for.
 
     These are the vehicle file, the report, and the MCAP file with what was measured and predicted. `base` replaces the
-    vehicle to begin from that rov.toml names.
+    vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
     name of each part of the work, and returns the function that takes the progress of this part. Returns the
@@ -48,8 +52,10 @@ def identify_folder(
             check_written(report, PAGE)
         replaced.extend(check_replaced(targets, force=force))
 
-    begin("reading the folder")
-    tests = load_tests(folder, check_outputs, base)
+    begin("reading the tests")
+    folder, files = folder_and_files(paths)
+    draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
+    tests = load_tests(folder, check_outputs, base, files, draft)
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:

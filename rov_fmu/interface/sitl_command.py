@@ -70,7 +70,7 @@ def serve(path: Path, options: Options) -> None:
             connection.end()
             paragraph(console(), _summary(connection))
             if connection.logs:
-                inspect = shell_words("rov-fmu", "identify", "--inspect", connection.logs[0])
+                inspect = shell_words("rov-fmu", "inspect", connection.logs[0])
                 print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(options.log) else inspect)
             elif options.log:
                 paragraph(console(), "No log was written, because no row was complete.")

@@ -7,7 +7,7 @@ from rov_fmu.io.messages import FileError
 
 VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
 GAZEBO_MODEL = "a model for Gazebo (SDF)"
-TESTS_FILE = "the rov.toml of a folder of tank tests"
+TESTS, TESTS_FILE = "a log, or a folder of tank tests", "the rov.toml of a folder of tank tests"
 _TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot, of ROS or of MATLAB"
 DATAFLASH_SUFFIX = ".bin"
 """The suffix of a DataFlash log, which the autopilot writes."""
@@ -43,7 +43,7 @@ _HINTS = {
     TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
     _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
     _TABLE: "to see a recording beside a vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
-    _LOG: "`rov-fmu identify` reads it in a folder of tank tests, as log_*",
+    _LOG: "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it",
 }
 
 

@@ -1,22 +1,52 @@
-"""The printout of the content of a log."""
+"""The printout of what logs contain."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from math import isfinite
 
 from rich.table import Table
 
-from rov_fmu.io.messages import first_of
+from rov_fmu.identify.inspection.inspected import Inspected
+from rov_fmu.io.messages import first_of, print_message
 from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import SENTENCES, sentences
 from rov_fmu.tank.inspection.inspection import Inspection, Row
 
+_LEVELS = "▁▂▃▄▅▆▇█"
+_ASCII_LEVELS = "_.-~=+*#"
+"""The heights of a drawn signal, and what stands for them where the terminal lacks these characters."""
 _MOST_GAPS = 3
 """The largest number of gaps of a signal that are listed."""
 
-_NOT_ENOUGH = (
+UNDETERMINED = "What no fit can learn from these logs:"
+NOT_ENOUGH = (
     "Not enough is recognised: a log needs times with commands or measurements, and a table needs commands with what "
     "was measured."
 )
+
+
+def print_inspected(inspected: Inspected, replaced: Sequence[str] = (), *, with_draft: bool = True) -> None:
+    """Print what logs contain, what they cannot determine, and, `with_draft`, the lines to paste into rov.toml."""
+    out = console()
+    for line in replaced:
+        paragraph(out, line)
+    for inspection in inspected.logs:
+        print_inspection(inspection)
+    for line in inspected.warnings:
+        print_message(f"rov-fmu: warning: {line}")
+    for line in inspected.notes:
+        paragraph(out, f"{line}.")
+    if lines := inspected.undetermined:
+        out.print(UNDETERMINED)
+        for line in lines:
+            paragraph(out, f"- {line}.")
+        out.print()
+    if with_draft and inspected.text:
+        what = f"{inspected.path} lacks these lines" if inspected.own else f"A draft of {inspected.path}"
+        paragraph(out, f"{what}; --draft writes them:")
+        for line in inspected.text.rstrip().splitlines():
+            out.print(f"  {line}", soft_wrap=True)
+        out.print()
 
 
 def print_inspection(inspection: Inspection) -> None:
@@ -26,14 +56,8 @@ def print_inspection(inspection: Inspection) -> None:
         print_table(_rows(inspection))
     else:
         paragraph(out, str(inspection.path))
-        paragraph(out, _NOT_ENOUGH)
-    for heading, lines in {
-        "Not recognised": [f"{name}{': ' if what else ''}{what}" for name, what in inspection.unread.items()],
-        "Notes": [
-            *(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()),
-            *(line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings, SENTENCES)),
-        ],
-    }.items():
+        paragraph(out, NOT_ENOUGH)
+    for heading, lines in {"Not recognised": unrecognised(inspection), "Notes": notes(inspection)}.items():
         if lines:
             out.print()
             out.print(f"{heading}:")
@@ -42,15 +66,42 @@ def print_inspection(inspection: Inspection) -> None:
     out.print()
 
 
+def unrecognised(inspection: Inspection) -> list[str]:
+    """Return a line for everything in a log that is not recognised."""
+    return [f"{name}{': ' if what else ''}{what}" for name, what in inspection.unread.items()]
+
+
+def notes(inspection: Inspection) -> list[str]:
+    """Return what headers are taken for, and what was left out, taken or doubted."""
+    told = (line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings, SENTENCES))
+    return [*(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()), *told]
+
+
 def _rows(inspection: Inspection) -> Table:
-    """Return the table of the commands and channels; angles are in degrees."""
+    """Return the table of the commands and channels."""
     numbers = ("unit", "samples", "rate [Hz]", "least", "largest")
-    found = table(str(inspection.path.with_name(inspection.name)), "", numbers, ("gaps",))
+    found = table(str(inspection.path.with_name(inspection.name)), "", numbers, ("course", "gaps"))
     for row in (*inspection.commands, *inspection.channels):
-        factor, unit = in_degrees(row.unit)
-        digits = [text(number, ".4g") for number in (row.rate, factor * row.low, factor * row.high)]
-        found.add_row(row.name, unit, str(row.samples), *digits, ", ".join(_gaps(row)))
+        *most, gaps = cells(row)
+        found.add_row(*most, _drawn(row), gaps)
     return found
+
+
+def cells(row: Row) -> tuple[str, ...]:
+    """Return the cells about a command or a channel: name, unit, samples, rate, least and largest value, gaps. Angles
+    are in degrees."""
+    factor, unit = in_degrees(row.unit)
+    digits = [text(number, ".4g") for number in (row.rate, factor * row.low, factor * row.high)]
+    return row.name, unit, str(row.samples), *digits, ", ".join(_gaps(row))
+
+
+def _drawn(row: Row) -> str:
+    """Draw the course of a signal between its least and its largest value, with blanks in gaps."""
+    means = [value for value in row.course if isfinite(value)]
+    low, size = min(means, default=0.0), max(means, default=0.0) - min(means, default=0.0)
+    places = (0.0 if size == 0.0 else (value - low) / size for value in row.course)
+    levels = _LEVELS if console().encoding.startswith("utf") else _ASCII_LEVELS
+    return "".join(levels[min(int(8 * place), 7)] if isfinite(place) else " " for place in places)
 
 
 def _gaps(row: Row) -> Iterator[str]:

@@ -33,6 +33,8 @@ def print_identification(identification: Identification) -> None:
     to get there and to stop, and how well motion is predicted that the fit had not seen.
     """
     out, vehicle = console(), identification.vehicle
+    for words in sentences(identification.findings, "assumed vehicle"):
+        paragraph(out, f"Assumed: {words}.")
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for words in repairs(identification):
         paragraph(out, f"First: {words}")
@@ -92,7 +94,8 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     yield from (f"- {warning}" for warning in groups["Warnings"])
     others = sentences(identification.findings, "other files")
     yield from others
-    others += sentences(identification.findings, "assumed thrust")
+    for kind in ("assumed thrust", "assumed vehicle"):
+        others += sentences(identification.findings, kind)
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))

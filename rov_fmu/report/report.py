@@ -1,7 +1,7 @@
 """The identification report: one HTML file with the verdicts, the answers, the predictions, and all that is known."""
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import date, datetime, timezone
 from functools import partial
 from itertools import count
@@ -14,17 +14,18 @@ from rov_fmu.identify import findings
 from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, sealed
-from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
+from rov_fmu.report.plots.identification import plot_answers, plot_forces
+from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.columns import in_degrees
+from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SIZE = 3.7, 2.7
 """The size of a plot, inches. All plots but the first are as wide, so that their text has the same size."""
 _PLOTS: Mapping[str, Callable[..., None]] = {
-    "overview": plot_overview,
-    "prediction": plot_prediction,
+    "log": plot_log,
     "answers": plot_answers,
     "forces": plot_forces,
 }
@@ -49,7 +50,8 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
     curves = {p.subject: [q for q in results.forces if q.subject == p.subject] for p in results.forces}
     shown = _shown(results.axes)
     drawn = count()
-    total = len(curves) + sum(2 * bool(r.answers) + len(r.predictions) for r in results.axes) + 2 * bool(shown)
+    pictures = [*_of_logs(results)]
+    total = len(curves) + sum(2 * bool(r.answers) for r in results.axes) + len(pictures) + 2 * bool(shown)
 
     def plot(label: str, kind: str, size: tuple[float, float] = _SIZE, salt: str = "", **content: object) -> Markup:
         on_progress(f"drawing: {label}", next(drawn) / total)
@@ -66,12 +68,18 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         shown=shown,
         forces=curves,
         plot=plot,
-        picture=_picture(results, shown, partial(plot, "Main prediction", "overview")) if shown else None,
+        pictures=pictures,
+        height_of=height_of,
+        WIDTH=_SIZE[0],
+        picture=_picture(results, shown, partial(plot, "Main prediction", "log")) if shown else None,
         script=inline_script("plots.js"),
         card=card(results.vehicle),
         asides=[*findings.with_lag(results), *findings.driven_aside(results)],
         extrapolated=findings.extrapolated(results),
         assumed=findings.sentences(results.findings, "assumed thrust"),
+        assumed_vehicle=findings.sentences(results.findings, "assumed vehicle"),
+        scale=findings.assumed_scale(results),
+        scale_of=partial(findings.assumed_scale, results),
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,
@@ -98,13 +106,21 @@ def _shown(axes: Sequence[AxisResult]) -> list[Prediction]:
     return found or [p for p in mains if p.file == file]
 
 
+def _of_logs(results: Identification) -> Iterator[tuple[str, Log | None, list[Prediction]]]:
+    """Yield each log with its name and the predictions of it, those that are judged first."""
+    logs = {log.file: log for log in results.folder.logs}
+    predictions = [p for result in results.axes for p in result.predictions]
+    for file in dict.fromkeys([*logs, *(p.file for p in predictions)]):
+        yield file, logs.get(file), sorted((p for p in predictions if p.file == file), key=lambda p: not p.is_judged)
+
+
 def _picture(results: Identification, shown: Sequence[Prediction], plot: Callable[..., Markup]) -> Markup:
     """Return the large picture twice, broad and for phones, of which the page shows one."""
     log = next((log for log in results.folder.logs if log.file == shown[0].file), None)
-    height = 1.4 + 1.3 * len(shown)
+    height = height_of(log, shown, measured=False)
     sizes = {"broad": (_BROAD, height), "narrow": (_SIZE[0], height)}
     drawn = [
-        Markup('<div class="{}">{}</div>').format(key, plot(size, key, shown=shown, log=log))
+        Markup('<div class="{}">{}</div>').format(key, plot(size, key, predictions=shown, log=log, measured=False))
         for key, size in sizes.items()
     ]
     return Markup("").join(drawn)

@@ -38,6 +38,7 @@ from rov_fmu.io.toml_file import (
     folder_of,
     join_names,
     key_line,
+    parse_toml,
     problem_lines,
     read_toml,
 )
@@ -240,6 +241,16 @@ class RovTables(Tables):
 
 
 @dataclass(frozen=True)
+class Draft:
+    """A rov.toml that nobody wrote: what the logs tell, and a vehicle that is assumed."""
+
+    text: str
+    """The content of the file."""
+    reason: str
+    """Why this vehicle is assumed, such as `it has 6 thrusters`; empty if the user names it."""
+
+
+@dataclass(frozen=True)
 class Description:
     """The vehicle as rov.toml describes it, before any test is read."""
 
@@ -266,6 +277,8 @@ class Description:
     """Sentences about what the model leaves out."""
     base_name: str
     """The name of the base; empty without one."""
+    assumed: str = ""
+    """Why the base is assumed; empty where a user names it."""
     thrusters: Layout | None = None
     """The thrusters that give the forces on the body, where the logs have these forces and the file has the thrusters.
     `layout` then has the forces in their place."""
@@ -305,10 +318,11 @@ NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 """What there is without a rov.toml."""
 
 
-def read_description(path: Path, base: Path | None = None) -> RovFile:
-    """Read rov.toml. `base` replaces the one that it names. Raises VehicleFileError where there is no such file, or
-    where it is not TOML."""
-    data, context = read_toml(path, VehicleFileError), {"folder": path.parent}
+def read_description(path: Path, base: Path | None = None, draft: Draft | None = None) -> RovFile:
+    """Read rov.toml, or a draft in its place. `base` replaces the one that it names. Raises VehicleFileError where
+    there is no such file, or where it is not TOML."""
+    data = parse_toml(path, draft.text.encode(), VehicleFileError) if draft else read_toml(path, VehicleFileError)
+    context = {"folder": path.parent}
     data |= {"base": base} if base else {}
     file, problems, lost = read_tables(data, RovTables, context, ("vehicle",), ("fin",))
     vehicle, base_mistakes = _load_base(file)
@@ -316,6 +330,7 @@ def read_description(path: Path, base: Path | None = None) -> RovFile:
     description, of_hardware = None, {"base", "axes", *_HARDWARE_TABLES}
     if not (base_mistakes or mistakes or lost & of_hardware or _misspelt(lost, _HARDWARE_TABLES)):
         description = _describe(path, file, data, vehicle)
+        description = replace(description, assumed=draft.reason if draft else "")
         possible = _possible_coefficients(description.layout)
         # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
         unknown = {("known", name) for name in description.named if name not in possible}

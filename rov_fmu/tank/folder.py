@@ -21,17 +21,18 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
+from rov_fmu.io.file_kinds import OWN_SUFFIXES, TESTS, check_suffix
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
-from rov_fmu.tank.description import ROV_FILE, Dive, Requests, RovFile, read_description
+from rov_fmu.tank.description import ROV_FILE, Dive, Draft, Requests, RovFile, RovTables, read_description
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.listing import has_usual_suffix, list_files
+from rov_fmu.tank.readers.listing import BAG, NOT_OPENED, Listing, has_usual_suffix, list_files
 from rov_fmu.tank.readers.parsers import header_of, one_parser
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.quantity import Quantity
@@ -115,7 +116,6 @@ class Folder:
 
     def read_all(self, paths: Iterable[Path]) -> None:
         """Read some files and the dives of several files, and check their logs."""
-        self.inputs[ROV_FILE] = file_hash(self.path / ROV_FILE)
         with one_parser():
             for path in paths:
                 self.read(path)
@@ -182,7 +182,7 @@ class Folder:
         """Add the pieces of a log that have commands. Raises DataFileError if none has."""
         if not any(log.commands for log in logs):
             raise DataFileError(
-                f"{self.path / logs[0].file}: no commands of thrusters were found. `rov-fmu identify --inspect` "
+                f"{self.path / logs[0].file}: no commands of thrusters were found. `rov-fmu inspect` "
                 "lists the content of the log. Name the commands in the table [topics] of rov.toml"
             )
         self.known = self.known.union(*(log.names for log in logs))
@@ -248,32 +248,62 @@ class Folder:
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
 
 
-def read_folder(
-    folder: Path, check_inputs: Callable[[Sequence[Path]], None] = lambda _: None, base: Path | None = None
-) -> Folder:
-    """Read a folder. Raises DataFileError or VehicleFileError if it cannot be read at all.
+def folder_and_files(paths: Sequence[Path]) -> tuple[Path, list[Path]]:
+    """Return the folder of tests, and the logs in it that are named; no log if the whole folder is. A bag may be named
+    by its own folder. Raises DataFileError."""
+    folders: dict[Path, list[Path]] = {}
+    for path in paths:
+        if not path.exists():
+            raise DataFileError(f"{path}: there is no such file and no such folder")
+        if not (path.is_dir() or path.is_file()):
+            raise DataFileError(f"{path}: {NOT_OPENED}")
+        if path.suffix.lower() in OWN_SUFFIXES and path.is_file():
+            check_suffix(path, TESTS, DataFileError)
+        is_bag = (path / BAG).is_file()
+        folder = path if path.is_dir() and not is_bag else path.parent
+        folder = folder.parent if (folder / BAG).is_file() else folder
+        folders.setdefault(folder, []).extend(list_files(path).tests if is_bag else [path])
+    (folder, files), *others = folders.items()
+    if others or (folder in files and len(paths) > 1):
+        raise DataFileError(f"{paths[1]}: is not beside {paths[0]}: copy all logs of a vehicle into one folder")
+    return folder, [] if folder in files else files
 
-    `check_inputs` is called with every file that is read, before any test is read. `base` replaces that of rov.toml.
+
+def read_folder(
+    folder: Path,
+    check_inputs: Callable[[Sequence[Path]], None] = lambda _: None,
+    base: Path | None = None,
+    files: Collection[Path] = (),
+    draft: Draft | None = None,
+) -> Folder:
+    """Read a folder, or some `files` in it. Raises DataFileError or VehicleFileError if it cannot be read at all.
+
+    `check_inputs` is called with every file that is read, before any test is read. `base` replaces that of rov.toml,
+    and `draft` all of rov.toml.
     """
-    rov_file = _read_description(folder, base)
+    rov_file = _read_description(folder, base, draft)
+    if files:
+        rov_file = replace(rov_file, tables=_tables_of(rov_file.tables, {file.name for file in files}))
     found = Folder(folder, rov_file, rov_file_mistakes=[*rov_file.mistakes])
     mistakes, tables, dives = found.rov_file_mistakes, rov_file.tables, rov_file.tables.dives
+    own = [] if draft else [folder / ROV_FILE]
+    found.inputs = {path.name: file_hash(path) for path in own}
     found.names, wrong_names = names_of(found.layout, tables)
     if wrong_names or not rov_file.explains_files:  # each file would be refused for what rov.toml should explain
         raise VehicleFileError(*mistakes, *lines_on(folder / ROV_FILE, wrong_names))
     parts = {name for dive in dives.values() for name in dive.files}
-    listing = list_files(folder, parts)
+    listing = Listing(folder, [*files]) if files else list_files(folder, parts)
     paths = [path for path in listing.tests if path.name not in parts]
     if not paths and not dives:
         raise VehicleFileError(*mistakes, *listing.no_tests())
     vehicles = filter(None, (tables.against, tables.base))
-    check_inputs([folder / ROV_FILE, *paths, *(folder / part for part in parts), *vehicles])
+    check_inputs([*own, *paths, *(folder / part for part in parts), *vehicles])
     found.read_all(paths)
     found.findings += listing.findings
     if found.mistakes:  # they may follow from files that are not read
         found.mistakes += listing.lines("unreadable file")
     if (description := rov_file.description) and not (mistakes or found.mistakes):
-        mistakes += lines_on(description.path, found.unknown_names())
+        mistakes += lines_on(description.path, found.unknown_names() if not files else ())
         mistakes += lines_on(description.path, found.missing_columns(description.requests))
     return found
 
@@ -284,14 +314,17 @@ def unreadable(path: Path, error: FileError) -> Finding:
     return about(path.name, "unreadable file", reason=first.removeprefix(str(path)).lstrip(":, "))
 
 
-def _read_description(folder: Path, base: Path | None) -> RovFile:
+def _tables_of(tables: RovTables, names: Collection[str]) -> RovTables:
+    """Return the tables of rov.toml with only the dives that some files belong to."""
+    dives = {name: dive for name, dive in tables.dives.items() if not {*dive.files}.isdisjoint(names)}
+    return tables.model_copy(update={"dives": dives})
+
+
+def _read_description(folder: Path, base: Path | None, draft: Draft | None) -> RovFile:
     """Read rov.toml, and explain its purpose where there is none beside tests."""
-    if not folder.is_dir():
-        what = "is a file, and must be a folder" if folder.exists() else "there is no such folder"
-        raise DataFileError(f"{folder}: {what} with {ROV_FILE} and tests of a vehicle")
     path = folder / ROV_FILE
     try:
-        return read_description(path, base)
+        return read_description(path, base, draft)
     except VehicleFileError:
         if path.exists():
             raise
@@ -309,13 +342,13 @@ def joined_dive(folder: Path, dive: Dive, layout: Layout, names: Names) -> Log:
     """Read the log of a dive of several files. Raises DataFileError."""
     paths = [folder / part for part in dive.files]
     logs = [log for path in paths for log in read_logs(path, layout, names, is_part=True)]
-    return _together(paths[0], logs, dive.other_clock)
+    return together(paths[0], logs, dive.other_clock)
 
 
 # ---- Files -----------------------------------------------------------------------------------------------------------
 
 
-def _together(path: Path, logs: Sequence[Log], other_clock: Collection[str]) -> Log:
+def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ()) -> Log:
     """Return the log of a dive of several files, of which one has the commands. Raises DataFileError.
 
     If the times of a file do not overlap with those of the commands, its first sample is moved to the first command.

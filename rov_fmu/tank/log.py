@@ -172,6 +172,8 @@ class Log:
     """What was left out, taken or doubted."""
     unread: Mapping[str, str] = field(default_factory=dict)
     """A description of everything that is not recognised, by name."""
+    frame: str = ""
+    """The frame of ArduSub that the log tells, such as `vectored`; empty where it tells none."""
     names: frozenset[str] = frozenset()
     """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
 

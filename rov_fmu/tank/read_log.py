@@ -31,7 +31,7 @@ from rov_fmu.tank.columns import (
 from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.readers.ardusub_frames import misfits
+from rov_fmu.tank.readers.ardusub_frames import frame_of, misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.no_measurement import measured_only
 from rov_fmu.tank.readers.parsers import guarded, open_table, read_content
@@ -112,6 +112,7 @@ def _log(
         follows_axis=COMMAND in series,
         findings=tuple(findings),
         unread=unread,
+        frame=frame_of(config),
         names=content.names or frozenset(piece.fields),
     )
 

@@ -73,7 +73,7 @@ TYPED: dict[str, tuple[str, str]] = {
     "a recording for a vehicle": ("fly log.csv", "log.csv: must be a vehicle file (TOML), and not a recording"),
     "an autopilot's log for a ghost": (
         "fly --against d.tlog",
-        "and not the log of an autopilot, of ROS or of MATLAB; `rov-fmu identify` reads it in a folder of tank tests",
+        "and not the log of an autopilot, of ROS or of MATLAB; `rov-fmu inspect` lists what it contains, and",
     ),
     "rov.toml for a vehicle": (
         "build rov.toml",
@@ -89,7 +89,11 @@ TYPED: dict[str, tuple[str, str]] = {
         "prove mine.toml",
         "mine.toml: must be an FMU, and not a TOML file; `rov-fmu build` makes an FMU of a vehicle file",
     ),
-    "a file for a folder": ("identify mine.toml", "mine.toml: is a file, and must be a folder with rov.toml"),
+    "a vehicle for its tests": (
+        "identify mine.toml",
+        "mine.toml: must be a log, or a folder of tank tests, and not a TOML file",
+    ),
+    "no tests": ("inspect nowhere.bin", "nowhere.bin: there is no such file and no such folder"),
     "an FMU written to a vehicle file": (
         "build -o mine.toml",
         "mine.toml: would be an FMU, but .toml is the suffix of a TOML file",
@@ -100,10 +104,9 @@ TYPED: dict[str, tuple[str, str]] = {
         "--platform: the PythonFMU flavour is the same for all platforms",
     ),
     "a draft that is written elsewhere": (
-        "identify . --draft --force",
-        "identify: --draft writes only a draft of rov.toml: leave -o, --report, --mcap, --base, --force out",
+        "identify . --draft -o mine.toml",
+        "identify: --draft identifies nothing: leave -o, --mcap, --base out",
     ),
-    "an inspection with a report": ("identify . --inspect --report r.html", "identify: --inspect writes only a draft"),
     "a vehicle that is no FMU yet": (
         "prove videoray",
         "videoray: must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name",

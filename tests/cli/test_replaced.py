@@ -152,11 +152,13 @@ WRITING = {
     ("identify", "output"): ("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
     ("identify", "report"): ("report.html", f"identify {_FEW} --report {{f}}/report.html"),
     ("identify", "mcap"): ("logs.mcap", f"identify {_FEW} --mcap {{f}}/logs.mcap"),
+    ("inspect", "report"): ("page.html", f"inspect {_FEW} --report {{f}}/page.html"),
     ("tune", "output"): ("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
 }
 READING = {
     *{("build", "sign"), ("simulate", "commands"), ("fly", "recording"), ("fly", "identified")},
-    *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("identify", "folder"), ("tune", "points")},
+    *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("tune", "points")},
+    *{("identify", "tests"), ("inspect", "tests")},
 }
 """The arguments and options that name a file to read."""
 AGAIN = [key for key in WRITING if key[0] in ("simulate", "fly", "sdf", "export", "tune")]

@@ -101,6 +101,7 @@ COMMANDS = [
     "export",
     "fly",
     "identify",
+    "inspect",
     "prove",
     "schema",
     "sdf",

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -36,10 +37,12 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.description import Draft, read_description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.folders import BLUEROV2
 from tests.report.results import FILES, TIME, example, log, prediction, without_findings
 
 BLUEROV = load_vehicle(SHIPPED["bluerov2"])
@@ -76,6 +79,12 @@ def with_channels(*names: str) -> Identification:
     vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False))
     one = replace(log("dive.csv"), channels=channels)
     return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)
+
+
+def with_description(reason: str) -> Identification:
+    """A result of a drafted rov.toml; without a reason, a user has named the base."""
+    described = read_description(Path("rov.toml"), draft=Draft(BLUEROV2, reason))
+    return quiet(folder=replace(quiet().folder, rov_file=described))
 
 
 def with_full(share: float) -> Identification:
@@ -172,6 +181,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(curves={"top": (SCALE,)}, forces=()),
         "top thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust. A spring",
         quiet(curves={"top": (SCALE,)}, forces=forces(1.0)),
+    ),
+    (
+        "assumed vehicle",
+        with_description("it is the first that ships with 6 thrusters"),
+        "the vehicle is taken for bluerov2, because it is the first that ships with 6 thrusters: its thrusters, their ",
+        with_description(""),
     ),
     (
         "not identified",

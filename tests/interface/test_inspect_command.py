@@ -1,4 +1,4 @@
-"""`rov-fmu identify --inspect`: what logs contain, and a draft of rov.toml with which they are read."""
+"""`rov-fmu inspect`: what logs contain, what no fit can learn from them, and a draft with which they are read."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -10,16 +10,20 @@ from typing import Any
 import numpy as np
 import pytest
 import tomlkit
+from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
+from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
+from tests.folders import VECTORED
+from tests.report.pages import check_refers_to_itself_alone
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
-from tests.tank.readers.writers import LOGS, Ros, servos, table, write_tlog
+from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_tlog
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -63,9 +67,10 @@ Inspect = Callable[..., tuple[str, str]]
 def inspect(tmp_path: Path, capsys: Capsys) -> Inspect:
     """A function that inspects logs, and returns what is printed and the draft of rov.toml."""
 
-    def inspected(path: Path = tmp_path, option: str = "--inspect") -> tuple[str, str]:
-        assert main(["identify", option, str(path)]) == 0
-        return capsys.readouterr().out, (tmp_path / "rov.toml").read_text(encoding="utf-8")
+    def inspected(path: Path = tmp_path, option: str = "--draft") -> tuple[str, str]:
+        assert main(["inspect", *[option] * bool(option), str(path)]) == 0
+        draft = tmp_path / "rov.toml"
+        return capsys.readouterr().out, draft.read_text(encoding="utf-8") if draft.exists() else ""
 
     return inspected
 
@@ -117,7 +122,20 @@ def test_samples_rates_ranges_gaps_and_what_is_not_recognised(tmp_path: Path, in
     )
     out, draft = inspect(tmp_path / "log_heave.csv")
     rows = {line.split("  ")[0]: line.split() for line in out.splitlines() if line}
-    assert rows["command"][1:] == ["1", "60", "10", "0", "0.3", "4.1", "s", "at", "3.9", "s"]
+    assert rows["command"][1:] == [
+        "1",
+        "60",
+        "10",
+        "0",
+        "0.3",
+        "▁▁▁▆█████████",
+        "███████",
+        "4.1",
+        "s",
+        "at",
+        "3.9",
+        "s",
+    ]
     assert rows["depth"][1:6] == ["m", "60", "10", "1", "1.99"]
     assert rows["voltage"][1:6] == ["V", "60", "10", "16", "25.9"]
     assert "\n# voltage = true\n" in draft
@@ -142,8 +160,9 @@ def test_a_rov_toml_tells_the_names_of_thrusters_and_columns(tmp_path: Path, ins
     rows = {line.split("  ")[0] for line in out.splitlines()}
     assert {"thruster fore", "thruster aft", "depth", "- battery [%]: 0 to 9.9"} <= rows
     assert "- sonde [m]" not in rows
-    assert draft == own
-    assert f"There is a {tmp_path / 'rov.toml'} already, so no draft was written." in out
+    assert draft.startswith(own.strip()), "what was there stays as it is"
+    assert parsed(draft)["vehicle"]["identifier"]
+    assert f"Wrote {tmp_path / 'rov.toml'}. Next: rov-fmu identify {tmp_path}" in out
 
 
 def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
@@ -255,6 +274,20 @@ def test_outputs_that_never_change_drive_no_thruster(tmp_path: Path, inspect: In
     assert "thruster 8" in out
 
 
+@pytest.mark.parametrize(("frame", "base"), [(0, ""), (1, "bluerov2")])
+def test_the_frame_of_the_autopilot_tells_the_base(frame: int, base: str, tmp_path: Path, inspect: Inspect) -> None:
+    """A BlueROV1 has six thrusters, too, and is no BlueROV2."""
+    messages = [parameter("FRAME_CONFIG", frame)]
+    pulses = np.transpose([1500 + 400 * c for c in THRUSTERS])
+    messages += [servos(100.0 + time, *map(round, row)) for time, row in zip(TIME, pulses, strict=True)]
+    write_tlog(tmp_path / "dive.tlog", messages)
+    assert parsed(inspect()[1]).get("base", "") == base
+    (tmp_path / "rov.toml").unlink()
+    if base:
+        reason = inspect_logs([tmp_path / "dive.tlog"]).draft_for(None).reason
+        assert reason == "the log has FRAME_CONFIG 1 (vectored)"
+
+
 def test_what_is_used_is_not_called_unrecognised(tmp_path: Path, inspect: Inspect) -> None:
     """Flags of validity, and all topics of commands, where each thruster has its own."""
     titles = ",".join(["time [s]", *(f"u_{n} [1]" for n in motion.THRUSTERS), "depth [m]", "depth_valid"])
@@ -288,7 +321,7 @@ def pool_run(folder: Path, tables: Mapping[str, str | bytes]) -> list[str]:
     pulses = [np.where(TIME < 2.0, 1500.0, 1500.0 + 400.0 * c) for c in THRUSTERS[:2]]
     titles = "time [s],thr_FS_pwm,thr_FP_pwm,Compass (deg),Gyro_Z (deg/s)"
     table(folder / "pool.csv", titles, TIME, *pulses, TIME, TIME)
-    assert main(["identify", "--inspect", str(folder)]) == 0
+    assert main(["inspect", "--draft", str(folder)]) == 0
     return (folder / "rov.toml").read_text(encoding="utf-8").splitlines()
 
 
@@ -379,35 +412,104 @@ def test_headers_with_control_characters(tmp_path: Path, inspect: Inspect) -> No
 # ---- Folders without rov.toml ----------------------------------------------------------------------------------------
 
 
-def test_a_folder_without_rov_toml_is_inspected_and_offers_the_draft(tmp_path: Path, capsys: Capsys) -> None:
+def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path: Path, capsys: Capsys) -> None:
+    """The option of `identify` is the same command."""
     folder = tmp_path / "A ROV (2)"
     folder.mkdir()
     one_file(folder)
     draft = folder / "rov.toml"
-    assert main(["identify", str(folder)]) == 0
-    out = capsys.readouterr().out
-    assert "thruster 1" in out
-    assert out.endswith(
-        f"There is no {draft}, which gives the vehicle's name and everything that no test tells.\n"
-        f"Next: rov-fmu identify '{folder}' --draft writes a draft of it\n"
-    )
-    assert not draft.exists()
-    assert main(["identify", str(folder), "-o", str(tmp_path / "v.toml")]) == 2
-    assert (
-        f"{draft}: there is no such file. It must give the vehicle's name, and everything that no test "
-        in capsys.readouterr().err
-    )
-    assert main(["identify", str(folder), "--draft"]) == 0
-    document = parsed(draft.read_text(encoding="utf-8"))
+    printed = []
+    for command in (["inspect"], ["identify", "--inspect"]):
+        assert main([*command, str(folder)]) == 0
+        printed.append(capsys.readouterr().out)
+        assert not draft.exists()
+    assert printed[0] == printed[1]
+    assert "thruster 1" in printed[0]
+    assert printed[0].endswith(f"Next: rov-fmu identify '{folder}'\n")
+    lines = printed[0].partition("--draft writes them:\n")[2].splitlines()
+    assert main(["inspect", str(folder), "--draft"]) == 0
+    text = draft.read_text(encoding="utf-8")
+    assert [line.removeprefix("  ") for line in lines[: len(text.splitlines())]] == text.splitlines()
+    document = parsed(text)
     assert (document["vehicle"]["name"], document["vehicle"]["identifier"]) == ("A ROV (2)", "a_rov_2")
     assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
     assert "dives" not in document, "its log is one file"
-    written = draft.read_bytes()
     capsys.readouterr()
-    assert main(["identify", str(folder), "--draft"]) == 2
-    assert "the file there is not replaced by a draft" in capsys.readouterr().err
-    assert draft.read_bytes() == written
+    assert main(["identify", str(folder), "--draft"]) == 0
+    assert "Wrote" not in capsys.readouterr().out, "it lacks nothing"
+    assert draft.read_text(encoding="utf-8") == text
     assert {path.name for path in folder.iterdir()} == {"rov.toml", "log_a.csv"}
+
+
+INCOMPLETE: dict[str, tuple[str, set[str]]] = {
+    "": (" ", {"base", "against", "vehicle", "known", "columns"}),
+    "a base": ('base = "bluerov2"  # mine\n', {"vehicle", "columns"}),
+    "a part of a table": ('# Mine.\nbase = "bluerov2"\n[vehicle]\nname = "Ours"\n', {"vehicle", "columns"}),
+    "a column": ('[columns]\n"Sonde" = "depth [ft]"  # my unit\n\n[limits]\nduration = 60.0\n', {"base", "vehicle"}),
+    "thrusters": (
+        f"{VECTORED.partition('[body]')[0]}[curves.t200]\n{VECTORED.partition('[curves.t200]')[2]}",
+        {"body", "columns"},
+    ),
+}
+"""What a rov.toml has, and what `--draft` adds."""
+
+
+@pytest.mark.parametrize("name", INCOMPLETE)
+def test_a_draft_completes_what_is_there_and_keeps_it(name: str, tmp_path: Path, inspect: Inspect) -> None:
+    own, added = INCOMPLETE[name]
+    (tmp_path / "rov.toml").write_text(own, encoding="utf-8")
+    pulses = [1500.0 + 400.0 * c for c in THRUSTERS[: 4 if name == "thrusters" else 6]]
+    titles = [f"T{n} (us)" for n, _ in enumerate(pulses, start=1)]
+    table(tmp_path / "dive.csv", ",".join(["t", *titles, "Sonde", "Tiefe (m)"]), TIME, *pulses, DEPTH, DEPTH)
+    _, text = inspect()
+    before, after = parsed(own), parsed(text)
+    assert {line.strip() for line in own.splitlines()} <= {line.strip() for line in text.splitlines()}
+    assert {key for key in after if after[key] != before.get(key)} >= added
+    for key, value in before.items():
+        assert after[key] == value or after[key] == after[key] | value
+    assert inspect()[1] == text, "a second time, nothing is lacking"
+
+
+def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: Inspect) -> None:
+    """Sway is not measured, yaw is only commanded together with surge, and its commands change in each row."""
+    time = 0.1 * np.arange(400.0)
+    surge, yaw, down = 0.3 * np.sin(time), 0.3 * np.sin(time + 0.1), 0.2 * np.sin(0.4 * time)
+    sides = [-surge + yaw, -surge - yaw, surge - yaw, surge + yaw, down, down]
+    titles = ",".join(["time [s]", *(f"u_{n} [1]" for n in range(1, 7)), "surge velocity [m/s]", "heading [deg]"])
+    table(tmp_path / "dive.csv", titles, time, *sides, np.sin(time), np.cos(time))
+    told = inspect(option="")[0].partition("What no fit can learn from these logs:\n")[2].partition("\n\n")[0]
+    for words in (
+        "sway stays that of bluerov2: no log has a velocity or a position of sway. Command it both ways, and log its",
+        "heave stays that of bluerov2: no log has a velocity or a position of heave. Command it both ways, and log the",
+        "yaw: known less well, because it is never commanded alone, only together with surge",
+        "speeds beyond the strongest commands, 30% in surge and 30% in yaw, are extrapolated",
+        "dive.csv: the commands are momentary values, because they change in 100% of the rows",
+        "forces are relative to an assumed thrust",
+    ):
+        assert f"- {words}" in told
+    still = [np.where(time < 20.0, 0.3, 0.0) for _ in range(4)] + [np.zeros(400)] * 2
+    table(tmp_path / "dive.csv", titles, time, *still, np.sin(time), np.cos(time))
+    told = inspect(option="")[0]
+    assert "the thrusters along surge and yaw cancel each other all the time" in told
+    assert "momentary" not in told
+
+
+def test_the_page_of_logs_has_a_picture_of_each(tmp_path: Path) -> None:
+    one_file(tmp_path)
+    (tmp_path / "bad.csv").write_text("time [s],depth [m]\n", encoding="utf-8")
+    page = tmp_path / "logs.html"
+    for _ in range(2):
+        assert main(["inspect", str(tmp_path), "--report", str(page)]) == 0
+    root = html.fromstring(page.read_text(encoding="utf-8"))
+    assert [svg.get("aria-label") for svg in root.iter("svg")] == ["log_a.csv over time"]
+    told = root.text_content()
+    assert "Bad.csv: left out as unreadable" in told or "bad.csv: left out as unreadable" in told
+    for words in ("What no fit can learn from these logs", "thruster 6", "surge and sway", 'base = "bluerov2"'):
+        assert words in told
+    check_refers_to_itself_alone(page.read_text(encoding="utf-8"))
+    page.write_text("mine", encoding="utf-8")
+    assert main(["inspect", str(tmp_path), "--report", str(page)]) == 2
+    assert page.read_text(encoding="utf-8") == "mine"
 
 
 UNREADABLE: dict[str, bytes] = {

@@ -9,12 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.prove.claims import prove_claims
+from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from tests.report.conftest import Visit
 from tests.report.pages import UNFOLD
 from tests.report.results import example
+from tests.tank.readers.motion import DIVE
+from tests.tank.readers.writers import LOGS
 
 if TYPE_CHECKING:
     pass
@@ -47,9 +51,18 @@ def evidence(videoray_fmu: Path, tmp_path_factory: pytest.TempPathFactory) -> Pa
     return path
 
 
+@pytest.fixture(scope="module")
+def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What `rov-fmu inspect --report` writes about a dive."""
+    folder = tmp_path_factory.mktemp("inspection")
+    path = folder / "logs.html"
+    path.write_text(inspection_page(inspect_logs([LOGS[".tlog"](folder, DIVE)])), encoding="utf-8")
+    return path
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [375, 1440])
-@pytest.mark.parametrize("name", ["documentation", "report", "evidence"])
+@pytest.mark.parametrize("name", ["documentation", "report", "evidence", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
 ) -> None:
@@ -88,8 +101,8 @@ def test_what_is_folded_opens_by_a_click_or_a_link_and_on_paper(report: Path, vi
     assert not table.is_visible()
     page.emulate_media(media="print")
     page.set_viewport_size({"width": 720, "height": 1000})
-    assert page.locator(".picture .broad svg").is_visible(), "a page of A4 is as wide as a screen"
-    assert not page.locator(".picture .narrow svg").is_visible()
+    assert page.locator(".picture .narrow svg").is_visible(), "beside the answers, there is half a page"
+    assert not page.locator(".picture .broad svg").is_visible()
     box = table.bounding_box()
     assert box is not None
     assert box["height"] > 50
@@ -114,3 +127,12 @@ def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, v
     seen.page.mouse.move(5, 5)
     assert seen.page.locator(".broad .values span").count() == 0
     assert (seen.problems(), seen.requests) == ([], [report.as_uri()])
+
+
+def test_the_answers_are_on_the_first_page_of_paper(report: Path, visit: Callable[..., Visit]) -> None:
+    """Verdicts, answers, picture, next test and warnings fit on A4 with its margins, 182 mm by 273 mm."""
+    seen = visit(width=688, height=1031)
+    seen.page.emulate_media(media="print")
+    seen.page.goto(report.as_uri())
+    bottom = seen.page.evaluate("document.querySelector('.overview').getBoundingClientRect().bottom")
+    assert 300.0 < bottom < 1031.0

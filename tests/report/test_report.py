@@ -19,7 +19,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.fmu.content import native_content, python_content
 from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, driven_aside, next_tests, told
-from rov_fmu.identify.result import AxisResult, Identification, Slip
+from rov_fmu.identify.result import AxisResult, Coefficient, Identification, Slip
 from rov_fmu.io.output import write_whole
 from rov_fmu.report import report
 from rov_fmu.report.console import _Console
@@ -97,6 +97,21 @@ def test_the_page_is_whole_loads_nothing_and_answers_the_owners_questions_first(
     shown = [h2.text_content() for h2 in root.iter("h2") if h2.getparent().tag != "summary"]
     verdicts = ["Surge: good", "Heave: usable", "Yaw: do not use"]
     assert shown == [*verdicts, "What you can expect", "What to measure next", "Warnings"]
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_numbers_in_units_of_an_assumed_thrust_say_so(page: str) -> None:
+    """Beside drag, load, β and the inertias; neither beside a time nor where a force was measured."""
+    words = "in units of the assumed thrust"
+    assert words not in text_of(page)
+    curves = {"top": (Coefficient("a_t_top", 6.0, (5.0, 7.0), "N", "6.0 ± 1.0 N", 0.5),)}
+    made = report_page(told(replace(without_findings(), forces=(), curves=curves)))
+    heads = [th.text_content() for th in html.fromstring(made).xpath("//th[@class='quantity']")]
+    assert heads
+    assert all(head.endswith(f", {words}") for head in heads)
+    (load,) = [row[0] for row in rows(made) if row[0].startswith("Constant load")]
+    (lag,) = [row[0] for row in rows(made) if row[0].startswith("Lag of the thrusters")]
+    assert (load, lag) == (f"Constant load, {words}", "Lag of the thrusters")
 
 
 @pytest.mark.interop

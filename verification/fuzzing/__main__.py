@@ -119,7 +119,7 @@ def _try_logs(inputs: Sequence[Path], count: int) -> None:
             try:
                 tried = try_damaged(path, range(count), Path(name))
             except FindingError as finding:
-                again = [_keep("rov-fmu identify --inspect", one) for one in finding.inputs]
+                again = [_keep("rov-fmu inspect", one) for one in finding.inputs]
                 raise FindingError("\n".join([str(finding), *again])) from None
         seconds, memory = f"{tried.seconds:.1f}", f"{tried.memory / 1e9:.2f}"
         result.add_row(path.name, str(tried.read), str(tried.refused), seconds, memory)

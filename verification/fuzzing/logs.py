@@ -1,6 +1,6 @@
 """Damages logs and tables, and looks whether each is read, or refused in one line, within a minute and 2 GB.
 
-A file is read as `rov-fmu identify --inspect` reads it, in this process, so that the next file costs no start. The time
+A file is read as `rov-fmu inspect` reads it, in this process, so that the next file costs no start. The time
 is that of the wall clock; the memory is that of this process and of the child process that reads, counted together.
 """
 
@@ -91,12 +91,11 @@ def _inspected(path: Path) -> tuple[str, float, float]:
 
     Raises what the command raises, and AssertionError for another message.
     """
-    path.with_name("rov.toml").unlink(missing_ok=True)  # the draft of the file before
     printed, told = StringIO(), StringIO()
     begin = time.monotonic()
     _forget_peaks()
     with redirect_stdout(printed), redirect_stderr(told):
-        code = main(["identify", "--inspect", str(path)])
+        code = main(["inspect", str(path)])
     seconds, memory = time.monotonic() - begin, _peak()
     lines = told.getvalue().splitlines()
     assert code in (0, 2), f"exit code {code}: {lines}"

@@ -115,11 +115,11 @@ def add_legend(figure: Figure, columns: int = 2) -> None:
 
 
 def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = "1") -> None:
-    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or pulse widths in µs.
+    """Draw the commands of all thrusters as steps in one small panel: fractions in percent, or numbers in another unit.
 
     Equal commands share a line.
     """
-    factor, shown = (100.0, "%") if unit == "1" else (1.0, "µs")
+    factor, shown = (100.0, "%") if unit == "1" else (1.0, unit)
     groups: dict[bytes, list[str]] = {}
     for name, values in commands.items():
         groups.setdefault(np.asarray(values, float).tobytes(), []).append(name)

@@ -49,6 +49,8 @@ _NO_THRUSTER = 2
 """The grade of a header that names no thruster."""
 _NO_COMMAND = {"rc", "rcin", "max", "min", "limit", "n", "kgf", "lbf", *NOT_COMMANDED}
 """Words in headers that are no commands: of a pilot, limits, and forces."""
+_SHARES = {"force", "thrust", "torque"}
+"""Words of forces, which are commands if their unit is one of commands: a thrust in percent."""
 _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 """A name of a thruster that a vehicle file may have."""
 _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
@@ -239,7 +241,7 @@ def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
 def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
     """Return the name of the column that a header seems to mean, or an empty text.
 
-    `rotations` are the beginnings of headers of quaternions.
+    `rotations` are the beginnings of headers of quaternions. Nothing is measured in percent.
     """
     words, unit = _words(title), header_parts(title)[1]
     is_part = words.endswith((" x", " y", " z"))
@@ -247,6 +249,8 @@ def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
         return ""
     for name in _candidates(title, ("", "time", *QUANTITIES)):
         quantity = QUANTITIES.get(name)
+        if quantity and unit == "%":
+            continue
         if not (quantity and quantity.is_velocity) or unit in quantity.units or (is_part and not unit):
             return name
     return ""
@@ -255,8 +259,10 @@ def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
 def _may_be_command(title: str, numbers: Array) -> bool:
     """Return True if the name and the unit of a header are not against the command of a thruster."""
     unit = header_parts(title)[1].casefold()
-    is_possible = unit in ("", "1", "-", "%", "pwm") or unit.startswith(PULSES)
-    return bool(is_possible and len(numbers) and not _NO_COMMAND & {*_words(title).split()})
+    is_unit_of_command = unit == "%" or unit.startswith(PULSES)
+    no_command = _NO_COMMAND - _SHARES if is_unit_of_command else _NO_COMMAND
+    is_possible = is_unit_of_command or unit in ("", "1", "-", "pwm")
+    return bool(is_possible and len(numbers) and not no_command & {*_words(title).split()})
 
 
 def _is_command(title: str, numbers: Array, meant: str) -> bool:
@@ -264,7 +270,10 @@ def _is_command(title: str, numbers: Array, meant: str) -> bool:
     if not _may_be_command(title, numbers):
         return False
     given = numbers[~np.isin(numbers, NO_OUTPUT)]
-    if re.search(COMMANDS, _words(title)) or (header_parts(title)[1] == "%" and not meant):
+    unit = header_parts(title)[1]
+    if unit.startswith(PULSES) and _within(given, PULSE_RANGE):
+        return True
+    if re.search(COMMANDS, _words(title)) or (unit == "%" and not meant):
         return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
     values, counts = np.unique(given, return_counts=True)
     return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
@@ -288,12 +297,15 @@ def _within(numbers: Array, ends: tuple[float, float]) -> bool:
 def _names(titles: Sequence[str]) -> list[str]:
     """Return names of thrusters for columns of commands: what is particular in those of the columns, or else numbers.
 
-    The words that all headers share say nothing: the particular part of `thr_FS_pwm` is `FS`.
+    The words that all headers share say nothing: the particular part of `thr_FS_pwm` is `FS`. Numbers that count from 0
+    become those of the thrusters, which count from 1.
     """
     parts = [header_parts(title)[0] for title in titles]
     words = [re.findall(r"[^\W\d_]+|\d+|[\W_]+", part) for part in parts]
     shared = set.intersection(*map(set, words)) if len(words) > 1 else {*words[0][:-1]} if words else set()
     particular = [re.sub(r"[\W_]+", "_", "".join(w for w in own if w not in shared)).strip("_") for own in words]
+    if {*particular} == {str(n) for n in range(len(titles))}:
+        return [str(int(number) + 1) for number in particular]
     for names in (particular, parts):
         if all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names):
             return names

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from math import nan
 from pathlib import Path
 from typing import TextIO
@@ -27,6 +28,9 @@ from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
 
+PARTS = 32
+"""The number of parts of the time for which the course of a signal is told."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -43,6 +47,8 @@ class Row:
     low: float
     high: float
     gaps: Sequence[tuple[float, float]]
+    course: Sequence[float] = ()
+    """The mean in each of PARTS equal parts of the time; NaN where there is no sample. Empty without times."""
 
 
 @dataclass(frozen=True)
@@ -61,14 +67,17 @@ class Inspection:
     findings: tuple[Finding, ...]
     columns: Mapping[str, str] = field(default_factory=dict)
     """Headers of columns of logs that seem to be meant, by the headers of the file."""
+    log: Log | None = None
+    """What is read of a log; None for a table, and where not enough is recognised."""
 
 
 def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_FILE) -> list[Inspection]:
     """Return what a log contains, for each piece between two restarts of its clock, or what a table contains.
 
     The thrusters and columns have the names of the described vehicle, and the tables [columns], [topics], [valid] and
-    [logs] of its rov.toml are obeyed. Without one, the thrusters of a CSV log have the names of the first layout that
-    fits, or else names that follow from the headers. Raises DataFileError.
+    [logs] of its rov.toml are obeyed. What it does not explain is guessed from headers and numbers. Without a
+    description, the thrusters of a CSV log have the names of the first layout that fits, or else names that follow from
+    the headers. Raises DataFileError.
     """
     layout = described.description.layout if described.description else None
     tables = described.tables
@@ -91,10 +100,15 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
-        if not described:
-            layout, columns = guessed(titles, numbers, axis, layouts)
-        names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
+        own = {renamed.get(title, title): numbers[title] for title in titles}
+        guess, columns = guessed([*own], own, axis, [described] if described else layouts)
+        layout = described or guess
         known = columns_of_log(layout, axis)
+        is_known = KnownColumns(known_columns(known)).has
+        told = {*map(_quantity, renamed.values())}
+        guesses = {title: meant for title, meant in columns.items() if title in numbers and is_known(meant)}
+        columns = {title: meant for title, meant in guesses.items() if _quantity(meant) not in told} | renamed
+        names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
         is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {title: ranges[title] for title in titles if not (is_column(meant[title]) or title in flags)}
@@ -111,6 +125,11 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     return [_of_log(path, log, unread, columns) for log in logs]
 
 
+def _quantity(meant: str) -> str:
+    """Return what a header stands for, without its sign and its unit."""
+    return meant.removeprefix("-").partition(" [")[0]
+
+
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
     """Return what a log contains; `unread` has the columns that are not recognised."""
     channels = tuple(
@@ -118,7 +137,8 @@ def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[st
         for channel in log.channels
         if not channel.unused
     )
-    return Inspection(path, log.file, tuple(_commands(log)), channels, {**unread, **log.unread}, log.findings, columns)
+    unread = {**unread, **log.unread}
+    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, log.findings, columns, log)
 
 
 def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection:
@@ -166,7 +186,16 @@ def _row(name: str, unit: str, time: Array, values: Array) -> Row:
     at, found = time[there], values[there]
     ends = (at[0], at[-1], found.min(), found.max()) if len(found) else (np.nan,) * 4
     start, end, low, high = map(float, ends)
-    return Row(name, unit, start, end, len(found), rate(at), low, high, gaps(time, values))
+    return Row(name, unit, start, end, len(found), rate(at), low, high, gaps(time, values), _course(at, found))
+
+
+def _course(time: Array, values: Array) -> list[float]:
+    """Return the mean in each of PARTS equal parts of the time, where there is any."""
+    if len(time) < 2 or not time[0] < time[-1] < np.inf:
+        return []
+    ends = np.linspace(time[0], np.nextafter(time[-1], np.inf), PARTS + 1)
+    parts = [values[(time >= start) & (time < end)] for start, end in pairwise(ends)]
+    return [float(part.mean()) if len(part) else nan for part in parts]
 
 
 def _commands(log: Log) -> Iterator[Row]:

@@ -90,6 +90,11 @@ def config_of(frame: str) -> str:
     return f"FRAME_CONFIG {[*FRAMES].index(frame)} ({frame})"
 
 
+def frame_of(config: float | None) -> str:
+    """Return the name of the frame of a FRAME_CONFIG; an empty text without one, and for a frame that is not known."""
+    return next((name for number, name in enumerate(FRAMES) if number == config), "")
+
+
 def question_of(layout: Layout) -> str:
     """Return the question whether ArduSub has the frame that fits a vehicle."""
     own = listed(map(config_of, fitting_frames(layout)), "or")

@@ -74,6 +74,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         ),
         ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
         ({"effects": [replace(SLOW, beyond=2.4)]}, "good", ""),
+        ({"is_assumed": True}, "usable", "The mass and the thrusters are assumed."),
         ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
         (
             {"structure": 4.2},
@@ -119,6 +120,7 @@ MADE: dict[str, Any] = {
     "upper end": lambda x: {"inertia": x},
     "effects of unusual": lambda x: {"effects": [SLOW] * round(x)},
     "slips": lambda x: {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)] * round(x)},
+    "an assumed": lambda x: {"is_assumed": x > 0.5},
     "difference of J": lambda x: {"difference": x},
 }
 """How to make evidence of a value, by the beginning of the words of its rule."""

@@ -12,7 +12,8 @@ from matplotlib.figure import Figure
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.result import Prediction
-from rov_fmu.report.plots.identification import plot_answers, plot_forces, plot_overview, plot_prediction
+from rov_fmu.report.plots.identification import plot_answers, plot_forces
+from rov_fmu.report.plots.logs import plot_log
 from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -42,7 +43,7 @@ def bars(ax: Axes) -> list[tuple[float, float, float]]:
 
 def drawn(p: Prediction) -> Axes:
     figure = Figure()
-    plot_prediction(figure, p)
+    plot_log(figure, None, [p])
     (ax,) = figure.axes
     return ax
 
@@ -65,14 +66,14 @@ def test_a_prediction_has_its_measured_and_predicted_values_and_the_band() -> No
 def test_the_overview_has_a_panel_for_each_axis_above_the_commands() -> None:
     shown = [prediction(HEAVE, "depth"), prediction(SURGE, "distance")]
     figure = Figure()
-    plot_overview(figure, shown, log(FILES[1], full=0.5))
+    plot_log(figure, log(FILES[1], full=0.5), shown, measured=False)
     upper, _, commands = figure.axes
     assert [ax.get_title(loc="left") for ax in figure.axes] == ["Depth (m)", "Distance (m)", "Commands (%)"]
     assert [ax.get_xlabel() for ax in figure.axes] == ["", "", "time (s)"]
     time, values = lines(commands)["u_t"]
     assert [values[time.index(end)] for end in (time[0], time[-1])] == [100.0, 50.0]
     assert {*lines(upper)} == {"measured", "predicted, with 95 % band"}
-    plot_overview(without := Figure(), shown, None)
+    plot_log(without := Figure(), None, shown)
     assert [ax.get_xlabel() for ax in without.axes] == ["", "time (s)"]
 
 

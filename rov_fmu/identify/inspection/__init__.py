@@ -1,0 +1,1 @@
+"""What logs contain, and what no fit can learn from them."""

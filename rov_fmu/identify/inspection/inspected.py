@@ -1,0 +1,173 @@
+"""What logs contain, what they cannot determine, and a draft of rov.toml."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from rov_fmu.equation.catalogue import EXTERNAL
+from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.inspection.undetermined import undetermined
+from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import listed
+from rov_fmu.io.output import Output
+from rov_fmu.io.reading import read_text
+from rov_fmu.tank.columns import COMMAND
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, has_wrench, read_description
+from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
+from rov_fmu.tank.folder import folder_and_files, together, unreadable
+from rov_fmu.tank.inspection.draft import LikelyVehicle, completed, dives, draft, lacking, likely_vehicle
+from rov_fmu.tank.inspection.headers import TableHeaders, headers_of_tables
+from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
+from rov_fmu.tank.log import Log
+from rov_fmu.tank.readers.listing import Listing, list_files, named
+from rov_fmu.tank.readers.parsers import one_parser
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+
+
+@dataclass(frozen=True)
+class Inspected:
+    """What logs contain, what they cannot determine, and what rov.toml would be."""
+
+    logs: Sequence[Inspection]
+    warnings: Sequence[str]
+    """A sentence for each file that cannot be read."""
+    notes: Sequence[str]
+    """A sentence about the tables in the folder, and one for each reason why others are not read."""
+    path: Path
+    """The place of rov.toml."""
+    own: str
+    """The text of rov.toml; empty without one."""
+    text: str
+    """The draft of rov.toml, or the tables and keys that it lacks; empty if it lacks nothing."""
+    description: Description | None
+    """The vehicle by rov.toml, or by the draft; None where neither tells its hardware."""
+    likely: LikelyVehicle
+    """The vehicle that the logs seem to be of."""
+    headers: TableHeaders
+    name: str
+    """The name of the draft's vehicle."""
+
+    @property
+    def missing(self) -> list[str]:
+        """What to do before anything can be identified, besides editing the draft."""
+        has_commands = any(one.commands or any(row.name == COMMAND for row in one.channels) for one in self.logs)
+        has_names = all(finding.kind != "unnamed table" for one in self.logs for finding in one.findings)
+        steps = {"add the commands, or name their columns": has_commands, "rename the tables": has_names}
+        return [step for step, is_done in steps.items() if not is_done]
+
+    @property
+    def is_enough(self) -> bool:
+        """True if `identify` needs no draft: there is a rov.toml, or a vehicle that ships can stand in for it."""
+        return bool(self.own or self.likely.base)
+
+    @property
+    def completed(self) -> Output:
+        """The file rov.toml: the draft, or the one that is there with what it lacks."""
+        return Output(self.path, completed(self.own, self.text).encode())
+
+    @property
+    def dives(self) -> list[Log]:
+        """The logs with commands, each with the channels of the files without commands that belong to it."""
+        by_name = {one.path.name: one.log for one in self.logs if one.log}
+        joined = {files[0]: files for files in dives(self.logs)}
+        found = []
+        for one in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
+            parts = [by_name[name] for name in joined.get(one.file, ()) if by_name.get(name)]
+            found.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
+        return found
+
+    @property
+    def undetermined(self) -> list[str]:
+        """A sentence for everything that the logs cannot determine, whatever a fit finds."""
+        if not self.description:
+            return []
+        dives = self.dives
+        if self.description.layout.has_wrench:
+            dives = [replace(log, commands=c.relative_to(_whole(c.largest))) for log in dives if (c := log.commands)]
+        return [*undetermined(dives, self.description)] if dives else []
+
+    def draft_for(self, base: Path | None) -> Draft:
+        """Return a rov.toml that nobody has to complete, with the vehicle that the logs seem to be of, or with a given
+        one. Raises VehicleFileError if no vehicle that ships has such thrusters, and none is given."""
+        if not (base or self.likely.base):
+            own, instead = listed(self.likely.thrusters), "name a vehicle file by --base, or "
+            why = f"no vehicle that ships has the thrusters {own}" if own else "no log has commands of thrusters"
+            if not EXTERNAL.isdisjoint(self.likely.thrusters):
+                why, instead = "the logs have forces on the body, and none tells the mass", ""
+            raise VehicleFileError(
+                f"{self.path}: there is no such file, and {why}: {instead}describe the vehicle: `rov-fmu inspect "
+                '--draft` writes the file with a "?" wherever you have to decide'
+            )
+        text = draft(self.name, self.logs, self.headers, self.likely, asks=False)
+        return Draft(text, "" if base else self.likely.reason)
+
+
+def _whole(largest: dict[str, float]) -> dict[str, float]:
+    return {name: most or 1.0 for name, most in largest.items()}
+
+
+@one_parser()
+def inspect_logs(paths: Sequence[Path]) -> Inspected:
+    """Return what logs contain, or each log in a folder, with a draft of rov.toml, or with what it lacks.
+
+    If there is a rov.toml already, thrusters and columns have its names, unless its hardware tables have a mistake.
+    Files that cannot be read are left out. Raises DataFileError if no file is left, and VehicleFileError if rov.toml is
+    not TOML.
+    """
+    folder, files = folder_and_files(paths)
+    place = folder / ROV_FILE
+    described = read_description(place) if place.exists() else NO_ROV_FILE
+    is_described = bool(described.tables.base or described.tables.thruster or has_wrench(described.tables))
+    layouts = [load_vehicle(file).layout for file in SHIPPED.values()]
+    listing = Listing(folder, files) if files else list_files(folder)
+    inspections: list[Inspection] = []
+    mistakes: list[str] = []
+    findings: list[Finding] = listing.findings
+    logs = logs_among(listing.tests, described.tables.columns)
+    if tables := [test for test in listing.tests if test not in logs]:
+        findings.append(about(named(tables), "tank tests"))
+    for log in logs:
+        try:
+            inspections += inspect(log, layouts, described if is_described else replace(described, description=None))
+        except DataFileError as error:
+            mistakes += str(error).splitlines()
+            findings.append(unreadable(log, error))
+    if not inspections:
+        raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
+    headers = headers_of_tables(folder)
+    likely = likely_vehicle(inspections, headers.curves)
+    name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
+    text = draft(name, inspections, headers, replace(likely, base="") if described.tables.thruster else likely)
+    own = read_text(place, VehicleFileError).strip() if place.exists() else ""
+    has_vehicle = is_described or _has_form_of_paper(described, likely)
+    lacks = lacking(own, text, has_vehicle=has_vehicle) if own else text
+    if lacks and place.exists():  # what is told is about the file that it will be
+        described = read_description(place, draft=Draft(completed(own, lacks), ""))
+    notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
+    warnings = [finding for finding in findings if finding not in notes]
+    inspected = Inspected(
+        logs=inspections,
+        warnings=[*sentences(warnings, SENTENCES), *described.mistakes],
+        notes=sentences(notes, SENTENCES),
+        path=place,
+        own=own,
+        text=lacks,
+        description=described.description,
+        likely=likely,
+        headers=headers,
+        name=name,
+    )
+    return inspected if own else replace(inspected, description=_drafted(inspected).description)
+
+
+def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:
+    """Return True if a rov.toml that has no vehicle stands for that of the paper, and the logs do not contradict it."""
+    layout = described.description.layout if described.description else Layout((), (), ())
+    return {*likely.thrusters} <= {thruster.name for thruster in layout.thrusters} | {COMMAND}
+
+
+def _drafted(inspected: Inspected) -> RovFile:
+    """Return what the draft says of the vehicle."""
+    draft = inspected.draft_for(None) if inspected.likely.base else Draft(inspected.text, "")
+    return read_description(inspected.path, draft=draft)

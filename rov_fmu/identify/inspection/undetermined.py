@@ -1,0 +1,145 @@
+"""What recordings cannot determine, and why, told before any fit."""
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.beginning import layout_of
+from rov_fmu.identify.findings import how_to_measure, how_to_record
+from rov_fmu.identify.likelihood.records import driven_axes
+from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import percent
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.description import Description
+from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.log import Commands, Log
+
+_LEAST_PUSH, _ASIDE = 0.1, 1.0 / 3.0
+"""An axis is commanded alone where its command is above the first number, a fraction of the full one, and those of the
+axes that share thrusters with it are below the second one, relative to it."""
+_LEAST_TIME = 1.0
+"""An axis that is commanded alone for less than this time, s, is never commanded alone."""
+_CHANGING, _SLOWEST = 0.5, 0.04
+"""Commands are momentary values if they change in more than the first share of the rows, and if the rows are farther
+apart than this, s. A controller changes them far more often."""
+_FULL = 0.95
+"""A command above this counts as full."""
+_REASONS = {
+    "constant push": "the thrust along {it} never changes",
+    "cancelling thrusters": "the thrusters along {it} cancel each other all the time",
+    "no thruster": "no thruster drives {it}",
+    "constant motion": "what is measured of {it} never changes",
+    "too few samples": "too few samples show {it}",
+}
+"""Why a log that measures the motion along an axis tells nothing about it, by the kind of the finding."""
+
+
+def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]:
+    """Yield a sentence for everything that logs cannot determine about the vehicle that a rov.toml describes.
+
+    Nothing is fitted: it follows from what is measured, and from how the thrusters are commanded.
+    """
+    layout = description.logged
+    driven: dict[Log, list[Axis]] = {}
+    findings: list[Finding] = []
+    for log in logs:
+        driven[log], found = driven_axes(log, layout_of(log, layout if not log.axis else description.layout))
+        findings += found
+    tested = {axis for axes in driven.values() for axis in axes}
+    groups: dict[tuple[str, str], list[Axis]] = {}
+    for axis in (form.axis for form in layout.axes if form.axis not in tested):
+        groups.setdefault(_reason(axis, findings, logs), []).append(axis)
+    for (reason, sensor), axes in groups.items():
+        named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
+        stays = f"{'stay those' if are_many else 'stays that'} of {base}" if base else "cannot be identified"
+        why = reason.replace("{it}", named)
+        how = how_to_record(axes) if sensor else f"Command {'each' if are_many else 'it'} both ways"
+        yield f"{named} {stays}: {why}. {how}"
+    if not layout.has_wrench:
+        weak: list[str] = []
+        for axis in (form.axis for form in layout.axes if form.axis in tested):
+            own = [log.commands for log, axes in driven.items() if axis in axes and log.commands]
+            largest, told = _by_commands(axis, own, layout)
+            yield from told
+            if 0.0 < largest < _FULL:
+                weak.append(f"{percent(largest)} in {axis.name}")
+        if weak:
+            yield f"speeds beyond the strongest commands, {listed(weak)}, are extrapolated"
+        yield from (words for log in logs if (words := _momentary(log)))
+        if curves := [c.name for c in layout.curves if c.coefficient("a_t") not in description.known]:
+            yield (
+                "forces are relative to an assumed thrust, and so are loads, drag, masses and β, unless "
+                f"thrust_{curves[0]}.csv has measured ones"
+            )
+
+
+def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> tuple[str, str]:
+    """Return why no log tests an axis, which is {it} in the reason, and what would show its motion, or an empty text
+    where the logs do."""
+    sensor = how_to_measure(axis, "<axis>")
+    kinds = dict.fromkeys(finding.kind for finding in findings if finding.axis == axis.name)
+    if reasons := [_REASONS[kind] for kind in kinds if kind in _REASONS]:
+        return listed(reasons), sensor if {*kinds} & {"constant motion", "too few samples"} else ""
+    unused = [c for log in logs for c in log.channels if c.quantity.axis is axis and c.unused]
+    if unused:
+        return f"{unused[0].quantity.name} from {unused[0].source} is left out ({unused[0].unused})", sensor
+    what = "an angle or a rate" if axis.is_rotation else "a velocity or a position"
+    return f"no log has {what} of {{it}}", sensor
+
+
+def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[float, list[str]]:
+    """Return the largest command along an axis in the logs that test it, and a sentence if it is never commanded
+    alone."""
+    others = [
+        other
+        for other in (form.axis for form in layout.axes)
+        if other is not axis and _shares(layout, axis, other) and axis.is_rotation + other.is_rotation < 2
+    ]
+    alone, largest, beside = 0.0, 0.0, dict.fromkeys(others, 0.0)
+    for commands in logs:
+        values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
+        own = _push(layout, axis, values)
+        pushed = {other: np.abs(_push(layout, other, values)) for other in others}
+        most = np.max([*pushed.values()], axis=0) if pushed else np.zeros(len(own))
+        is_used = np.abs(own) > _LEAST_PUSH
+        alone += commands.interval * float(np.sum(is_used & (most < _ASIDE * np.abs(own))))
+        for other, push in pushed.items():
+            beside[other] += commands.interval * float(np.sum(is_used & (push >= _ASIDE * np.abs(own))))
+        largest = max(largest, float(np.abs(own).max(initial=0.0)))
+    together = [other.name for other, time in beside.items() if time >= _LEAST_TIME]
+    if alone >= _LEAST_TIME or not together:
+        return largest, []
+    words = f"{axis.name}: known less well, because it is never commanded alone, only together with {listed(together)}"
+    return largest, [f"{words}. Command it alone for some seconds, both ways"]
+
+
+def _shares(layout: Layout, one: Axis, other: Axis) -> bool:
+    """Return True if a thruster drives both axes."""
+    return any(thruster in layout.thrusters_along(other) for thruster in layout.thrusters_along(one))
+
+
+def _push(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
+    """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
+    rows = len(next(iter(values.values())))
+    if "command" in values:
+        return values["command"]
+    effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
+    total = sum(abs(effect) for _, effect in effects)
+    pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]
+    return np.sum(pushes, axis=0) if pushes else np.zeros(rows)
+
+
+def _momentary(log: Log) -> str:
+    """Return a sentence about a log whose commands are momentary values; an empty text about another one."""
+    commands = log.commands
+    if not commands or len(commands.rows) < 2 or commands.interval < _SLOWEST:
+        return ""
+    share = len({*commands.time.tolist()}) / len(commands.rows)
+    if share < _CHANGING:
+        return ""
+    return (
+        f"{log.file}: the commands are momentary values, because they change in {share:.0%} of the rows: what happens "
+        f"between rows, {commands.interval:.2g} s apart, is not known. Log at 50 Hz, or fly without a controller"
+    )
