@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.bridges.sdf import written
-from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, effects_of
+from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, ROTOR_LAG, effects_of
 from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -58,7 +58,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         "tables": tables,
         "command_of": command_of,
         "row": _row,
-        "left_out": [effect.words for effect in effects_of(layout) if effect in (ADVANCE, DEAD_TIME, LAG)],
+        "left_out": [effect.words for effect in effects_of(layout) if effect in (ADVANCE, DEAD_TIME, LAG, ROTOR_LAG)],
     }
     lines = ["curve,voltage_V,force_N,command"]
     for curve, by_voltage in tables.items():

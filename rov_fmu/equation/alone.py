@@ -72,8 +72,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     loads = [force.sign * product(*force.coefficient) for force in forces if force.factors in constant]
     formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
     steady = {force: Name(name) for own in equation.lags.values() for force, name in own.items()}
-    torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
-    return {key: replaced(formula, steady | torques) for key, formula in formulas.items()}
+    return {key: replaced(formula, {**steady, **equation.forces}) for key, formula in formulas.items()}
 
 
 def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:

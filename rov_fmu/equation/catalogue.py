@@ -284,8 +284,10 @@ CURVE = {
     "d_reverse": Declaration(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance in reverse", 0.0, 1e6, needed=False
     ),
-    "T": Declaration("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
+    "T": Declaration("s", "Time constant T of the lag of the {curve}, {lag}", 1e-3, 60.0, needed=False),
 }
+LAGS = {"force": "T dF/dt = F(c) - F", "speed": "T dn/dt = n(c) - n"}
+"""What may lag of a thruster, its force or the speed of its rotor, with the law."""
 REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
 """The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {

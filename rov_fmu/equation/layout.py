@@ -51,6 +51,7 @@ from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thr
 from .words import (
     CoefficientTable,
     command_words,
+    rotor_declaration,
     table_of_axis,
     table_of_curve,
     table_of_fin,
@@ -341,13 +342,13 @@ class Layout:
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
-        """The forces that follow the commands with a lag, which are the last states."""
-        return self._forces(lag=True)
-
-    def _forces(self, *, lag: bool) -> dict[str, Declaration]:
-        """Return the forces of the thrusters that follow the commands with a lag, or those of the others."""
+        """The forces and the speeds of rotors that follow the commands with a lag, which are the last states."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
-        return {f"F_{t.name}": thrust_declaration(t, curve) for t, curve in curves if curve.has_lag == lag}
+        return {
+            curve.lagging(t.name): rotor_declaration(t) if curve.has_rotors else thrust_declaration(t, curve)
+            for t, curve in curves
+            if curve.has_lag
+        }
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
@@ -358,11 +359,13 @@ class Layout:
     def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates.
 
-        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
-        of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
+        They are the forces of the thrusters that are no states, the torque of the thrusters of each curve, the Euler
+        angles of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
+        forces = {f"F_{t.name}": thrust_declaration(t, self.curve_of[t.name]) for t in self.thrusters}
         torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
-        return self._forces(lag=False) | torques | self.angles | self.outside
+        forces = {name: declaration for name, declaration in forces.items() if name not in self.lagging}
+        return forces | torques | self.angles | self.outside
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:

@@ -9,6 +9,7 @@ from .catalogue import (
     CURVE,
     FIN,
     HEAVE,
+    LAGS,
     SURGE,
     SWAY,
     TUNING,
@@ -33,6 +34,7 @@ class CoefficientTable(NamedTuple):
 
 def table_of_curve(curve: Curve) -> CoefficientTable:
     words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
+    words["lag"] = LAGS[curve.lag]
     names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
     return CoefficientTable(("curves", curve.name), names, CURVE, words)
 
@@ -70,6 +72,12 @@ def thrust_declaration(thruster: Thruster, curve: Curve) -> Declaration:
     return Declaration(
         "N", f"{words}{share}{rest}, positive {_pushes(thruster.direction.value)}{cited(curve.equation)}"
     )
+
+
+def rotor_declaration(thruster: Thruster) -> Declaration:
+    words = f"Speed n_{thruster.name} of the rotor of {thruster.description or f'thruster {thruster.name}'}"
+    rest = "the part beyond the dead band of the command that holds it"
+    return Declaration("1", f"{words}: {rest}, positive {_pushes(thruster.direction.value)}", is_share=True)
 
 
 def torque_declaration(curve: Curve) -> Declaration:

@@ -25,6 +25,7 @@ from rov_fmu.equation.catalogue import (
     COMMANDS,
     CURVE,
     FIN,
+    LAGS,
     REPLACED_BY_TABLE,
     RESTORING,
     Axis,
@@ -138,7 +139,7 @@ class Arm(_coefficients("Arm", ARM)):  # type: ignore[misc]
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.filled(curve="curve", equation="") for key, kind in CURVE.items()}
+_CURVE = {key: kind.filled(curve="curve", equation="", lag=LAGS["force"]) for key, kind in CURVE.items()}
 
 
 def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
@@ -207,6 +208,9 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     a_t, b_t and c_0."""
     tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
     """Tables at several voltages, which replace `table`."""
+    lag: Literal["force", "speed"] = "force"
+    """What follows the command with the time constant T: the force, or the speed n of the rotor, on which the force
+    (a_t |n| + b_t) n and the loss d |n| depend."""
 
     electric_current: ElectricCurrent | None = None
 
@@ -220,7 +224,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
         return parts.Curve(
             name,
             keys,
-            **{key: getattr(self, key) for key in ("description", "equation")},
+            **{key: getattr(self, key) for key in ("description", "equation", "lag")},
             n_thrusters=self.together,
             tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
             electric_current=replace(current.table, voltage=current.voltage) if current else None,

@@ -111,6 +111,7 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "together": curve.n_thrusters if curve.n_thrusters != 1 else None,
         "table": tables[0]["table"] if len(tables) == 1 else None,
         "tables": tables if len(tables) > 1 else None,
+        "lag": curve.lag if curve.has_rotors else None,
         "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
     }
 
