@@ -242,6 +242,11 @@ def with_axes(axes: str) -> Vehicle:
     return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
 
 
+def with_rotors(rov: Vehicle) -> Vehicle:
+    """Return a vehicle whose rotors lag in speed, where its forces lag."""
+    return replace(rov, layout=replace(rov.layout, curves=tuple(replace(c, lag="speed") for c in rov.layout.curves)))
+
+
 def extended(rov: Vehicle, **values: float) -> Vehicle:
     """Return a vehicle with other or additional coefficients."""
     return rov.with_(rov.layout.extended(values), **values)
@@ -389,7 +394,7 @@ def random_state(rng: random.Random, rov: Vehicle) -> State:
         if name in ("x", "y", "z", "psi"):
             found[name] = rng.gauss(0.0, sizes[name])
         else:
-            size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
+            size = 10.0 if name.startswith("F_") else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
     if rov.layout.has_attitude:  # all attitudes are equally likely
         parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]
