@@ -37,7 +37,7 @@ Array = NDArray[np.float64]
 REFERENCES = ROOT / "verification" / "references" / "vehicles"
 FILES = {
     **SHIPPED,
-    **{name: ROOT / "tests" / "vehicle" / f"{name}.toml" for name in ("everything", "six_axes")},
+    **{name: ROOT / "tests" / "vehicle" / f"{name}.toml" for name in ("everything", "six_axes", "thrust_effects")},
     **{name: REFERENCES / f"{name}.toml" for name in ("every_option", "identified", "thrust")},
 }
 FLIP = np.array([1.0, -1.0, -1.0])
