@@ -197,7 +197,8 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     (
         DOWN.replace("[curves.t200]\n", '[curves.t200]\nlag = "speed"\n'),
         HEAVE_ALONE,
-        "/rov.toml: curves.t200.lag: identification fits a lag of the force, and not of the rotor's speed | : no thrust_",
+        "/rov.toml: curves.t200.lag: identification fits a lag of the force, and not of the rotor's speed"
+        " | : no thrust_t200*.csv",
     ),
     (
         f"{BLUEROV2}[fit]\nvoltage = true\n",
