@@ -256,13 +256,7 @@ def equation_of(layout: Layout) -> Equation:
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
         _lags(layout, table.names),
-        {
-            table.names("arrived", curve.name).identifier: tuple(
-                until_reversal(t.name, curve, table.names) for t in layout.thrusters if t.curve == curve.name
-            )
-            for curve in layout.curves
-            if curve.has_rotors
-        },
+        _reversals(layout, table.names),
         outputs=angles | _outside(layout, table.names),
         ends=quaternion,
         tables=_tables(layout),
@@ -294,6 +288,17 @@ def _lags(layout: Layout, names: Names) -> dict[str, dict[str, str]]:
 
 def _steady(thruster: str, curve: Curve, names: Names) -> Name:
     return names("speed", thruster) if curve.has_rotors else steady_name(thruster, curve, names)
+
+
+def _reversals(layout: Layout, names: Names) -> dict[str, tuple[Expression, ...]]:
+    """Return for the progress of each lag of speeds the times at which the rotors reverse."""
+    return {
+        names("arrived", curve.name).identifier: tuple(
+            until_reversal(t.name, curve, names) for t in layout.thrusters if t.curve == curve.name
+        )
+        for curve in layout.curves
+        if curve.has_rotors
+    }
 
 
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
