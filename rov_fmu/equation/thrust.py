@@ -93,7 +93,7 @@ def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) ->
     The health multiplies the whole force, with what it loses by the speed of advance.
     """
     command, share = names("command", name), 1.0 / curve.n_thrusters
-    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
+    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names, health)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
@@ -102,7 +102,7 @@ def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) ->
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
         force = product(force, share)
-    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(health * force)}
+    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:
@@ -110,8 +110,8 @@ def by_direction(command: Name, curve: Curve, key: str) -> Expression:
     return directed(command, Name(curve.coefficient(key)), Name(curve.coefficient(key + REVERSE)))
 
 
-def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return formulas of F = k_t F_table(c), with F_table interpolated linearly in the voltage."""
+def _from_tables(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
+    """Return formulas of F = h k_t F_table(c), with F_table interpolated linearly in the voltage."""
     battery, (first, *_) = names("battery"), curve.tables
     forces = [call(table.function, names("command", name)) for table in curve.tables]
     force: Expression = forces[-1]
@@ -121,11 +121,11 @@ def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expre
     if len(forces) > 1:
         force = where(battery < first.voltage, forces[0], force)
     measured = names("table", name)
-    return {measured.identifier: force}, Name(curve.coefficient("k_t")) * measured
+    return {measured.identifier: force}, health * Name(curve.coefficient("k_t")) * measured
 
 
-def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return the formulas of the force a_t m^2 + b_t m, and the formula of the force with its sign.
+def _from_coefficients(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
+    """Return the formulas of the force h (a_t m^2 + b_t m), and the formula of the force with its sign.
 
     m is the part of the command beyond the dead band.
     """
@@ -135,5 +135,5 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     force = directed(command, size, -size)
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
+        size.identifier: product(health, a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force
