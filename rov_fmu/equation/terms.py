@@ -315,7 +315,8 @@ class _Table:
         self.directed: dict[str, Directed] = {}
         self.forces: dict[str, Expression] = {}
         for name, curve in layout.curve_of.items():
-            self.forces |= rotor_formulas(name, curve, names) if curve.has_rotors else {}
+            if curve.has_rotors:
+                self.forces |= rotor_formulas(name, curve, names, Name(layout.health[name]))
         self.forces |= {
             f"tau_{curve.name}": total(thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves
         }

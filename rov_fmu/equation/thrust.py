@@ -53,7 +53,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
             formulas[mixed.identifier] = total(gain * part for gain, part in parts)
             formulas[command_of] = saturated(mixed)
         if name in layout.curve_of:
-            formulas |= _steady_thrust(name, layout.curve_of[name], names)
+            formulas |= _steady_thrust(name, layout.curve_of[name], names, Name(layout.health[name]))
     for fin in layout.fins:
         angle = Name(fin.coefficient("angle_max")) * names("command", fin.name)
         formulas[names("angle", fin.name).identifier] = angle
@@ -65,7 +65,7 @@ def curve_formulas(curve: Curve) -> Formulas:
     names = Names(curve.coefficient(key) for key in curve.keys)
     command = {names("command", "one").identifier: saturated(Name("u_one"))}
     battery = _battery(names) if "V_0" in curve.keys or len(curve.tables) > 1 else {}
-    return {**battery, **command, **_steady_thrust("one", curve, names)}
+    return {**battery, **command, **_steady_thrust("one", curve, names, of(1.0))}
 
 
 def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
@@ -88,16 +88,19 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
     return where(equal(command, 0.0), 0.0, (command - neutral) / span)
 
 
-def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
-    """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
+def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) -> Formulas:
+    """Return formulas from the command of a thruster to its steady thrust, which is the last of them.
+
+    The health multiplies the whole force, with what it loses by the speed of advance.
+    """
     command, share = names("command", name), 1.0 / curve.n_thrusters
     if curve.has_rotors:
-        return _steady_speed(name, curve, names)
-    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
+        return _steady_speed(name, curve, names, health)
+    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names, health)
     if "V_0" in curve.keys:
         force = force * _by_voltage(curve, names)
     if "d" in curve.keys:
-        loss = product(by_direction(command, curve, "d"), call("abs", command), share)
+        loss = product(health, by_direction(command, curve, "d"), call("abs", command), share)
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
         force = product(force, share)
@@ -113,8 +116,8 @@ def by_direction(command: Name, curve: Curve, key: str) -> Expression:
     return directed(command, Name(curve.coefficient(key)), Name(curve.coefficient(key + REVERSE)))
 
 
-def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return formulas of F = k_t F_table(c), with F_table interpolated linearly in the voltage."""
+def _from_tables(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
+    """Return formulas of F = h k_t F_table(c), with F_table interpolated linearly in the voltage."""
     battery, (first, *_) = names("battery"), curve.tables
     forces = [call(table.function, names("command", name)) for table in curve.tables]
     force: Expression = forces[-1]
@@ -124,11 +127,11 @@ def _from_tables(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expre
     if len(forces) > 1:
         force = where(battery < first.voltage, forces[0], force)
     measured = names("table", name)
-    return {measured.identifier: force}, Name(curve.coefficient("k_t")) * measured
+    return {measured.identifier: force}, health * Name(curve.coefficient("k_t")) * measured
 
 
-def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas, Expression]:
-    """Return the formulas of the force a_t m^2 + b_t m, and the formula of the force with its sign.
+def _from_coefficients(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
+    """Return the formulas of the force h (a_t m^2 + b_t m), and the formula of the force with its sign.
 
     m is the part of the command beyond the dead band.
     """
@@ -138,7 +141,7 @@ def _from_coefficients(name: str, curve: Curve, names: Names) -> tuple[Formulas,
     force = directed(command, size, -size)
     return {
         beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
+        size.identifier: product(health, a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
     }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force
 
 
@@ -148,7 +151,7 @@ _FAINT = 8.0 * 2.0**-52
 """A speed below this share of the steady one is a rounding error, and has no direction."""
 
 
-def _steady_speed(name: str, curve: Curve, names: Names) -> Formulas:
+def _steady_speed(name: str, curve: Curve, names: Names, health: Expression) -> Formulas:
     """Return formulas from the command of a thruster to the steady speed of its rotor, and to its steady thrust.
 
     The speed is the part of the command beyond the dead band, with its sign.
@@ -161,7 +164,7 @@ def _steady_speed(name: str, curve: Curve, names: Names) -> Formulas:
         formulas = {beyond.identifier: call("abs", command) - c_0, speed.identifier: steady}
     if "V_0" in curve.keys:
         formulas[names("by_voltage", name).identifier] = _by_voltage(curve, names)
-    thrust = _of_rotor(name, curve, names, _per_speed(speed, speed, curve), speed)
+    thrust = _of_rotor(name, curve, names, health, _per_speed(speed, speed, curve), speed)
     return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(thrust)}
 
 
@@ -176,14 +179,14 @@ def _of_rotor(name: str, curve: Curve, names: Names, *factors: Expression) -> Ex
     return product(*factors, *by_voltage, 1.0 / curve.n_thrusters)
 
 
-def rotor_formulas(name: str, curve: Curve, names: Names) -> Formulas:
-    """Return formulas of the thrust F = (a_t |n| + b_t) n of a thruster, and of its loss d |n| per speed of advance.
+def rotor_formulas(name: str, curve: Curve, names: Names, health: Name) -> Formulas:
+    """Return formulas of the thrust F = h (a_t |n| + b_t) n of a thruster, and of the loss h d |n| by its advance.
 
     The speed n of the rotor follows n_c. With the arrived fraction p, it is n + (n_c - n) p. Until the rotor reverses,
     the thrust then changes by `rise` p + `bend` p^2, and the loss by `loss_rise` p.
     """
     n, n_c, heads = Name(curve.lagging(name)), names("speed", name), names("heads", name)
-    change = n_c - n
+    change, share = n_c - n, 1.0 / curve.n_thrusters
 
     def signed(key: str) -> Expression:
         """Return a coefficient with the sign of the direction in which the rotor turns next."""
@@ -191,14 +194,14 @@ def rotor_formulas(name: str, curve: Curve, names: Names) -> Formulas:
 
     formulas: Formulas = {
         heads.identifier: where(call("abs", n) > _FAINT * call("abs", n_c), n, n_c),
-        f"F_{name}": with_positive_zero(_of_rotor(name, curve, names, _per_speed(n, heads, curve), n)),
-        names("rise", name).identifier: _of_rotor(name, curve, names, _per_speed(n, heads, curve, 2.0), change),
-        names("bend", name).identifier: _of_rotor(name, curve, names, signed("a_t"), change, change),
+        f"F_{name}": with_positive_zero(_of_rotor(name, curve, names, health, _per_speed(n, heads, curve), n)),
+        names("rise", name).identifier: _of_rotor(name, curve, names, health, _per_speed(n, heads, curve, 2.0), change),
+        names("bend", name).identifier: _of_rotor(name, curve, names, health, signed("a_t"), change, change),
     }
     if "d" in curve.keys:
-        share = 1.0 / curve.n_thrusters
-        formulas[names("loss", name).identifier] = product(by_direction(heads, curve, "d"), call("abs", n), share)
-        formulas[names("loss_rise", name).identifier] = product(signed("d"), change, share)
+        loss = product(health, by_direction(heads, curve, "d"), call("abs", n), share)
+        formulas[names("loss", name).identifier] = loss
+        formulas[names("loss_rise", name).identifier] = product(health, signed("d"), change, share)
     return formulas
 
 

@@ -35,6 +35,7 @@ TOLERANCE = 5e-12
 FORCES = {"four axes": VEHICLES["drag by direction, coupled, late"], "six axes": SIX}
 """Vehicles with dead bands, reverse thrust and drag by direction. That with six axes also loses thrust with speed."""
 ROTORS = {name: with_rotors(rov) for name, rov in FORCES.items()}
+WEAK = with_rotors(SIX).with_(health_a=0.6, health_b=1.2)
 SLOW = {name: rov.with_(T_t200=2.5) for name, rov in ROTORS.items()}
 """The same with large rotors, which take a second to reverse."""
 
@@ -76,8 +77,8 @@ def errors(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[float]
 
 
 def test_the_motion_is_that_of_dop853_between_reversals() -> None:
-    rov, rng = ROTORS["six axes"], random.Random(4)
-    for h in (0.01, 0.5):
+    rng = random.Random(4)
+    for rov, h in ((ROTORS["six axes"], 0.01), (WEAK, 0.5)):
         inputs, state = turning(rng, rov, h)
         expected = rigid_vehicle.integrate(rov, inputs, places(rov, state), h).tolist()
         assert error(rov, rov.step(inputs, state, h), expected) <= 1e-10
@@ -88,6 +89,7 @@ def test_the_motion_is_that_of_dop853_between_reversals() -> None:
 @pytest.mark.parametrize("h", [1e-3, 1e-2, 1.0, pytest.param(100.0, marks=WEEKLY)])
 def test_a_step_with_reversals_of_rotors_and_velocities_is_exact(name: str, h: float) -> None:
     rov = (SLOW if h > 10.0 else ROTORS)[name]
+    rov = rov.with_(**{rov.layout.health[rov.layout.thrusters[0].name]: 0.8})
     inputs, state = turning(random.Random(f"{name} {h}"), rov, h)
     assert max(errors(rov, inputs, state, h)) <= TOLERANCE, (inputs, state)
 

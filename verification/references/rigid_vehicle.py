@@ -94,29 +94,29 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
         wrench = _wrench(thruster.place, thruster.direction.value)
+        health = mp.mpf(rov.coefficients[f"health_{name}"])
         target = rotor_speed(rov, curve, command, mp) if curve.has_rotors else forces[name]
-        rows.append([*wrench, target, loss * abs(command) / curve.n_thrusters, lag])
+        rows.append([*wrench, target, health * loss * abs(command) / curve.n_thrusters, lag])
     table = np.array([[number(x) for x in row] for row in rows]).reshape(-1, 9)
     return table[:, :6], table[:, 6], table[:, 7], table[:, 8]
 
 
 def _rotors(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> tuple[Array, Array]:
     """Return a, b and d of each rotor whose speed lags, ahead and astern, and which thrusters have one."""
-    curves = [rov.layout.curve_of[t.name] for t in rov.layout.thrusters]
-    k, rows = rov.coefficients, []
+    curves, k, rows = rov.layout.curve_of, rov.coefficients, []
     for end in ("", "_reverse"):
         for key in ("a_t", "b_t", "d"):
             row = []
-            for curve in curves:
+            for name, curve in curves.items():
                 value = mp.mpf(k.get(f"{key}_{curve.name}{end}", k.get(f"{key}_{curve.name}", 0.0)))
                 if "V_0" in curve.keys and key != "d":
                     U, V_0, n_V = (
                         mp.mpf(x) for x in (inputs["voltage"], k[f"V_0_{curve.name}"], k[f"n_V_{curve.name}"])
                     )
                     value *= (max(U, mp.zero) / V_0) ** n_V
-                row.append(number(value / curve.n_thrusters))
+                row.append(number(mp.mpf(k[f"health_{name}"]) * value / curve.n_thrusters))
             rows.append(row)
-    return np.array(rows).reshape(2, 3, -1), np.array([curve.has_rotors for curve in curves], bool)
+    return np.array(rows).reshape(2, 3, -1), np.array([curve.has_rotors for curve in curves.values()], bool)
 
 
 def _fins(rov: Vehicle, inputs: Values) -> Array:

@@ -254,9 +254,8 @@ class Symbol:
 
 _LETTERS = {
     **{"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"},
-    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u"},
+    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u", "health": "h", "fraction": "u"},
     **{"command": "c", "beyond": "m", "loss": "k", "table": "f", "steady": "F", "speed": "n", "battery": "U"},
-    "fraction": "u",
 }
 """The letters of quantities whose names begin with a word or whose letter is another one."""
 _INDICES = ("t", "d", "a", "0", "V", "max", "u")
