@@ -12,6 +12,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import e, inf
 
 from .attitude import entry
@@ -57,6 +58,11 @@ def stopping_formula() -> Expression:
     return where(A > 0.0, where(speed > 0.0, where(speed < inf, quadratic, inf), 0.0), linear)
 
 
+@lru_cache(maxsize=100)
+def _forces_of(layout: Layout) -> tuple[Force, ...]:
+    return tuple(forces_of(layout, equation_of(layout).names))
+
+
 def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """Return the formulas of the motion of an axis alone: A, B and C, and A_reverse and B_reverse for v < 0.
 
@@ -64,7 +70,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """
     equation = equation_of(layout)
     gain = equation.names("gain", velocity)
-    forces = [force for force in forces_of(layout, equation.names) if force.axis == velocity]
+    forces = [force for force in _forces_of(layout) if force.axis == velocity]
     constant: list[tuple[str, ...]] = [()]
     """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
     if not layout.by_velocity[velocity].axis.is_rotation:
