@@ -15,6 +15,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import degrees, inf, pi
+from typing import Literal
 
 from .attitude import INITIAL, QUATERNION
 
@@ -297,8 +298,9 @@ CURVE = {
     ),
     "T": Declaration("s", "Time constant T of the lag of the {curve}, {lag}", 1e-3, 60.0, needed=False),
 }
-LAGS = {"force": "T dF/dt = F(c) - F", "speed": "T dn/dt = n(c) - n"}
-"""What may lag of a thruster, its force or the speed of its rotor, with the law."""
+Lag = Literal["force", "speed"]
+"""What may lag of a thruster: its force, or the speed of its rotor."""
+LAGS: dict[Lag, str] = {"force": "T dF/dt = F(c) - F", "speed": "T dn/dt = n(c) - n"}
 REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
 """The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {

@@ -5,7 +5,7 @@ from math import sin
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from .catalogue import REVERSE, YAW, Axis, coefficient_name
+from .catalogue import REVERSE, YAW, Axis, Lag, coefficient_name
 from .python.step import interpolated
 
 
@@ -93,7 +93,7 @@ class Curve(Part):
     """Where the curve is published: the number of an equation of the paper, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
-    lag: Literal["force", "speed"] = "force"
+    lag: Lag = "force"
     """What lags with the time constant T: the force, T F' = F(c) - F, or the rotor's speed, T n' = n_c - n."""
     electric_current: CurrentTable | None = field(default=None, compare=False)
     """The current of one thruster. All curves of a vehicle have it, or none."""

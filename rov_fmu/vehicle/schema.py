@@ -31,6 +31,7 @@ from rov_fmu.equation.catalogue import (
     THRUSTER,
     Axis,
     Declaration,
+    Lag,
     cross_of,
     declarations_of,
 )
@@ -209,7 +210,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     a_t, b_t and c_0."""
     tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
     """Tables at several voltages, which replace `table`."""
-    lag: Literal["force", "speed"] = "force"
+    lag: Lag = "force"
     """What follows the command with the time constant T: the force, or the speed n of the rotor, on which the force
     (a_t |n| + b_t) n and the loss d |n| depend."""
 
