@@ -20,7 +20,11 @@ __version__ = "0.2.0"
 def load(vehicle: "str | Path | Vehicle") -> "VehicleModel":
     """Load a vehicle that ships, by its name, or a vehicle file, by its path.
 
-    A vehicle from elsewhere, such as that of an identification, is returned with the functions of the result.
+    - `vehicle`: a name, a path, or a vehicle from elsewhere, such as that of an identification, which is returned
+      with the functions of the result.
+
+        rov_fmu.load("bluerov2").response("surge", 0.3)  # V_ss, m/s, and Tau, s, at 30 %
+
     Raises FileError, a ValueError, with one line for each mistake.
     """
     from rov_fmu.interface.model import load as load_model  # imported here, so that `import rov_fmu` is quick

@@ -76,16 +76,21 @@ def build(
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it. After a failure no file is written.
 
-    `output` is the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
-    `platforms` names one or several of PLATFORMS, or `host` for this machine; by default it is those with 64 bits.
-    `backend` is `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms. `fmi` is the
-    version of FMI, 2 or 3. `interface` names what the FMU offers: `cs` for Co-Simulation, `me` for Model Exchange, or
-    `both`, which is the default; the FMU in pure Python has only `cs`. `osp` also writes
-    <identifier>_OspModelDescription.xml to the folder of the FMU. `pythonfmu` and `osp` need FMI 2.0. `sign` is the
-    file of a private key by Ed25519, which signs the FMU in <output>.sig; it needs the extra `sign`. `force` allows
-    replacing files that this program did not write, or that have changed since. `inputs` are further files that must
-    not be overwritten, like those that the vehicle names. `on_content` is called once the content is made and the
-    compilers begin, and `on_compiled` with the name of each platform that has been compiled.
+    - `vehicle`: the vehicle, as `rov_fmu.load` or `load_vehicle` returns it.
+    - `output`: the file to write, by default <identifier>.fmu or <identifier>.fmi3.fmu in the current folder.
+    - `platforms`: one or several of PLATFORMS, or `host` for this machine; by default those with 64 bits.
+    - `backend`: `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms.
+    - `fmi`: the version of FMI, 2 or 3. `pythonfmu` and `osp` need 2.
+    - `interface`: `cs` for Co-Simulation, `me` for Model Exchange, or `both`, which is the default; the FMU in pure
+      Python has only `cs`.
+    - `osp`: True to also write <identifier>_OspModelDescription.xml to the folder of the FMU.
+    - `sign`: the file of a private key (Ed25519), which signs the FMU in <output>.sig; it needs the extra `sign`.
+    - `force`: True to replace files that this program did not write, or that have changed since.
+    - `inputs`: further files that must not be overwritten, like those that the vehicle names.
+    - `on_content`: called once the content is made and the compilers begin.
+    - `on_compiled`: called with the name of each platform that has been compiled.
+
+        build(load_vehicle(find_vehicle("videoray")), "videoray.fmu", platforms="host").path
 
     Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the

@@ -4,15 +4,12 @@ Each command is a short function that imports its modules only when it is called
 fast.
 """
 
-import logging
 import warnings
-import webbrowser
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from math import inf, isfinite, nan, nextafter
 from pathlib import Path
-from tempfile import mkdtemp
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
@@ -32,7 +29,6 @@ from rov_fmu.io.messages import (
     print_message,
     shown,
 )
-from rov_fmu.io.output import check_replaced, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_name
 
@@ -300,50 +296,15 @@ def _print_built(built: "Built", seconds: float) -> None:
     help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
 @_force_option()
-def _simulate(
-    vehicle: Path,
-    settings: tuple[str, ...],
-    commands: Path | None,
-    stop: float | None,
-    step: float | None,
-    output: Path | None,
-    plot: Path | None,
-    *,
-    force: bool,
-) -> None:
+def _simulate(vehicle: Path, **options: Any) -> None:
     """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
 
     Inputs that are not set have their usual values, and states start at 0. Without -o and --plot the values at the end
     are printed.
     """
-    from rov_fmu.interface.model import load
-    from rov_fmu.interface.simulate_command import (
-        check_outputs,
-        moves,
-        print_final,
-        run,
-        title,
-        write_results,
-    )
-    from rov_fmu.io.file_kinds import is_mcap
-    from rov_fmu.report.console import print_end
+    from rov_fmu.interface.simulate_command import Options, simulate_vehicle
 
-    opens = plot == Path()
-    loaded = load(vehicle)
-    inputs = [vehicle, *loaded.files, *([commands] if commands else [])]
-    check_outputs(output, None if opens else plot, inputs, force=force)
-    result = run(loaded, settings, commands, stop, step, with_inputs=is_mcap(output))
-    picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    write_results(loaded, result, output, picture, title(loaded, settings, commands), force=force)
-    if opens and picture:
-        _open(picture, "--plot FILE.svg")
-    following = "open the plot" if plot and not opens else "add --plot to see the curves" if not opens else ""
-    if output or picture:
-        print_end([path for path in (output, plot) if path and path != Path()], following)
-    else:
-        print_final(
-            loaded, result, has_no_input=not commands and not any(moves(text, loaded.layout) for text in settings)
-        )
+    simulate_vehicle(vehicle, Options(**options))
 
 
 @contextmanager
@@ -397,7 +358,7 @@ def _fly(
     force: bool,
 ) -> None:
     """Fly a vehicle in a browser, without building an FMU. The default is the VideoRay Pro 4."""
-    from rov_fmu.interface.fly_command import write_fly_page
+    from rov_fmu.interface.fly_command import open_in_browser, write_fly_page
     from rov_fmu.report.console import print_end
 
     if identified and not recording:
@@ -407,20 +368,7 @@ def _fly(
     if output:
         print_end([path], "open it in a browser")
     else:
-        _open(path, "-o PAGE.html")
-
-
-def _open(path: Path, option: str) -> None:
-    """Print the path of a file, and open it in a browser. `option` is the option with which the user can choose the
-    place of the file."""
-    from rov_fmu.report.console import console
-
-    console().print(str(path), soft_wrap=True)
-    if not webbrowser.open(path.as_uri()):
-        print_message(
-            "rov-fmu: no browser could be opened. Open this file in a browser, here or on another machine. "
-            f"It needs no other files. Use {option} to write it to another place"
-        )
+        open_in_browser(path, "-o PAGE.html")
 
 
 # ---- sitl ------------------------------------------------------------------------------------------------------------
@@ -591,52 +539,16 @@ def _sdf(vehicle: Path, output: Path | None, **options: Any) -> None:
     help="Page (HTML) to write, with more evidence.",
 )
 @_force_option()
-def _prove(
-    fmu: Path,
-    interface: str | None,
-    tolerance: float | None,
-    time_limit: float,
-    key: Path | None,
-    report: Path | None,
-    *,
-    force: bool,
-) -> None:
+def _prove(fmu: Path, **options: Any) -> None:
     """Run the experiments that an FMU of any exporter contains (FMI-LS-REF), and compare the results.
 
     First, the hashes in the FMU and the signature beside it are checked, if there are any.
     """
     if str(fmu) in SHIPPED and not fmu.exists():
         raise FileError(f"{fmu}: must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
-    from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
-    from rov_fmu.report.progress import parts
+    from rov_fmu.interface.prove_command import Options, prove_fmu
 
-    if report:
-        from rov_fmu.interface.prove_command import prove_with_report
-
-        with parts() as shown:
-            begin = shown.begin("checking the claims")
-            proof = prove_with_report(
-                fmu, interface, tolerance, time_limit, key, report, force=force, on_progress=begin
-            )
-        print_claims(proof)
-        print_evidence(proof.origin)
-        print_end([report], "open it in a browser")
-        if failed := proof.with_result("fails"):
-            raise ProofError(
-                *(f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed)
-            )
-        return
-
-    from rov_fmu.prove.check import check_evidence
-    from rov_fmu.prove.proof import prove
-
-    evidence = check_evidence(fmu, key)
-    with parts() as shown:
-        findings = prove(fmu, interface, tolerance, time_limit, shown.begin("running the experiments"))
-    print_proof(findings)
-    print_evidence(evidence)
-    if wrong := sum(not finding.passed for finding in findings):
-        raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
+    prove_fmu(fmu, Options(**options))
 
 
 # ---- study -----------------------------------------------------------------------------------------------------------
@@ -660,9 +572,7 @@ def _prove(
     help="Run to write to RESULTS/run-RUN.mcap, for Foxglove and PlotJuggler. The plan must name a vehicle.",
 )
 @_force_option()
-def _study(
-    plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None, *, force: bool
-) -> None:
+def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, **options: Any) -> None:
     """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
@@ -671,48 +581,10 @@ def _study(
     if workers and scheduler is not None:
         raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
     try:
-        from rov_fmu.study.plan.plan import load_plan
-        from rov_fmu.study.plan.prepared import vehicle_file
-        from rov_fmu.study.results.page import PAGE as STUDY_PAGE
-        from rov_fmu.study.results.page import page_output
-        from rov_fmu.study.results.summary import print_summary
-        from rov_fmu.study.run.run_study import run_study
+        from rov_fmu.study.study_command import study_plan
     except ModuleNotFoundError as error:
         raise click.UsageError(f"study: needs {error.name}: pip install 'rov-fmu[study]'") from error
-    from rov_fmu.interface.model import load
-    from rov_fmu.io.output import Output
-    from rov_fmu.report.console import print_end
-    from rov_fmu.report.progress import StudyParts, parts
-
-    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
-    motion_file = [output / f"run-{run}.mcap"] if run is not None else []
-    if output.is_dir():
-        check_replaced([output / STUDY_PAGE, *motion_file], force=force)
-    vehicle = load_plan(plan).vehicle if run is not None else None
-    if run is not None and not vehicle:
-        raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
-    with parts() as shown:
-        spent, results = run_study(
-            plan,
-            output,
-            workers,
-            scheduler,
-            StudyParts(shown).update,
-            lambda message: shown.print(f"warning: {message}"),
-        )
-    page = page_output(results)
-    written = [page]
-    write_whole(page, force=force)
-    print_summary(results, spent)
-    if vehicle and run is not None:
-        if not results.outputs or (motion := results.trajectories([run])).empty:
-            raise FileError(f"{output}: --mcap {run}: there is no such run with outputs, which [keep] names")
-        content = load(vehicle_file("vehicle", vehicle, plan)).to_mcap(motion)
-        written.append(Output(motion_file[0], content))
-        write_whole(written[-1], force=force)
-    print_end([one.path for one in written], "open it in a browser")
-    if len(results.failed) + len(results.incomplete) == len(results.runs):
-        raise StudyError(f"{output}: no run is complete with all its figures")
+    study_plan(plan, output, workers, scheduler, **options)
 
 
 # ---- identify --------------------------------------------------------------------------------------------------------

@@ -23,7 +23,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, with_rotors
 
 compile_anew = compilation._Library.compile
 """The method that compiles a library even if another test has done so."""
@@ -208,10 +208,15 @@ def _six() -> Vehicle:
     return a_vehicle(SIX)
 
 
+def _rotors() -> Vehicle:
+    return a_vehicle(with_rotors(SIX))
+
+
 heavy_dir, heavy3_dir = _folder_of("heavy", lambda: HEAVY), _folder_of("heavy3", lambda: HEAVY, 3)
 everything_dir, everything3_dir = _folder_of("everything", _everything), _folder_of("everything3", _everything, 3)
 thrust_dir, thrust3_dir = _folder_of("thrust", _thrust), _folder_of("thrust3", _thrust, 3)
 six_dir, outside3_dir = _folder_of("six", _six), _folder_of("outside3", lambda: OUTSIDE, 3)
+rotors_dir, rotors3_dir = _folder_of("rotors", _rotors), _folder_of("rotors3", _rotors, 3)
 
 
 @pytest.fixture(scope="module")

@@ -62,7 +62,6 @@ LARGER_FOLDERS = {
     "tests/fmu": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
-    "tests/equation": 14,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""
 

@@ -120,6 +120,11 @@ _CURVE_NUMBERS = {
 }
 
 
+def _factors(layout: Layout) -> set[str]:
+    """Return the names of the coefficients that are 1 unless a vehicle file gives them."""
+    return {*layout.tuning, *layout.health.values()}
+
+
 def numbered(layout: Layout, **values: float) -> Vehicle:
     """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
     numbers = {
@@ -132,11 +137,8 @@ def numbered(layout: Layout, **values: float) -> Vehicle:
     for key, *axes in layout.cross:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
-    numbers |= _BODY_NUMBERS | values
-    return Vehicle(
-        layout,
-        {name: 1.0 if name in layout.tuning else numbers[name] for name in layout.coefficients},
-    )
+    numbers |= _BODY_NUMBERS | dict.fromkeys(_factors(layout), 1.0) | values
+    return Vehicle(layout, {name: numbers[name] for name in layout.coefficients})
 
 
 def pulsed(rov: _Vehicle, pulse: tuple[float, float, float]) -> _Vehicle:
@@ -240,6 +242,11 @@ def with_axes(axes: str) -> Vehicle:
     """Return the vehicle SIX with only some of its axes, nothing between them, and no weight."""
     forms = tuple(form for form in SIX.layout.axes if form.axis.velocity in axes)
     return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
+
+
+def with_rotors(rov: Vehicle) -> Vehicle:
+    """Return a vehicle whose rotors lag in speed, where its forces lag."""
+    return replace(rov, layout=replace(rov.layout, curves=tuple(replace(c, lag="speed") for c in rov.layout.curves)))
 
 
 def extended(rov: Vehicle, **values: float) -> Vehicle:
@@ -350,7 +357,7 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Vehicle:
     layout = layout or random_layout(rng)
     numbers = {}
     for name, declaration in layout.coefficients.items():
-        if name in layout.tuning:
+        if name in _factors(layout):
             numbers[name] = spread(rng, -0.5, 0.5)
         elif name.startswith(("a_d", "b_d")):
             numbers[name] = spread(rng, -1.0, 2.0, zero=1 / 6)
@@ -389,7 +396,7 @@ def random_state(rng: random.Random, rov: Vehicle) -> State:
         if name in ("x", "y", "z", "psi"):
             found[name] = rng.gauss(0.0, sizes[name])
         else:
-            size = 10.0 if name in rov.layout.lagging else sizes.get(name, 0.8)
+            size = 10.0 if name.startswith("F_") else sizes.get(name, 0.8)
             found[name] = rng.choice([rng.gauss(0.0, size), rng.gauss(0.0, size), rng.gauss(0.0, size), 0.0])
     if rov.layout.has_attitude:  # all attitudes are equally likely
         parts = [rng.gauss(0.0, 1.0) for _ in QUATERNION]

@@ -56,7 +56,7 @@ _LIMIT = 150
 """The longest time (s) for the tests of a mutant. One that no test has noticed by then has survived."""
 TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/results/test_ballast.py fmu/calls",
-    "fmu_src/c/[dt]*.c": "equation/test_thrust_effects.py fmu/calls/test_dead_time.py fmu/calls",
+    "fmu_src/c/[dt]*.c": "equation/thrust/test_thrust_effects.py fmu/calls/test_dead_time.py fmu/calls",
     "fmu_src/c/[ch]*.c": "equation/test_step.py equation/test_six_axes.py c equation fmu/calls",
     "fmu_src/c/[ls]*.c": "equation/test_step.py equation/test_alone.py equation c fmu/calls",
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls "

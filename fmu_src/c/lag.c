@@ -1,4 +1,4 @@
-/* Thrust that lags behind its command. */
+/* Thrust that lags behind its command: the force F itself, or the speed of the rotor in its place. */
 
 /* Return true when a force has arrived at the steady thrust of its command. The force is then set to exactly that thrust. */
 static inline mask has_arrived(real *F, real start, real steady, real outstanding)

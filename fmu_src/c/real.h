@@ -50,6 +50,7 @@ EACH_LANE(sin, (real x), LANE(x, i))
 EACH_LANE(cos, (real x), LANE(x, i))
 EACH_LANE(atan2, (real y, real x), LANE(y, i), LANE(x, i))
 EACH_LANE(pow, (real x, real y), LANE(x, i), LANE(y, i))
+EACH_LANE(log1p, (real x), LANE(x, i))
 
 #define fabs __builtin_elementwise_abs
 #define sqrt __builtin_elementwise_sqrt
@@ -60,6 +61,7 @@ EACH_LANE(pow, (real x, real y), LANE(x, i), LANE(y, i))
 #define cos lanes_cos
 #define atan2 lanes_atan2
 #define pow lanes_pow
+#define log1p lanes_log1p
 #endif
 
 #endif

@@ -231,6 +231,16 @@ INLINE void motion_move(motion *m, const series *s, real length, real change[N_S
     }
 }
 
+/* Return the longest unit of time for the next series. It ends with the step, and where a rotor reverses. */
+INLINE real motion_unit(const motion *m)
+{
+#if HAS_ROTORS
+    return fmin(fmin(m->rest, m->unit), model_until_reversal(m->n, &m->q));
+#else
+    return fmin(m->rest, m->unit);
+#endif
+}
+
 /* Begin a step of h > 0 seconds, over which the inputs are held. */
 INLINE void motion_start(motion *m, const real at[], const model_numbers *n, real h, real heading)
 {
@@ -264,7 +274,11 @@ INLINE mask motion_pass(motion *m, const real at[], const series *s, real length
     if (!ALL(ends)) {
         motion_add(&m->done, length * s->unit, &m->done_lost);
         m->rest = m->length - m->done - m->done_lost;
+#if HAS_ROTORS /* a piece that a rotor made short says nothing about the next one */
+        m->unit = reach == 1.0 ? fmax(m->unit, 2.0 * s->unit) : 2.0 * s->unit * reach;
+#else
         m->unit = 2.0 * s->unit * reach;
+#endif
     }
     return ends;
 }
@@ -402,7 +416,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
     motion_start(&m, at, n, h, *heading);
     while (++pieces <= MOST_PIECES && m.unit > 0.0) {
         motion_measure(&m);
-        motion_begin(&m, fmin(m.rest, m.unit), &s);
+        motion_begin(&m, motion_unit(&m), &s);
         double reach = 1.0;
         if (!motion_grow(&m, &s)) {
             if (pieces == 1) { /* the step is long, and some states may have settled before it */

@@ -122,7 +122,7 @@ static mask take_piece(block *b, mask started, mask *left)
     int reversed[LANES];
     series s;
     motion_measure(m);
-    motion_begin(m, fmin(m->rest, m->unit), &s);
+    motion_begin(m, motion_unit(m), &s);
     mask under_way = started & ~motion_waits(m, &s);
     mask whole = motion_grow_short(m, &s, ~under_way);
     if (!ALL(whole | ~under_way)) {

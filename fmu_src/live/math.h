@@ -11,6 +11,7 @@ IMPORTED(expm1) double expm1(double x);
 IMPORTED(atanh) double atanh(double x);
 IMPORTED(hypot) double hypot(double x, double y);
 IMPORTED(log) double log(double x);
+IMPORTED(log1p) double log1p(double x);
 IMPORTED(pow) double pow(double x, double y);
 
 #define INFINITY __builtin_inf()

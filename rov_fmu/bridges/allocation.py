@@ -2,7 +2,8 @@
 
 The wrench w on the body, along and about the axes of the vehicle in the frame of the FMU (forward, starboard, down), is
 w = B F for the forces F of the thrusters. The forces of least size for a wrench are F = B^+ w, with the pseudo-inverse
-(Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, 12.3.2). The tuning alpha is in B.
+(Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, 12.3.2). The tuning alpha and the
+health of the thrusters are in B, so F are the forces of whole ones.
 """
 
 from collections.abc import Iterator
@@ -13,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.bridges.sdf import written
-from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, effects_of
+from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, ROTOR_LAG, effects_of
 from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -58,7 +59,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         "tables": tables,
         "command_of": command_of,
         "row": _row,
-        "left_out": [effect.words for effect in effects_of(layout) if effect in (ADVANCE, DEAD_TIME, LAG)],
+        "left_out": [effect.words for effect in effects_of(layout) if effect in (ADVANCE, DEAD_TIME, LAG, ROTOR_LAG)],
     }
     lines = ["curve,voltage_V,force_N,command"]
     for curve, by_voltage in tables.items():
@@ -73,7 +74,9 @@ def allocation_matrix(vehicle: Vehicle) -> Array:
     return np.array(
         [
             [
-                vehicle[axis.coefficient("alpha")] * vehicle.effect(thruster, axis)
+                vehicle[axis.coefficient("alpha")]
+                * vehicle[thruster.coefficient("health")]
+                * vehicle.effect(thruster, axis)
                 for thruster in vehicle.layout.thrusters
             ]
             for axis in (part.axis for part in vehicle.layout.axes)

@@ -63,7 +63,8 @@ def force_names(layout: Layout) -> tuple[str, ...]:
 
     These are the steady thrust of each thruster, F_… or, when it lags, steady_…; the loss of thrust by the speed of
     advance, loss_…, and the angle of each fin, angle_…, where the vehicle has them; and the inputs that are no
-    commands: the loads from outside (X_ext …) and the current (V_N …).
+    commands: the loads from outside (X_ext …) and the current (V_N …). A rotor that lags has its steady speed,
+    speed_…, in place of the thrust and the loss, and the factor of its thrust by the voltage, by_voltage_….
     """
     equation = equation_of(layout)
     formulas = (*_before_rates(equation).values(), *equation.rates.values())

@@ -72,7 +72,13 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Draw all coefficients and starts anew. Return the states (vehicles x states)."""
+        """Draw all coefficients and starts anew. Return the states (vehicles x states), in SI units.
+
+        - `seed`: the seed of the draws; of a list, the first one counts.
+        - `options`: none are known.
+
+            states, _ = RovVectorEnv(rov_fmu.load("videoray_refit"), 16).reset(seed=1)
+        """
         super().reset(seed=seed[0] if isinstance(seed, list) else seed, options=options)
         if self.draws:
             drawn = self.vehicle.draws(self.num_envs, self.np_random, forced=self.draws == "force")
@@ -82,6 +88,12 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
 
     def step(self, actions: Array) -> tuple[Array, Array, Any, Any, dict[str, Any]]:
         """Hold the commands (vehicles x commands) for one step. Vehicles whose episode is over begin a new one.
+
+        - `actions`: the commands from -1 to 1, also of a vehicle whose commands are pulse widths.
+
+            many = RovVectorEnv(rov_fmu.load("videoray").with_(health_l=0.5), 16)
+            many.reset(seed=1)
+            states, reward, terminated, truncated, _ = many.step(np.zeros((16, 3)))
 
         Raises InputError if the actions have another shape or are not finite.
         """
@@ -129,13 +141,25 @@ class RovEnv(gymnasium.Env[Array, Array]):
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Draw the coefficients and the start anew. Return the states."""
+        """Draw the coefficients and the start anew. Return the states, in SI units.
+
+        - `seed`, `options`: those of `RovVectorEnv.reset`.
+
+            state, _ = RovEnv(rov_fmu.load("videoray")).reset(seed=1)
+        """
         super().reset(seed=seed)
         state, info = self.many.reset(seed=seed, options=options)
         return state[0], info
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold the commands for one step."""
+        """Hold the commands for one step.
+
+        - `action`: the commands from -1 to 1.
+
+            one = RovEnv(rov_fmu.load("videoray"))
+            one.reset(seed=1)
+            state, reward, terminated, truncated, _ = one.step(np.zeros(3))
+        """
         if np.shape(action) != self.action_space.shape:
             raise InputError(f"action: must have the shape {self.action_space.shape}, and has {np.shape(action)}")
         state, reward, terminated, truncated, info = self.many.step(np.asarray(action)[np.newaxis])

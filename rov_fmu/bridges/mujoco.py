@@ -100,6 +100,13 @@ def mujoco_files(
 def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
     """Return a vehicle in its world in MuJoCo, as `load` of the folder does. Needs the extra `mujoco`.
 
+    - `vehicle`: the vehicle, which needs a mass.
+    - `coefficients`: other values of coefficients by name, in SI units. They may change at any time.
+
+        rov = mujoco.load(rov_fmu.load("bluerov2"), health_1=0.5)  # from rov_fmu.bridges import mujoco
+        rov.data.ctrl[:] = 0.2  # the commands, -1 to 1
+        rov.step()
+
     Raises InputError as `mujoco_files` does.
     """
     import mujoco

@@ -56,6 +56,8 @@ class Water:
         self.numbers: dict[str, float] = {}
         self.since = 0.0
         """The time since the numbers of the equation were last computed, s."""
+        self.until = 0.0
+        """The time until a rotor reverses, after which they no longer hold, s."""
 
     def mass(self) -> Any:
         """Return the 6x6 mass matrix with added mass and tuning. Raises ValueError if no body has the coefficients."""
@@ -134,15 +136,16 @@ class Water:
         return [*(row[0] * a + row[1] * b + row[2] * c for row in R), *rates[3:]]
 
     def _hold(self, commands: Mapping[str, float], nu: tuple[float, ...]) -> None:
-        """Compute the numbers that are constant while the inputs and the directions of the velocities are held."""
+        """Compute the numbers that are constant while the inputs and the directions of motion are held."""
         directions = [-1.0 if x < 0.0 else 1.0 for x in nu]
         held = *self.coefficients.values(), *self.inputs.values(), *commands.values(), *directions
-        if held != self.held:
+        if held != self.held or self.since >= self.until:
             if self.held:
                 self.forces = self.equation.lagging(self.numbers, self.since)
             self.held, self.since = held, 0.0
             self.numbers = self._numbers({**commands, **dict(zip("uvwpqr", directions, strict=True))})
             self.rates = self.equation.accelerations(self.numbers)
+            self.until = self.equation.until_reversal(self.numbers)
 
 
 def _rotation(quaternion: list[float]) -> list[list[float]]:
@@ -206,7 +209,7 @@ class Rov:
         water = self.water
         if not water.held:
             return {}
-        now = {**water.numbers, **water.equation.lagging(water.numbers, water.since)}
+        now = water.equation.numbers({**water.numbers, **water.equation.lagging(water.numbers, water.since)})
         return {name: now[name] for name in water.equation.FORCES}
 
     def step(self) -> None:

@@ -55,12 +55,17 @@ def step_jacobian(
 ) -> StepJacobian:
     """Return the states after h > 0 seconds with the inputs held, and their derivatives.
 
+    - `vehicle`: the vehicle, whose layout has the order of the derivatives.
+    - `inputs`, `state`: all inputs and states of the vehicle by name, in SI units, as `Vehicle.step` takes them.
+    - `h`: the length of the step, s.
+    - `coefficients`: the names of the coefficients for which there shall be derivatives as well.
+
+    Commands act at once, also in a vehicle with a dead time. At a kink of the thrust curve (saturation, dead band), the
+    derivative is that of one side.
+
+        inputs, state = rov.layout.usual_inputs | {"u_l": 0.3, "u_r": 0.3}, rov.layout.at_rest | {"u": 0.4}
         found = step_jacobian(rov, inputs, state, 0.1, ["a_d_u"])
         found.states[0, 0], found.coefficients[0, 0]  # d u / d u before the step; d u / d a_d_u, (m/s) / (N.s2/m2)
-
-    The states and inputs are in the order of `vehicle.layout.state` and `vehicle.layout.inputs`. `coefficients` are the
-    names of the coefficients for which there shall be derivatives as well. Commands act at once, also in a vehicle with
-    a dead time. At a kink of the thrust curve (saturation, dead band), the derivative is that of one side.
 
     Raises ValueError when the motion overflows or takes too many substeps, and InputError when a coefficient is
     unknown, an input or a state is missing, or h is not a time.

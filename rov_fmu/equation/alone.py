@@ -12,6 +12,7 @@ the time from rest until p V_ss is reached, p = 1 - 1/e:
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from math import e, inf
 
 from .attitude import entry
@@ -57,6 +58,11 @@ def stopping_formula() -> Expression:
     return where(A > 0.0, where(speed > 0.0, where(speed < inf, quadratic, inf), 0.0), linear)
 
 
+@lru_cache(maxsize=100)
+def _forces_of(layout: Layout) -> tuple[Force, ...]:
+    return tuple(forces_of(layout, equation_of(layout).names))
+
+
 def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """Return the formulas of the motion of an axis alone: A, B and C, and A_reverse and B_reverse for v < 0.
 
@@ -64,7 +70,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """
     equation = equation_of(layout)
     gain = equation.names("gain", velocity)
-    forces = [force for force in forces_of(layout, equation.names) if force.axis == velocity]
+    forces = [force for force in _forces_of(layout) if force.axis == velocity]
     constant: list[tuple[str, ...]] = [()]
     """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
     if not layout.by_velocity[velocity].axis.is_rotation:
@@ -72,8 +78,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     loads = [force.sign * product(*force.coefficient) for force in forces if force.factors in constant]
     formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
     steady = {force: Name(name) for own in equation.lags.values() for force, name in own.items()}
-    torques = {name: formula for name, formula in equation.forces.items() if name in layout.calculated}
-    return {key: replaced(formula, steady | torques) for key, formula in formulas.items()}
+    return {key: replaced(formula, {**steady, **equation.forces}) for key, formula in formulas.items()}
 
 
 def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:
@@ -100,12 +105,22 @@ _closed_form, _stopping = compiled(closed_form()), compiled({"distance": stoppin
 
 
 def steady_velocity(A: float, B: float, C: float) -> float:
-    """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag."""
+    """Return the velocity V_ss at which drag balances the force, A |V| V + B V = C; infinite without drag.
+
+    - `A`, `B`, `C`: quadratic drag, 1/m (1/rad), linear drag, 1/s, and force, m/s2 (rad/s2), each over the inertia.
+
+        steady_velocity(0.48, 1.43, 0.77)  # m/s
+    """
     return AxisAlone(A, B, C).steady_velocity()
 
 
 def time_constant(A: float, B: float, C: float) -> float:
-    """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag."""
+    """Return Tau of (17), the time from rest until the velocity is (1 - 1/e) V_ss; infinite without drag.
+
+    - `A`, `B`, `C`: those of `steady_velocity`.
+
+        time_constant(0.48, 1.43, 0.77)  # s
+    """
     return AxisAlone(A, B, C).time_constant()
 
 

@@ -15,6 +15,7 @@ import re
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from math import degrees, inf, pi
+from typing import Literal
 
 from .attitude import INITIAL, QUATERNION
 
@@ -264,6 +265,17 @@ FIN = {
     "angle_max": Declaration("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
+THRUSTER = {
+    "health": Declaration(
+        "1",
+        "Health h of the {thruster}: its force relative to that of a whole one, so 1 is whole and 0 is dead",
+        0.0,
+        10.0,
+        needed=False,
+        tunable=True,
+    ),
+}
+"""The coefficients of a thruster."""
 CURVE = {
     "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
@@ -284,8 +296,11 @@ CURVE = {
     "d_reverse": Declaration(
         "N.s/m", "Loss of thrust d of the {curve} per speed of advance in reverse", 0.0, 1e6, needed=False
     ),
-    "T": Declaration("s", "Time constant T of the lag of the {curve}, T dF/dt = F(c) - F", 1e-3, 60.0, needed=False),
+    "T": Declaration("s", "Time constant T of the lag of the {curve}, {lag}", 1e-3, 60.0, needed=False),
 }
+Lag = Literal["force", "speed"]
+"""What may lag of a thruster: its force, or the speed of its rotor."""
+LAGS: dict[Lag, str] = {"force": "T dF/dt = F(c) - F", "speed": "T dn/dt = n(c) - n"}
 REPLACED_BY_TABLE = ("a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "c_0_reverse")
 """The keys of CURVE that a curve with measured forces does not have."""
 AXIS = {

@@ -99,6 +99,8 @@ def _number(x: Expression) -> float | None:
 
 def _folded(op: str, a: Expression, b: Expression) -> Expression:  # noqa: PLR0911 - a case for each rule
     match op, _number(a), _number(b):
+        case (_, None, None) if op not in "+-" or not _is_negative(b):
+            return Operation(op, (a, b))
         case ("*" | "/", 0.0, _) | ("*", _, 0.0):
             return ZERO
         case ("+", 0.0, _) | ("*", 1.0, _):
@@ -238,6 +240,10 @@ def replaced(x: Expression, formulas: Mapping[str, Expression]) -> Expression:
     return x
 
 
+_CHOICES_BY_NAME = frozenset({"saturated", "directed", "dead band"})
+"""The operations that `plain` writes as choices."""
+
+
 def plain(x: Expression) -> Expression:
     """Write the outermost operation as choices if it is `saturated`, `directed` or `beyond_dead_band`."""
     match x:
@@ -310,20 +316,21 @@ def written(
             return language.number(value)
         case Operation("directed", (_, Name(identifier, kind, owners), _)) if "directed" in language.forms:
             return name_of(Name(language.forms["directed"].format(identifier), kind, owners))
-    shown = x if isinstance(x, Operation) and x.op in language.forms else plain(x)
+    assert isinstance(x, Operation)
+    shown = plain(x) if x.op in _CHOICES_BY_NAME and x.op not in language.forms else x
     assert isinstance(shown, Operation)
-    form = _form(shown, language)
+    form = language.forms.get(shown.op) or _usual_form(shown, language)
     rank, operands = language.ranks.get(shown.op, (CALL, (0,) * len(shown.args)))
     parts = [written(arg, language, name_of, need) for arg, need in zip(shown.args, operands, strict=True)]
     text = form.format(*parts)
     return text if rank >= least else language.bracket.format(text)
 
 
-def _form(x: Operation, language: Language) -> str:
-    if x.op not in language.forms and not language.is_code:
+def _usual_form(x: Operation, language: Language) -> str:
+    """Return the form of an operation for which a language has none of its own: a + b or f(a, b)."""
+    if not language.is_code:
         raise ValueError(f"{written(x, PYTHON)}: there is no way to show this")
-    usual = f"{{}} {x.op} {{}}" if x.op in language.ranks else f"{x.op}({', '.join('{}' for _ in x.args)})"
-    return language.forms.get(x.op, usual)
+    return f"{{}} {x.op} {{}}" if x.op in language.ranks else f"{x.op}({', '.join('{}' for _ in x.args)})"
 
 
 # ---- Evaluation ------------------------------------------------------------------------------------------------------

@@ -37,6 +37,7 @@ LIFT = Effect("lift", "lift of the hull")
 RESTORING = Effect("restoring", "weight and buoyancy")
 COUPLING = Effect("coupling", "Coriolis and Munk terms")
 LAG = Effect("lag", "the lag of the thrust (T)", "lag")
+ROTOR_LAG = Effect("rotor lag", "the lag of the rotors' speed (T)", LAG.missed)
 DEAD_BAND = Effect("dead band", "the dead band (c_0)", "dead band")
 DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
 ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
@@ -83,14 +84,15 @@ class Force:
 def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield all forces and moments of a vehicle along its axes, in the order of its equation."""
     yield from _loads(layout, names)
-    yield from chain(_drag(layout), _restoring(layout, names), _advance(layout, names), _steering(layout, names))
+    yield from chain(_drag(layout), _restoring(layout, names), advance(layout, names), _steering(layout, names))
 
 
 def effects_of(layout: Layout) -> list[Effect]:
     """Return the effects that a vehicle has, each once."""
     of_forces = [force.effect for force in forces_of(layout, Names())]
     has = {
-        LAG: bool(layout.lagging),
+        LAG: any(curve.has_lag and not curve.has_rotors for curve in layout.curves),
+        ROTOR_LAG: any(curve.has_rotors for curve in layout.curves),
         DEAD_BAND: any("c_0" in curve.keys or curve.tables for curve in layout.curves),  # a table may have one
         DEAD_TIME: layout.has_dead_time,
         COUPLING: layout.coupled,
@@ -174,18 +176,22 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
                 yield Force(RESTORING, v, sign, (names("righting", coordinate),), (direction,))
 
 
-def _advance(layout: Layout, names: Names) -> Iterator[Force]:
-    """Yield the loss of thrust by the speed of advance.
+def advance(
+    layout: Layout, names: Names, curve: Curve | None = None, loss_of: Callable[[str], Expression] | None = None
+) -> Iterator[Force]:
+    """Yield the loss of thrust by the speed of advance: that of all thrusters, or only that of a curve.
 
-    The thrust is F - d |c| v_a, and the speed of advance v_a is linear in the velocities.
+    The thrust is F - d |c| v_a, and the speed of advance v_a is linear in the velocities. `loss_of` gives another
+    factor of v_a in place of d |c|, by the name of a thruster.
     """
     for vehicle_axis in layout.axes:
         for other in layout.axes:
             parts = []
             for t in layout.thrusters:
-                effect = t.effect(vehicle_axis.axis) * t.effect(other.axis)
-                if "d" in layout.curve_of[t.name].keys and abs(effect) > FAINT:
-                    loss = _with_arm(t, vehicle_axis.axis, names("loss", t.name), names)
+                effect, own = t.effect(vehicle_axis.axis) * t.effect(other.axis), layout.curve_of[t.name]
+                if "d" in own.keys and curve in (None, own) and abs(effect) > FAINT:
+                    of_thruster = loss_of(t.name) if loss_of else names("loss", t.name)
+                    loss = _with_arm(t, vehicle_axis.axis, of_thruster, names)
                     parts.append(effect * _with_arm(t, other.axis, loss, names))
             if parts:
                 lost = Name(vehicle_axis.axis.coefficient("alpha")), total(parts)

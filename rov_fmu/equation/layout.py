@@ -51,9 +51,11 @@ from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thr
 from .words import (
     CoefficientTable,
     command_words,
+    rotor_declaration,
     table_of_axis,
     table_of_curve,
     table_of_fin,
+    table_of_thruster,
     thrust_declaration,
     torque_declaration,
 )
@@ -225,6 +227,7 @@ class Layout:
             *map(table_of_curve, self.curves),
             *map(table_of_fin, self.fins),
             *(table_of_axis(vehicle_axis, kinds) for kinds in (AXIS, TUNING) for vehicle_axis in self.axes),
+            *map(table_of_thruster, self.thrusters),
         )
 
     @cached_property
@@ -255,6 +258,17 @@ class Layout:
     def tuning(self) -> tuple[str, ...]:
         """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
         return tuple(vehicle_axis.axis.coefficient(key) for vehicle_axis in self.axes for key in TUNING)
+
+    @cached_property
+    def health(self) -> dict[str, str]:
+        """The names of the health of each thruster, by its name. A vehicle file need not give it; it is 1 then."""
+        return {thruster.name: thruster.coefficient("health") for thruster in self.thrusters}
+
+    @cached_property
+    def ballast(self) -> tuple[str, ...]:
+        """The other tunable coefficients: mass, weight, buoyancy, their centres, and the scales of tables of thrust."""
+        factors = {*self.tuning, *self.health.values()}
+        return tuple(name for name, one in self.coefficients.items() if one.tunable and name not in factors)
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
@@ -341,13 +355,13 @@ class Layout:
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
-        """The forces that follow the commands with a lag, which are the last states."""
-        return self._forces(lag=True)
-
-    def _forces(self, *, lag: bool) -> dict[str, Declaration]:
-        """Return the forces of the thrusters that follow the commands with a lag, or those of the others."""
+        """The forces and the speeds of rotors that follow the commands with a lag, which are the last states."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
-        return {f"F_{t.name}": thrust_declaration(t, curve) for t, curve in curves if curve.has_lag == lag}
+        return {
+            curve.lagging(t.name): rotor_declaration(t) if curve.has_rotors else thrust_declaration(t, curve)
+            for t, curve in curves
+            if curve.has_lag
+        }
 
     @cached_property
     def state(self) -> dict[str, Declaration]:
@@ -358,11 +372,13 @@ class Layout:
     def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates.
 
-        They are the forces of the thrusters without a lag, the torque of the thrusters of each curve, the Euler angles
-        of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
+        They are the forces of the thrusters that are no states, the torque of the thrusters of each curve, the Euler
+        angles of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
         """
+        forces = {f"F_{t.name}": thrust_declaration(t, self.curve_of[t.name]) for t in self.thrusters}
         torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
-        return self._forces(lag=False) | torques | self.angles | self.outside
+        forces = {name: declaration for name, declaration in forces.items() if name not in self.lagging}
+        return forces | torques | self.angles | self.outside
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:
@@ -387,9 +403,9 @@ class Layout:
     @cached_property
     def variables(self) -> tuple[str, ...]:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
-        rates = map(rate_name, self.state)
-        known = (*self.calculated, *self.delayed, *self.coefficients, *self.initial)
-        return (*self.inputs, *self.state, *rates, *known)
+        rates, last = map(rate_name, self.state), self.health.values()
+        parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
+        return (*self.inputs, *self.state, *rates, *self.calculated, *self.delayed, *parameters, *last)
 
     @cached_property
     def places(self) -> dict[str, int]:

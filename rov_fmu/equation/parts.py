@@ -5,7 +5,7 @@ from math import sin
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from .catalogue import REVERSE, YAW, Axis, coefficient_name
+from .catalogue import REVERSE, YAW, Axis, Lag, coefficient_name
 from .python.step import interpolated
 
 
@@ -93,6 +93,8 @@ class Curve(Part):
     """Where the curve is published: the number of an equation of the paper, or another source."""
     tables: tuple[ThrustTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
+    lag: Lag = "force"
+    """What lags with the time constant T: the force, T F' = F(c) - F, or the rotor's speed, T n' = n_c - n."""
     electric_current: CurrentTable | None = field(default=None, compare=False)
     """The current of one thruster. All curves of a vehicle have it, or none."""
 
@@ -103,8 +105,17 @@ class Curve(Part):
 
     @property
     def has_lag(self) -> bool:
-        """True when the force follows the command with a lag."""
+        """True when the force, or the rotor's speed, follows the command with a lag."""
         return "T" in self.keys
+
+    @property
+    def has_rotors(self) -> bool:
+        """True when the speeds of the rotors lag, so that the forces follow from these speeds."""
+        return self.has_lag and self.lag == "speed"
+
+    def lagging(self, thruster: str) -> str:
+        """Return the name of what lags of a thruster: its force, or the speed of its rotor."""
+        return f"{'n' if self.has_rotors else 'F'}_{thruster}"
 
 
 Vector = tuple[float, float, float]
@@ -144,6 +155,10 @@ class Actuator:
     def place(self) -> Vector:
         """The position (m), or the centre of mass where there is none."""
         return self.position.value if self.position else (0.0, 0.0, 0.0)
+
+    def coefficient(self, key: str) -> str:
+        """Return the name of a coefficient by its key."""
+        return f"{key}_{self.name}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,10 +206,6 @@ class Fin(Actuator):
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
         effect = effect_along(axis, self.direction.value, self.place)
         return effect if abs(effect) > FAINT else 0.0
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key."""
-        return f"{key}_{self.name}"
 
 
 @dataclass(frozen=True)

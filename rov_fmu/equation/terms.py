@@ -29,11 +29,11 @@ from functools import cached_property, lru_cache
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Name, Names, call, directed, of, product, total, where
-from .forces import COUPLING, Effect, Force, forces_of, thrusts
+from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
-from .thrust import steady_name, thrust_formulas
+from .thrust import rotor_formulas, steady_name, thrust_formulas, until_reversal
 
 
 @dataclass(frozen=True)
@@ -89,9 +89,13 @@ class Equation:
     """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
     formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
     lags: Mapping[str, Mapping[str, str]]
-    """For the arrived fraction of each lag: the forces that lag, each with the steady thrust that it approaches.
+    """For the arrived fraction of each lag: the forces, or the speeds of rotors, each with the steady one that it
+    approaches.
 
-    The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p."""
+    The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p, and
+    so is each speed. A thrust that follows from a speed is quadratic in p until the rotor reverses."""
+    reversals: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
+    """For the arrived fraction of each lag of speeds: x for each rotor, which reverses after T log(1 + x)."""
 
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas, and for
@@ -115,7 +119,7 @@ class Equation:
 
     @cached_property
     def lagging(self) -> dict[str, tuple[Expression, Expression]]:
-        """For each force that lags: the formulas of its rate, and of its value after a piece of a step."""
+        """For each force or speed that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
                 self.rows[arrived][0].coefficient * (Name(steady) - Name(force)),
@@ -194,6 +198,7 @@ class Equation:
         directed = {name: d.formula for name, d in self.directed.items()}
         lags = [term.coefficient.names for terms in self.rows.values() for term in terms if self._is_lag(term)]
         by_lag = frozenset().union(*lags)
+        by_lag = by_lag.union(*(self.forces[name].names for name in by_lag & self.forces.keys()))
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
         return {**self.parameters, **directed, **self.orientation, **self.thrust, **forces}
 
@@ -251,6 +256,7 @@ def equation_of(layout: Layout) -> Equation:
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
         _lags(layout, table.names),
+        _reversals(layout, table.names),
         outputs=angles | _outside(layout, table.names),
         ends=quaternion,
         tables=_tables(layout),
@@ -268,15 +274,30 @@ def _tables(layout: Layout) -> dict[str, ThrustTable]:
 
 
 def _lags(layout: Layout, names: Names) -> dict[str, dict[str, str]]:
-    """Return for the progress of each lag the forces that lag, each with its steady force."""
+    """Return for the progress of each lag the forces or speeds that lag, each with the steady one."""
     return {
         names("arrived", curve.name).identifier: {
-            f"F_{t.name}": steady_name(t.name, curve, names).identifier
+            curve.lagging(t.name): _steady(t.name, curve, names).identifier
             for t in layout.thrusters
             if t.curve == curve.name
         }
         for curve in layout.curves
         if curve.has_lag
+    }
+
+
+def _steady(thruster: str, curve: Curve, names: Names) -> Name:
+    return names("speed", thruster) if curve.has_rotors else steady_name(thruster, curve, names)
+
+
+def _reversals(layout: Layout, names: Names) -> dict[str, tuple[Expression, ...]]:
+    """Return for the progress of each lag of speeds the times at which the rotors reverse."""
+    return {
+        names("arrived", curve.name).identifier: tuple(
+            until_reversal(t.name, curve, names) for t in layout.thrusters if t.curve == curve.name
+        )
+        for curve in layout.curves
+        if curve.has_rotors
     }
 
 
@@ -292,7 +313,11 @@ class _Table:
         self._declared = [*forces_of(layout, names)]
         self.parameters = _parameters(layout, self._mass, names)
         self.directed: dict[str, Directed] = {}
-        self.forces: dict[str, Expression] = {
+        self.forces: dict[str, Expression] = {}
+        for name, curve in layout.curve_of.items():
+            if curve.has_rotors:
+                self.forces |= rotor_formulas(name, curve, names, Name(layout.health[name]))
+        self.forces |= {
             f"tau_{curve.name}": total(thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves
         }
 
@@ -335,20 +360,33 @@ class _Table:
         )
 
     def _arriving(self, v: str, inverse: Mapping[str, Name]) -> Iterator[Term]:
-        """Yield, for each lag, the change of acceleration until the thrust is steady."""
+        """Yield, for each lag, the change of acceleration until the thrust is steady, in powers of what has arrived."""
 
         def change_of(thruster: str, curve: Curve) -> Expression:
             return steady_name(thruster, curve, self.names) - Name(f"F_{thruster}")
 
+        def of_rotor(kind: str) -> Callable[..., Expression]:
+            return lambda thruster, *_: self.names(kind, thruster)
+
         for curve in (curve for curve in self.layout.curves if curve.has_lag):
-            changes = []
-            for other, gain in inverse.items():
-                axis = self.layout.by_velocity[other].axis
-                if arriving := thrusts(self.layout, axis, self.names, curve, change_of):
-                    changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
-            if changes:
-                change = self._named(total(changes), "arriving", v, curve.name)
-                yield Term(change, (self.names("arrived", curve.name).identifier,))
+            arrived = self.names("arrived", curve.name).identifier
+            powers = {"arriving": change_of}
+            if curve.has_rotors:
+                powers = {"arriving": of_rotor("rise"), "arriving_squared": of_rotor("bend")}
+            for power, (kind, of_thruster) in enumerate(powers.items(), 1):
+                changes = []
+                for other, gain in inverse.items():
+                    axis = self.layout.by_velocity[other].axis
+                    if arriving := thrusts(self.layout, axis, self.names, curve, of_thruster):
+                        changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
+                if changes:
+                    yield Term(self._named(total(changes), kind, v, curve.name), (arrived,) * power)
+            losses: dict[str, list[Expression]] = {}
+            rising = advance(self.layout, self.names, curve, of_rotor("loss_rise")) if curve.has_rotors else ()
+            for force in (force for force in rising if force.axis in inverse):
+                losses.setdefault(force.factors[0], []).append(force.along(inverse[force.axis]))
+            for other, parts in losses.items():
+                yield Term(self._named(total(parts), "arriving_loss", v, other, curve.name), (arrived, other))
 
     def _term(self, v: str, forces: Sequence[Force], inverse: Mapping[str, Name]) -> Term:
         """Return the sum of forces with one effect and equal factors. They must agree in `velocity`."""

@@ -140,8 +140,8 @@ def _left_out_of_motion(layout: Layout) -> Iterator[str]:
 
 
 def _left_out_of_forces(layout: Layout) -> Iterator[str]:
-    effects = effects_of(layout)
-    if some := [effect.missed for effect in EXPECTED if effect not in effects]:
+    has = {effect.missed for effect in effects_of(layout)}
+    if some := [effect.missed for effect in EXPECTED if effect.missed not in has]:
         yield f"Thrusters as machines: there is no {listed(some, 'or')}."
     own_terms = {
         "added mass": any("m_a" in own.keys for own in layout.axes),

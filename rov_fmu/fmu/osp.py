@@ -48,6 +48,7 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
             letter for part, (_, letter) in zip(thruster.direction.value, along, strict=True) if abs(part) > 1.0 - 1e-9
         ]
         yield f"thrust_{thruster.name}", {f"F_{thruster.name}": next(iter(only), None)}
+        yield f"rotor_{thruster.name}", {f"n_{thruster.name}": None}
     about = tuple(zip((ROLL, PITCH, YAW), "xyz", strict=True))
     yield "external_torque", {axis.external: letter for axis, letter in about}
     for curve in layout.turning_curves:

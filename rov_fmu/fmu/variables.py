@@ -125,8 +125,9 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
         derivatives["z"] = Declaration("m/s", "Rate of change of depth, w")
     if layout.has(YAW):
         derivatives["psi"] = Declaration("rad/s", "Rate of change of heading, r")
-    for name in layout.lagging:
-        derivatives[name] = Declaration("N/s", f"Rate of change of {name}, (F(c) - F) / T")
+    for name, lagging in layout.lagging.items():
+        letter, unit = name[0], "N/s" if lagging.unit == "N" else "1/s"
+        derivatives[name] = Declaration(unit, f"Rate of change of {name}, ({letter}(c) - {letter}) / T")
     return derivatives
 
 

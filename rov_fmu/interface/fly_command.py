@@ -1,12 +1,15 @@
-"""Write the page on which a vehicle flies in a browser, for `rov-fmu fly`."""
+"""Write the page on which a vehicle flies in a browser, for `rov-fmu fly`, and open it."""
 
+import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import mkdtemp
 
 from rov_fmu.fmu.content import web_module
 from rov_fmu.io.file_kinds import PAGE, check_written
+from rov_fmu.io.messages import print_message
 from rov_fmu.io.output import Output, check_replaced, check_targets, sealed, write_whole
+from rov_fmu.report.console import console
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -34,3 +37,16 @@ def write_fly_page(
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
     write_whole(Output(path, page), force=force)
     return path
+
+
+def open_in_browser(path: Path, option: str) -> None:
+    """Print the path of a file, and open it in a browser.
+
+    `option` is the option with which the user can choose the place of the file.
+    """
+    console().print(str(path), soft_wrap=True)
+    if not webbrowser.open(path.as_uri()):
+        print_message(
+            "rov-fmu: no browser could be opened. Open this file in a browser, here or on another machine. "
+            f"It needs no other files. Use {option} to write it to another place"
+        )

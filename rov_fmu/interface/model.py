@@ -73,26 +73,28 @@ class VehicleModel(Vehicle):
     ) -> Result:
         """Simulate the vehicle with the C code of the FMU; the results are equal to the last bit.
 
-        `time` holds the output times (s), which rise, or is the duration (s), which gives a result every 0.01 s from 0
-        on. Each step from one time to the next is exact, whatever its length.
+        - `time`: the output times, s, which rise; or the duration, s, which gives a result every 0.01 s from 0 on. Each
+          step from one time to the next is exact, whatever its length.
+        - `inputs`: the values of inputs by name. The others have their usual values: no command, no load, no current,
+          and the usual voltage. The name of an axis, such as `surge`, stands for all commands that drive it: 0.3 is
+          30 % of the full command in its positive direction. A number holds at all times. An array has a value for each
+          time, which is held up to the next time. A function of an array of times is evaluated in the middle of each
+          step and held over the step. Beyond ±1 a command saturates, with a warning. `inputs` may also be a data
+          frame. With a column `time` among the inputs, the other arrays have a value for each of its times instead,
+          which is held up to the next, also between output times; before the first, the inputs have their usual values.
+        - `start`: the values of states at the first time by name; all others are 0. A vehicle with roll or pitch begins
+          at the Euler angles phi, theta and psi, rad, which the FMU calls phi_0, theta_0 and psi_0; either name will
+          do. Instead of them, `start` may contain the quaternion, and psi, which selects the number of full turns of
+          the heading. With a dead time, it may contain the delayed commands, which act at the first time; by default,
+          no command acts yet.
+        - `record`: the names of the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The
+          default is the outputs of the FMU: states and thrust.
 
-        `inputs` maps names of inputs to values. All other inputs have their usual values: no command, no load, no
-        current, and the usual voltage. The name of an axis, such as `surge`, stands for all commands that drive it: 0.3
-        is 30 % of the full command in its positive direction. A value is one of three things. A number holds at all
-        times. An array has a value for each time, which is held up to the next time. A function of an array of times is
-        evaluated in the middle of each step and held over the step. Beyond ±1 a command saturates, with a warning.
-        `inputs` may also be a data frame. If there is a column `time` among the inputs, the other arrays have a value
-        for each of its times instead. Each value is held from its time up to the next, also between output times.
-        Before the first time the inputs have their usual values.
+        Five seconds at 30 % ahead, and then none, at a depth of 2 m:
 
-        `start` maps names of states to their values at the first time; all other states are 0. A vehicle with roll or
-        pitch begins at the Euler angles phi, theta and psi (rad), which are parameters of the FMU with the names phi_0,
-        theta_0 and psi_0; `start` may contain either name. They are 0 by default: level and heading north. Instead of
-        them, `start` may contain the quaternion, and psi, which selects the number of full turns of the heading. With a
-        dead time, it may contain the delayed commands, which act at the first time; by default, no command acts yet.
-
-        `record` names the variables to return: inputs, states, derivatives such as `der(u)`, thrust. The default is the
-        outputs of the FMU: states and thrust.
+            rov = rov_fmu.load("videoray")
+            run = rov.simulate(10.0, {"surge": lambda t: np.where(t < 5.0, 0.3, 0.0)}, start={"z": 2.0})
+            run["u"][-1]  # m/s
 
         The first simulation of a kind of vehicle compiles the engine, which takes seconds, and keeps it in the user's
         cache folder.
@@ -135,17 +137,22 @@ class VehicleModel(Vehicle):
     ) -> Result:
         """Simulate many variations of the vehicle at once, on all cores.
 
-        The arguments are those of `simulate`, with these differences. An array among the `inputs` has the shape
-        (times,), which holds for all vehicles, (vehicles, 1), or (vehicles, times). Each value of `start` and of
-        `coefficients` is a number, or an array of one number for each vehicle. Coefficients that are not given keep the
-        values of this vehicle.
+        - `time`, `inputs`, `start`, `record`: those of `simulate`. An array among the inputs has the shape (times,),
+          which holds for all vehicles, (vehicles, 1), or (vehicles, times). A value of `start` is a number, or an array
+          of one number for each vehicle.
+        - `coefficients`: other values of coefficients by name, in SI units: a number, or one for each vehicle.
+        - `workers`: the number of threads, on which the results do not depend. The default is all usable cores.
+        - `lanes`: True to step two to eight vehicles at once in the vectors of the processor.
 
-        `workers` is the number of threads; the default is the number of usable cores. The results do not depend on it.
+        The speed of a thousand vehicles whose mass is known to 2 %, after 10 s at 30 % ahead:
 
-        By default the results have the bits of the FMU. With `lanes=True`, the vectors of the processor step two to
-        eight vehicles at once. Steps then take a third to three quarters of the time, but steps during which commands
-        wait for a dead time gain nothing. The results differ from the default by rounding errors: by less than 1e-12 of
-        the scale of each variable. The first such simulation of a kind of vehicle compiles an engine of its own.
+            masses = np.random.default_rng(1).normal(6.57, 0.13, 1000)  # kg
+            rov.simulate_many([0.0, 10.0], {"surge": 0.3}, coefficients={"m_rov": masses})["u"][:, -1]
+
+        By default the results have the bits of the FMU. With `lanes`, steps take a third to three quarters of the time,
+        but steps during which commands wait for a dead time gain nothing. The results then differ by rounding errors:
+        by less than 1e-12 of the scale of each variable. The first such simulation of a kind of vehicle compiles an
+        engine of its own.
 
         The arrays of the result have the shape (vehicles, times). Where the motion of a vehicle cannot be computed, its
         values are NaN from there on, and `result.failed` has its number.
@@ -184,13 +191,16 @@ class VehicleModel(Vehicle):
     def rates(self, x: Any, forces: Any, p: Mapping[str, Any] = _NONE) -> Any:
         """Return the time derivatives of the states: the equation of motion itself, for any library.
 
-        `x` is a vector of the states in the order of `layout.state`, and `forces` one in the order of `force_names`,
-        which `forces` computes from commands. They may be NumPy arrays, CasADi vectors (SX, MX, DM) or JAX arrays in
-        double precision. An array of NumPy or JAX may have more dimensions after the first one, for many vehicles.
-        `p` maps names of coefficients to numbers, symbols or arrays; the other coefficients are those of the vehicle.
-        The result has the shape of `x`. All values are in SI units, angles in rad.
+        - `x`: the states in the order of `layout.state`: a NumPy array, a CasADi vector (SX, MX, DM) or a JAX array in
+          double precision. One of NumPy or JAX may have more dimensions after the first one, for many vehicles.
+        - `forces`: what `forces` returns, in the order of `force_names`.
+        - `p`: coefficients by name, as numbers, symbols or arrays; the others are those of the vehicle.
 
-        Where a velocity is 0, the drag has the coefficients of the positive direction.
+        The result has the shape of `x`. All values are in SI units, angles in rad. Where a velocity is 0, the drag has
+        the coefficients of the positive direction.
+
+            rov = rov_fmu.load("videoray")
+            rov.rates(np.zeros(7), rov.forces({"u_l": 0.3, "u_r": 0.3}))[0]  # the acceleration in surge, m/s2
 
         Raises InputError if a vector has another length, a coefficient is unknown, or JAX computes in single precision.
         """
@@ -199,9 +209,13 @@ class VehicleModel(Vehicle):
     def forces(self, inputs: Mapping[str, Any], p: Mapping[str, Any] = _NONE) -> Any:
         """Return the vector of forces that `rates` takes, for commands, loads and current.
 
-        `inputs` maps names of inputs to numbers, arrays or symbols of the libraries that `rates` accepts. The other
-        inputs are 0, and the voltage is the usual one. `p` is that of `rates`. The thrust is the steady one: a lag is
-        part of the rates. A dead time is left out, so the commands act at once.
+        - `inputs`: inputs by name, as numbers, arrays or symbols of the libraries that `rates` accepts: commands from
+          -1 to 1, loads in N and N.m, the current in m/s. The others are 0, and the voltage is the usual one.
+        - `p`: coefficients by name, as in `rates`.
+
+        The thrust is the steady one: a lag is part of the rates. A dead time is left out, so the commands act at once.
+
+            dict(zip(rov.force_names, rov.forces({"u_t": 0.5}, {"health_t": 0.8}), strict=True))  # N, N.m, m/s
 
         Raises InputError if an input or a coefficient is unknown.
         """
@@ -210,10 +224,15 @@ class VehicleModel(Vehicle):
     def step(self, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> dict[str, float]:
         """Return the states after h > 0 seconds with the inputs held, exact up to rounding.
 
-        `inputs` are those of `simulate` as numbers, also along axes: `vehicle.step({"surge": 0.3}, state, 0.1)`. The
-        other inputs have their usual values, and the states that `state` does not give are those at rest. Commands act
-        at once, unless the delayed commands are given, too. This is the second implementation, in Python: it needs no
-        compiler and takes milliseconds. For loops there is `stepper`.
+        - `inputs`: those of `simulate` as numbers, also along axes; the others have their usual values. Commands act at
+          once, unless the delayed commands are given, too.
+        - `state`: states by name, in SI units; the others are those at rest.
+        - `h`: the length of the step, s.
+
+        This is the second implementation, in Python: it needs no compiler and takes milliseconds. For loops there is
+        `stepper`.
+
+            rov.step({"surge": 0.3}, {"z": 2.0}, 0.1)["u"]  # m/s
 
         Raises InputError about an argument that cannot be used.
         """
@@ -222,8 +241,14 @@ class VehicleModel(Vehicle):
     def stepper(self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None) -> VehicleStepper:
         """Return the vehicle at time 0 s, to be stepped in a loop: with the states of `simulate` to the last bit.
 
+        - `start`, `record`: those of `simulate`.
+
         It goes on from where it was, with everything that its states do not tell, such as commands that wait for the
-        dead time. `start` and `record` are those of `simulate`.
+        dead time. A controller that holds a depth of 1 m:
+
+            stepper = rov.stepper(record=["z", "w"])
+            for _ in range(100):
+                stepper.step({"heave": 0.5 * (1.0 - stepper.now["z"]) - 0.5 * stepper.now["w"]}, 0.1)
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
@@ -233,11 +258,21 @@ class VehicleModel(Vehicle):
         return VehicleStepper(self, begin, checked_record(record, self.layout, names))
 
     def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
-        """Return the time derivatives of the states by their names. The arguments are those of `step`."""
+        """Return the time derivatives of the states by their names, in SI units.
+
+        The arguments are those of `step`.
+
+            rov.derivatives({"heave": 0.5}, {})["w"]  # m/s2, down
+        """
         return super().derivatives(self._all_inputs(inputs), self._all_states(state))
 
     def response(self, axis: Axis | str, command: float) -> tuple[float, float]:
-        """Return the signed V_ss, and Tau (17) from rest in s, of an axis alone: `vehicle.response("surge", 0.3)`.
+        """Return the signed V_ss (m/s or rad/s), and Tau (17) from rest in s, of an axis alone.
+
+        - `axis`: the axis or its name.
+        - `command`: a fraction from -1 to 1 of all commands that drive it; positive is its positive direction.
+
+            rov_fmu.load("bluerov2").response("surge", 0.3)
 
         Raises InputError if the vehicle has no such axis.
         """
@@ -271,7 +306,12 @@ class VehicleModel(Vehicle):
         sign: Path | None = None,
         force: bool = False,
     ) -> "Built":
-        """Build the FMU of the vehicle. The arguments, the result and the errors are those of `rov_fmu.build.build`."""
+        """Build the FMU of the vehicle.
+
+        The arguments, the result and the errors are those of `rov_fmu.build.build`.
+
+            rov.with_(health_l=0.5).build("fouled.fmu", fmi=3, platforms="host")
+        """
         from rov_fmu.build import build
 
         return build(

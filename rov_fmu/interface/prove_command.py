@@ -1,7 +1,8 @@
-"""The command `rov-fmu prove --report`: the claims about an FMU, of which one is about vehicles, and their page."""
+"""The command `rov-fmu prove`: what it prints, and with --report the claims, of which one is about vehicles."""
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,16 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.messages import Progress, listed
+from rov_fmu.io.messages import Progress, ProofError, listed
 from rov_fmu.io.output import check_replaced, check_targets, write_whole
+from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
+from rov_fmu.prove.proof import prove
 from rov_fmu.prove.runs import Array, Plan
 from rov_fmu.prove.subject import Subject
+from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
+from rov_fmu.report.progress import parts
 from rov_fmu.report.proof_page import proof_output
 
 _GLIDE, _GLIDE_STEPS = 10.0, 100
@@ -26,27 +31,58 @@ _LOSS = 1e-12
 """The increase of an energy, relative to the energy, that is a rounding error."""
 
 
-def prove_with_report(
-    fmu: Path,
-    interface: str | None,
-    tolerance: float | None,
-    time_limit: float,
-    key: Path | None,
-    report: Path,
-    *,
-    force: bool,
-    on_progress: Progress,
-) -> Proof:
-    """Check the claims about an FMU, and write the page about them.
+@dataclass(frozen=True)
+class Options:
+    """The options of the command. They are arguments of `rov_fmu.prove.proof.prove`, besides the last three."""
 
-    `force` allows replacing a file that `prove` did not write, or that was changed since. The other arguments, and what
-    is raised, are those of `prove_claims`.
+    interface: str | None
+    tolerance: float | None
+    time_limit: float
+    key: Path | None
+    """The public key that must have signed the FMU."""
+    report: Path | None
+    """The page to write, with more evidence."""
+    force: bool
+
+
+def prove_fmu(fmu: Path, options: Options) -> None:
+    """Run the experiments of an FMU, or with a report check all claims, and print the results.
+
+    Raises ProofError if a result is not as expected, and what `prove` and `prove_claims` raise.
     """
+    if options.report:
+        _with_report(fmu, options.report, options)
+        return
+    evidence = check_evidence(fmu, options.key)
+    with parts() as shown:
+        begin = shown.begin("running the experiments")
+        findings = prove(fmu, options.interface, options.tolerance, options.time_limit, begin)
+    print_proof(findings)
+    print_evidence(evidence)
+    if wrong := sum(not finding.passed for finding in findings):
+        raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
+
+
+def _with_report(fmu: Path, report: Path, options: Options) -> None:
+    """Check the claims about an FMU, write the page about them, and print them."""
+    with parts() as shown:
+        proof = prove_with_report(fmu, report, options, shown.begin("checking the claims"))
+    print_claims(proof)
+    print_evidence(proof.origin)
+    print_end([report], "open it in a browser")
+    if failed := proof.with_result("fails"):
+        raise ProofError(*(f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed))
+
+
+def prove_with_report(fmu: Path, report: Path, options: Options, on_progress: Progress) -> Proof:
+    """Check the claims about an FMU, and write the page about them. Raises what `prove_claims` does."""
     check_targets([report], [fmu])
     check_written(report, PAGE)
-    check_replaced([report], force=force)
-    proof = prove_claims(fmu, interface, tolerance, time_limit, key, CLAIMS_OF_VEHICLES, on_progress)
-    write_whole(proof_output(proof, report), force=force)
+    check_replaced([report], force=options.force)
+    proof = prove_claims(
+        fmu, options.interface, options.tolerance, options.time_limit, options.key, CLAIMS_OF_VEHICLES, on_progress
+    )
+    write_whole(proof_output(proof, report), force=options.force)
     return proof
 
 

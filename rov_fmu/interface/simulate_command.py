@@ -5,17 +5,19 @@ from dataclasses import dataclass
 from io import BytesIO, StringIO
 from math import ceil, floor, isfinite, log10, nan
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import STEP, TIME, name_at_start, result_times
 from rov_fmu.interface.command_files import read_inputs
-from rov_fmu.interface.model import VehicleModel
+from rov_fmu.interface.fly_command import open_in_browser
+from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
 from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
-from rov_fmu.report.console import console, paragraph, print_table, shell_words, table
+from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 
 _STOP = 10.0
 """The default end of a simulation, s, as in the FMU's default experiment."""
@@ -23,6 +25,45 @@ _SHORTEST = 1e-6
 """The shortest simulation, s."""
 _MOST_RESULTS = 1_000_000
 _TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet", ".mcap"), (".png", ".svg", ".pdf")
+
+
+@dataclass(frozen=True)
+class Options:
+    """The options of the command."""
+
+    settings: Sequence[str]
+    """What --set has."""
+    commands: Path | None
+    """The file of --input."""
+    stop: float | None
+    """The time at the end, s."""
+    step: float | None
+    """The time between two results, s."""
+    output: Path | None
+    plot: Path | None
+    """The picture; an empty path for one that a browser shows."""
+    force: bool
+
+
+def simulate_vehicle(path: Path, options: Options) -> None:
+    """Simulate the vehicle of a file, and write or print what is asked for.
+
+    Raises FileError, InputError, BuildError, WriteError.
+    """
+    output, plot, opens = options.output, options.plot, options.plot == Path()
+    vehicle = load(path)
+    inputs = [path, *vehicle.files, *([options.commands] if options.commands else [])]
+    check_outputs(output, None if opens else plot, inputs, force=options.force)
+    result = run(vehicle, options)
+    picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
+    write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
+    if opens and picture:
+        open_in_browser(picture, "--plot FILE.svg")
+    if output or picture:
+        following = "" if opens else "open the plot" if plot else "add --plot to see the curves"
+        print_end([path for path in (output, None if opens else plot) if path], following)
+    else:
+        print_final(vehicle, result, has_no_input=not options.commands and not _moves(options.settings, vehicle.layout))
 
 
 def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path], *, force: bool = False) -> None:
@@ -40,19 +81,12 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
     check_replaced(targets, force=force)
 
 
-def run(
-    vehicle: VehicleModel,
-    settings: Sequence[str],
-    commands: Path | None,
-    stop: float | None,
-    step: float | None,
-    *,
-    with_inputs: bool = False,
-) -> Result:
-    """Simulate a vehicle as the options say, and record the inputs, too, if it is asked for.
+def run(vehicle: VehicleModel, options: Options) -> Result:
+    """Simulate a vehicle as the options say, and record the inputs, too, if a file for Foxglove is to be written.
 
     Raises InputError, FileError, BuildError.
     """
+    commands, stop, step = options.commands, options.stop, options.step
     inputs: dict[str, Any] = {}
     if commands:
         inputs = {**read_inputs(commands, vehicle.layout)}
@@ -62,7 +96,7 @@ def run(
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
             )
-    given = read_settings(settings, vehicle.layout)
+    given = read_settings(options.settings, vehicle.layout)
     for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
@@ -73,7 +107,7 @@ def run(
     if stop / step > _MOST_RESULTS:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
     layout = vehicle.layout
-    record = [*layout.inputs, *layout.state, *layout.calculated] if with_inputs else None
+    record = [*layout.inputs, *layout.state, *layout.calculated] if is_mcap(options.output) else None
     changed = vehicle.with_(**given.coefficients)
     return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start, record=record)
 
@@ -131,14 +165,15 @@ def _percent(text: str) -> str:
     return f": {number:.6g} % is {number / 100.0:.6g}" if isfinite(number) else ""
 
 
-def moves(setting: str, layout: Layout) -> bool:
+def _moves(settings: Sequence[str], layout: Layout) -> bool:
     """Return True if an option --set has an input or a state, so that the vehicle may move, and not a coefficient."""
-    return setting.partition("=")[0].strip() not in layout.coefficients
+    return any(setting.partition("=")[0].strip() not in layout.coefficients for setting in settings)
 
 
-def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None) -> str:
+def title(vehicle: VehicleModel, options: Options) -> str:
     """Return the title of a plot: the vehicle, and what the options set."""
-    given = [*([f"commands of {shell_words(commands.name)}"] if commands else []), *map(one_line, settings)]
+    commands = [f"commands of {shell_words(options.commands.name)}"] if options.commands else []
+    given = [*commands, *map(one_line, options.settings)]
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
 
 

@@ -33,9 +33,14 @@ class VehicleStepper:
     def step(self, inputs: Mapping[str, float], h: float) -> dict[str, float]:
         """Hold inputs for h > 0 seconds, and return the recorded variables at the end, by name.
 
-        `inputs` are those of `simulate` as numbers, also along axes: `stepper.step({"surge": 0.3}, 0.1)`. The other
-        inputs have their usual values. Each command that saturates gives one warning. Thrust without lag is that of the
-        inputs that were held, as in the FMU; `simulate` gives that of the inputs that begin at the same time.
+        - `inputs`: those of `simulate` as numbers, also along axes. The others have their usual values. Each command
+          that saturates gives one warning.
+        - `h`: the length of the step, s. It need not be short.
+
+        Thrust without lag is that of the inputs that were held, as in the FMU; `simulate` gives that of the inputs that
+        begin at the same time.
+
+            rov_fmu.load("videoray").stepper().step({"surge": 0.3}, 0.1)["u"]  # m/s
 
         Raises InputError about an argument that cannot be used, or if the motion cannot be computed.
         """

@@ -60,10 +60,14 @@ def prove(
 ) -> list[Finding]:
     """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
-    `interface` is one of INTERFACES. The default is the first of these that the FMU has. `tolerance` replaces the
-    tolerances of the experiments. In Model Exchange, where a solver integrates, it is at least 1e-7. `time_limit` is
-    the time that each experiment may take, s. `on_experiment` is called before each experiment with its name and the
-    share that is done.
+    - `fmu`: an FMU of any exporter with experiments by FMI-LS-REF.
+    - `interface`: one of INTERFACES. The default is the first of these that the FMU has.
+    - `tolerance`: replaces the tolerances of the experiments, relative to the largest value of a variable. In Model
+      Exchange, where a solver integrates, it is at least 1e-7.
+    - `time_limit`: the time that each experiment may take, s.
+    - `on_experiment`: called before each experiment with its name and the share that is done.
+
+        all(finding.passed for finding in prove(Path("videoray.fmu")))
 
     Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """

@@ -73,6 +73,7 @@ def check_distinct_names(layout: Layout) -> Iterator[str]:
     Thrust astern of the curve `main`, a_t_main_reverse, has the name of thrust ahead of the curve `main_reverse`.
     """
     places = {f"F_{thruster.name}": f"thruster.{thruster.name}" for thruster in layout.thrusters}
+    places |= {layout.curve_of[name].lagging(name): f"thruster.{name}" for name in layout.curve_of}
     for table in layout.coefficient_tables:
         for key, name in table.names.items():
             place = ".".join((*table.place, key))
@@ -204,11 +205,15 @@ def _check_keys_of_thrust(place: str, curve: schema.Curve) -> Iterator[str]:
         replaced = (*REPLACED_BY_TABLE, *(("V_0", "n_V") if curve.tables else ()))
         reason = f"must not be given together with {'table' if curve.table else 'tables'}"
         yield from (key_line(f"{place}.{key}", reason) for key in replaced if key in given)
+        if curve.lag == "speed":
+            reason = "must be 'force' with a table, whose thrust is no quadratic of the speed: give a_t and b_t instead"
+            yield key_line(f"{place}.lag", reason, curve.lag)
     else:
         yield from (key_line(f"{place}.{key}", "this key is missing") for key in ("a_t", "b_t") if key not in given)
         if "k_t" in given:
             yield key_line(f"{place}.k_t", "scales a table, and this curve has none: give table, or leave k_t out")
-    yield from _check_needed_by(place, given, _both_ways("V_0", "n_V"))
+    needs = [*_both_ways("V_0", "n_V"), ("lag", "T")]
+    yield from _check_needed_by(place, given.keys() | curve.model_fields_set, needs)
 
 
 def _check_electric_currents(parts: File) -> Iterator[str]:

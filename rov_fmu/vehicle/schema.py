@@ -25,10 +25,13 @@ from rov_fmu.equation.catalogue import (
     COMMANDS,
     CURVE,
     FIN,
+    LAGS,
     REPLACED_BY_TABLE,
     RESTORING,
+    THRUSTER,
     Axis,
     Declaration,
+    Lag,
     cross_of,
     declarations_of,
 )
@@ -44,9 +47,9 @@ from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 
 FORMAT = 2
 UNTUNED = 1.0
-"""The value of α and β where the file does not give them."""
+"""The value of α and β, and of the health of a thruster, where the file does not give them."""
 NOT_GIVEN = "not given"
-"""The source of α and β where the file does not give them."""
+"""Their source there."""
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
 _NONE: Mapping[str, Any] = MappingProxyType({})
@@ -138,7 +141,7 @@ class Arm(_coefficients("Arm", ARM)):  # type: ignore[misc]
     """The arm R sin γ, (4), of the thrusters that have the key `arm`."""
 
 
-_CURVE = {key: kind.filled(curve="curve", equation="") for key, kind in CURVE.items()}
+_CURVE = {key: kind.filled(curve="curve", equation="", lag=LAGS["force"]) for key, kind in CURVE.items()}
 
 
 def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
@@ -207,6 +210,9 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     a_t, b_t and c_0."""
     tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
     """Tables at several voltages, which replace `table`."""
+    lag: Lag = "force"
+    """What follows the command with the time constant T: the force, or the speed n of the rotor, on which the force
+    (a_t |n| + b_t) n and the loss d |n| depend."""
 
     electric_current: ElectricCurrent | None = None
 
@@ -220,7 +226,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
         return parts.Curve(
             name,
             keys,
-            **{key: getattr(self, key) for key in ("description", "equation")},
+            **{key: getattr(self, key) for key in ("description", "equation", "lag")},
             n_thrusters=self.together,
             tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
             electric_current=replace(current.table, voltage=current.voltage) if current else None,
@@ -322,8 +328,13 @@ class Actuator(Strict):
         return {"name": self.name, "description": self.description, "direction": along, "position": at}
 
 
-class Thruster(Actuator):
+_THRUSTER = {key: kind.filled(thruster="thruster") for key, kind in THRUSTER.items()}
+
+
+class Thruster(_coefficients("Thruster", _THRUSTER, base=Actuator)):  # type: ignore[misc]
     """A thruster: its curve, its direction and its place."""
+
+    model_config = DOCUMENTED
 
     curve: str
     """The name of the thrust curve."""
@@ -451,15 +462,13 @@ class Tables(Strict):
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
-        fins: Any = {fin.name: fin for fin in self.fin}
+        lists: dict[str, list[Any]] = {"thruster": self.thruster, "fin": self.fin}
+        tables: Any = dict(self) | {key: {one.name: one for one in ones} for key, ones in lists.items()}
 
         def entry(table: Any, key: str) -> Any:
             return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
-        return {
-            name: reduce(entry, keys, fins if first == "fin" else getattr(self, first))
-            for name, (first, *keys) in of.keys_in_file.items()
-        }
+        return {name: reduce(entry, keys, tables) for name, keys in of.keys_in_file.items()}
 
 
 class _Head(Strict):

@@ -17,7 +17,12 @@ def shipped_name(path: Path) -> str:
 
 
 def find_vehicle(given: str | Path) -> Path:
-    """Return the vehicle file at a path, or of a shipped vehicle with this name. Raises FileError."""
+    """Return the vehicle file at a path, or of a shipped vehicle with this name. Raises FileError.
+
+    - `given`: a path or a name. A file with the name of a vehicle that ships comes first.
+
+        find_vehicle("bluerov2")
+    """
     path, name = Path(given), str(given)
     if name in SHIPPED and (path.is_dir() or not path.exists()):
         return SHIPPED[name]

@@ -44,6 +44,11 @@ class Uncertainty:
     def drawn(self, uniform: Array) -> Array:
         """Return n x p coefficients, made from independent uniform numbers (n x p, 0 to 1) of any sampler.
 
+        - `uniform`: a row for each vehicle, and a column for each of the p `names`.
+
+            known = rov_fmu.load("videoray_refit").uncertainty
+            known.drawn(np.random.default_rng(1).random((1000, len(known.names)))).std(axis=0)  # SI units
+
         A coefficient that would exceed a bound is held there, and the others become what a fit would give with this one
         held: if the data hardly separate linear and quadratic drag, the sum of both is preserved. Each row depends, to
         the last bit, only on its own numbers, and an uncorrelated coefficient depends only on its own column.
@@ -67,7 +72,12 @@ class Uncertainty:
         return tuple(map(tuple, groups.values()))
 
     def part(self, names: Sequence[str]) -> "Uncertainty":
-        """Return the distribution of some of the coefficients."""
+        """Return the distribution of some of the coefficients.
+
+        - `names`: the names of these coefficients, in any order.
+
+            rov_fmu.load("videoray_refit").uncertainty.part(["a_d_u", "b_d_u"]).correlation
+        """
         place = [self.names.index(name) for name in names]
         return Uncertainty(
             tuple(names),

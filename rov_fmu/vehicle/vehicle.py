@@ -152,10 +152,14 @@ class Vehicle:
     def with_(self, layout: Layout | None = None, /, **coefficients: float) -> Self:
         """Return this vehicle with other values of some coefficients, in SI units: `vehicle.with_(a_d_u=10)`.
 
-        Their source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
-        intervals. `vehicle.layout.coefficients` has the names, units and bounds.
+        - `layout`: with it, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too.
+        - `coefficients`: the values by name. `vehicle.layout.coefficients` has the names, units and bounds. Their
+          source becomes "set by hand", which also appears in the FMU and on its page, and they have no confidence
+          intervals.
 
-        With a `layout`, the vehicle gets this layout, and keeps those of its coefficients that the layout has, too.
+        A VideoRay whose left thruster has died:
+
+            load_vehicle(find_vehicle("videoray")).with_(health_l=0.0)
 
         Raises InputError if the vehicle has no such coefficient, or cannot have the value.
         """

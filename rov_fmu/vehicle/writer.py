@@ -111,6 +111,7 @@ def _curve(curve: Curve) -> dict[str, Any]:
         "together": curve.n_thrusters if curve.n_thrusters != 1 else None,
         "table": tables[0]["table"] if len(tables) == 1 else None,
         "tables": tables if len(tables) > 1 else None,
+        "lag": curve.lag if curve.has_rotors else None,
         "electric_current": {"voltage": current.voltage, "table": current.path} if current else None,
     }
 
@@ -150,7 +151,11 @@ def check_report(path: Path, report: Path) -> None:
 def write_vehicle(vehicle: Vehicle, path: str | Path, *, force: bool = False) -> None:
     """Write the vehicle file. Raises VehicleFileError if it could not be read again, or OSError.
 
-    `force` allows replacing a file that this program did not write, or that has changed since.
+    - `vehicle`: a vehicle with all its texts, such as `load_vehicle` and `identify` return. Numbers have all digits.
+    - `path`: the file. The tables, pictures and the report of the vehicle must be in its folder or below it.
+    - `force`: True to replace a file that this program did not write, or that has changed since.
+
+        write_vehicle(load_vehicle(find_vehicle("bare.toml")).with_(m_rov=7.2), "heavier.toml")
     """
     write_whole(vehicle_output(vehicle, Path(path)), force=force)
 
@@ -158,9 +163,15 @@ def write_vehicle(vehicle: Vehicle, path: str | Path, *, force: bool = False) ->
 def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str, *, force: bool = False) -> None:
     """Write a copy of the vehicle file `source` with other values of some coefficients.
 
-    `reason` becomes the source of the coefficients that change. A new file is a vehicle of its own: its name, its
-    identifier and so its FMU have other names than those of `source`. Everything else stays as it is. Raises
-    VehicleFileError or OSError, as write_vehicle does.
+    - `source`, `path`: the vehicle file, and the file to write. If that is a new one, it is a vehicle of its own: its
+      name, its identifier and so its FMU have other names than those of `source`.
+    - `values`: the new values by name, in SI units. Everything else stays as it is, with the comments.
+    - `reason`: the source of the coefficients that change.
+    - `force`: True to replace a file that this program did not write, or that has changed since.
+
+        write_tuned(Path("bare.toml"), Path("tuned.toml"), {"alpha_w": 0.9}, "Tuned by hand in the harbour")
+
+    Raises VehicleFileError or OSError, as write_vehicle does.
     """
     document, vehicle = _read_document(source), load_vehicle(source)
     for name, value in values.items():

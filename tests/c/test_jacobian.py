@@ -15,7 +15,7 @@ from rov_fmu.bridges import arrays
 from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.equation.test_thrust_effects import NOW, ROV
+from tests.equation.thrust.test_thrust_effects import NOW, ROV
 from tests.vehicles import SIX, VEHICLES, VIDEORAY, at_rest, random_inputs, random_state, still
 from verification.references import reference
 

@@ -34,10 +34,11 @@ OTHER_UNITS: dict[str, tuple[object, ...]] = {
     "V": (1, 2, -3, 0, -1),
     "s": (0, 0, 1, 0, 0),
     "N/s": (1, 1, -3, 0, 0),
+    "1/s": (0, 0, -1, 0, 0),
     "N.s2/(m2.rad)": (1, -1, 0, -1, 0),
     "N.s2/(m2.rad2)": (1, -1, 0, -2, 0),
 }
-"""Those that only a vehicle with pulse widths, a battery, lag and a fin has; a µs is 1e-6 s."""
+"""Those that only a vehicle with pulse widths, a battery, both lags and a fin has; a µs is 1e-6 s."""
 
 
 @pytest.fixture(scope="module")

@@ -13,7 +13,7 @@ from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes, with_rotors
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -98,8 +98,8 @@ _FILES = {
 @cache
 def flown_vehicle(kind: str) -> Vehicle:
     """Return a vehicle by the name of its page. The `heavy` is the BlueROV2 Heavy without roll and pitch."""
-    if kind == "six":
-        return a_vehicle(SIX)
+    if kind in ("six", "rotors"):
+        return a_vehicle(SIX if kind == "six" else with_rotors(SIX))
     return four_axes(load_vehicle(SHIPPED["bluerov2_heavy"])) if kind == "heavy" else load_vehicle(_FILES[kind])
 
 

@@ -92,7 +92,9 @@ def check_manoeuvre(page: Any, vehicle: Vehicle, folder: Path, longest: float = 
         assert values == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize(("kind", "longest"), [("videoray", 5.0), ("heavy", 5.0), ("everything", 5.0), ("six", 0.05)])
+@pytest.mark.parametrize(
+    ("kind", "longest"), [("videoray", 5.0), ("heavy", 5.0), ("everything", 5.0), ("six", 0.05), ("rotors", 0.05)]
+)
 def test_a_manoeuvre_is_that_of_the_native_fmu(
     kind: str, longest: float, fly: Fly, request: pytest.FixtureRequest
 ) -> None:

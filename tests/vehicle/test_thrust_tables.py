@@ -252,6 +252,20 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         {"curves.main.table": _FILES[0]},
         "curves.main.tables: must not be given together with table",
     ),
+    "a rotor that lags beside a table": (
+        {"curves.bow.lag": "speed", "curves.bow.T": quantity(0.1, "s"), "curves.main.lag": "speed"},
+        "curves.main.lag = 'speed': must be 'force' with a table, whose thrust is no quadratic of the speed\n"
+        "curves.bow.lag = 'speed': must be 'force' with a table, whose thrust is no quadratic of the speed",
+    ),
+    "a lag without a time constant": ({"curves.lift.T": GONE}, "curves.lift.T: this key is missing, and lag is there"),
+    "a lag of something else": (
+        {"curves.lift.lag": "rotor"},
+        "curves.lift.lag = 'rotor': must be 'force' or 'speed'",
+    ),
+    "a rotor with the name of a coefficient": (
+        {"thruster.top.name": "V_lift"},
+        "curves.lift.n_V: has the name n_V_lift in the FMU, which thruster.V_lift has too: rename one of them",
+    ),
     "no exponent": ({"curves.bow.n_V": GONE}, "curves.bow.n_V: this key is missing, and V_0 is there"),
     "falling voltages": (
         {"curves.main.tables": [{"voltage": 16.0, "table": _FILES[1]}, {"voltage": 12.0, "table": _FILES[0]}]},

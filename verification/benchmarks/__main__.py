@@ -74,9 +74,10 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
     plain_c = None
     if measurable():
         with say("steps in plain C"):
-            plain_c, heavy_c = (PlainC(one, Path(tempfile.mkdtemp(dir=folder))) for one in (rov, heavy))
             steps = Steps(rov, heavy, effort.commands, effort.known)
-            steps.measure(plain_c, heavy_c, effort.repetitions)
+            measured = (rov, heavy, steps.turned)
+            plain_c, heavy_c, rotors_c = (PlainC(one, Path(tempfile.mkdtemp(dir=folder))) for one in measured)
+            steps.measure(plain_c, heavy_c, rotors_c, effort.repetitions)
             yield from steps.sections()
             if picture_file:
                 write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()), force=True)

@@ -1,6 +1,7 @@
 """All that is measured in plain C: steps of the VideoRay and the BlueROV2 Heavy, costs at equal error, and promises."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from .taylor import NOT_INSTALLED, installed
 FINE = 1e-12
 """The error at which the Heavy is compared with RK4."""
 _SHORT = (0.001, SUBSTEP)
-_TO_RK4 = {"turning": (1.5, 2.3), "straight": (2.2, 2.8), "heavy": (8.0, 12.0)}
+_TO_RK4 = {"turning": (1.5, 2.3), "straight": (2.2, 2.8), "heavy": (8.0, 12.0), "rotors": (5.0, 8.0)}
 """The promised largest ratio of a step's cost to RK4's, for the lengths of _SHORT.
 
 All promises are ratios in one run, with a margin for the processor: at 10 ms, a straight step costs 1.9 steps of RK4 on
@@ -41,16 +42,21 @@ class Steps:
         self.straight = Table("VideoRay, straight", rov, [CORE, FMU, RK4], commands, known, straight=True)
         self.one_way = Table("VideoRay, turning one way", rov, series, commands, known, one_way=True)
         self.heavy = Table("BlueROV2 Heavy, six axes and lag", heavy, [CORE, RK4], commands, max(4, known // 4))
+        curves = tuple(replace(curve, lag="speed") for curve in heavy.layout.curves)
+        self.turned = replace(heavy, layout=replace(heavy.layout, curves=curves))
+        """The Heavy with rotors that lag in speed."""
+        self.rotors = Table("The same with rotors that lag", self.turned, [CORE, RK4], commands, max(4, known // 4))
         self.sweeps = {method: self.turning.sweep(method, settings) for method, settings in SWEEPS.items()}
         self.finer = self.heavy.sweep(RK4, [float(2**n) for n in range(8)], SUBSTEP)
         self.ours = self.turning.jobs[CORE, 1.0]
 
-    def measure(self, plain_c: PlainC, heavy_c: PlainC, repetitions: int) -> None:
+    def measure(self, plain_c: PlainC, heavy_c: PlainC, rotors_c: PlainC, repetitions: int) -> None:
         """Measure all jobs."""
         tables = (self.turning, self.straight, self.one_way)
         jobs = [job for some in (*(t.jobs.values() for t in tables), *self.sweeps.values()) for job in some]
         self.measured = Measured(plain_c, jobs, repetitions)
         self.measured_heavy = Measured(heavy_c, [*self.heavy.jobs.values(), *self.finer], repetitions)
+        self.measured_rotors = Measured(rotors_c, [*self.rotors.jobs.values()], repetitions)
 
     def sections(self) -> Iterator[Section]:
         """Yield the tables, the costs at equal error, and what is promised."""
@@ -59,6 +65,7 @@ class Steps:
         if HEYOKA not in self.one_way.methods:
             yield [NOT_INSTALLED]
         yield self.heavy.section(self.measured_heavy)
+        yield self.rotors.section(self.measured_rotors)
         section = [["ours, to rounding", duration(self.measured.cost(self.ours)), "1"]]
         for method, name in SOLVERS.items():
             cost, times = self.measured.compared(self.sweeps[method], self.ours)
@@ -68,10 +75,12 @@ class Steps:
 
     def _promises(self) -> Section:
         """Return the promises with what is measured. Ratios and differences are medians over the repetitions."""
-        turning, straight, heavy, one_way = (t.jobs for t in (self.turning, self.straight, self.heavy, self.one_way))
-        m, slow = self.measured, self.measured_heavy
+        tables = (self.turning, self.straight, self.heavy, self.rotors, self.one_way)
+        turning, straight, heavy, rotors, one_way = (table.jobs for table in tables)
+        m, slow, turned = self.measured, self.measured_heavy, self.measured_rotors
         found: list[tuple[str, float, str, float]] = []
-        for (name, limits), jobs, by in zip(_TO_RK4.items(), (turning, straight, heavy), (m, m, slow), strict=True):
+        to_rk4 = ((turning, m), (straight, m), (heavy, slow), (rotors, turned))
+        for (name, limits), (jobs, by) in zip(_TO_RK4.items(), to_rk4, strict=True):
             ratios = [by.ratio(jobs[CORE, h], jobs[RK4, h]) for h in _SHORT]
             found += [
                 (f"{name} step to one of RK4, {1000 * h:g} ms", ratio, "≤", limit)

@@ -166,6 +166,14 @@ def _interpolated(table: ThrustTable, command: Number, numbers: Any) -> Number:
     return first * (1 - t) ** 2 + last * t**2
 
 
+def rotor_speed(rov: Vehicle, curve: Curve, command: Number, numbers: Any) -> Number:
+    """Return the steady speed of a rotor under a command: what is beyond the dead band, with the command's sign."""
+    key = f"c_0_{curve.name}"
+    dead_band = rov.coefficients.get(f"{key}_reverse" if command < 0 and "c_0_reverse" in curve.keys else key, 0.0)
+    beyond = max(abs(command) - numbers.mpf(dead_band), numbers.zero)
+    return -beyond if command < 0 else beyond
+
+
 def _quadratic(rov: Vehicle, curve: Curve, command: Number, numbers: Any) -> Number:
     """Return F(c) = a (c - c0)^2 + b (c - c0) beyond the dead band; for c < 0, -F(-c) with the reverse coefficients."""
     keys, reverse = curve.keys, "_reverse" if command < 0 else ""
@@ -198,11 +206,14 @@ def commands(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[s
 
 
 def steady_forces(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
-    """Return the force of every thruster under the commands after its lag has died out."""
+    """Return the force of every thruster under the commands, with its health, after its lag has died out."""
     of_thruster = rov.layout.curve_of
     voltage = inputs.get("voltage", 0)
-    commanded = commands(rov, inputs, numbers).items()
-    return {name: thrust(rov, of_thruster[name], command, numbers, voltage) for name, command in commanded}
+    return {
+        name: numbers.mpf(rov.coefficients[f"health_{name}"])
+        * thrust(rov, of_thruster[name], command, numbers, voltage)
+        for name, command in commands(rov, inputs, numbers).items()
+    }
 
 
 def effect(rov: Vehicle, thruster: Thruster, velocity: str, numbers: Any) -> Number:

@@ -106,16 +106,41 @@ def growth(error: Number, tolerance: float) -> Number:
     return min(mpfr(4), max(mpfr(0.1), ideal))
 
 
-def _signs(system: _System, y: Sequence[Number], h: Number) -> tuple[list[int], Number]:
-    """Return the signs of the velocities in the step, and a time after which a velocity that is zero has its sign."""
-    n = len(system.names)
-    signs = [-1 if y[a] < 0 else 1 for a in range(n)]
+def _signs(
+    rates_with: Callable[[Sequence[int]], Rates], y: Sequence[Number], places: Sequence[int], h: Number
+) -> tuple[list[int], Number]:
+    """Return the signs of some states in the step, and a time after which one that is zero has its sign.
+
+    The sign of one may choose that of another: of a rotor that begins to turn, and of the vehicle that it pushes.
+    """
+    signs, before = [-1 if y[a] < 0 else 1 for a in places], list[int]()
     soon = h / 2**24
-    if any(y[a] == 0 for a in range(n)):
-        rates = system.rates(signs)
+    while any(y[a] == 0 for a in places) and signs != before:
+        before, rates = signs, rates_with(signs)
         later = leap(rates, y, rates(y), soon)[0]
-        signs = [signs[a] if y[a] != 0 else -1 if later[a] < 0 else 1 for a in range(n)]
+        signs = [sign if y[a] != 0 else -1 if later[a] < 0 else 1 for a, sign in zip(places, signs, strict=True)]
     return signs, soon
+
+
+def until_reversal(
+    rates_with: Callable[[Sequence[int]], Rates], y: list[Number], places: Sequence[int], h: Number, tolerance: float
+) -> tuple[list[Number], Number, Number]:
+    """Return the state after h or at the first reversal of the states at these places, the time, and the next h.
+
+    The time is 0 where h was too long. `rates_with` gives the rates while these states have some signs.
+    """
+    signs, soon = _signs(rates_with, y, places, h)
+    rates = rates_with(signs)
+    end, error = leap(rates, y, rates(y), h)
+    taken, size = h, h * growth(error, tolerance)
+    if not error <= tolerance:
+        return y, mpfr(0), size
+    for a, sign in zip(places, signs, strict=True):
+        low = soon if y[a] == 0 else mpfr(0)
+        high = taken if sign * end[a] < 0 else _dip(rates, y, end, a, sign, taken)
+        if high is not None and high > low:
+            taken, end = _reversal(rates, y, a, low, high)
+    return end, taken, size
 
 
 def _reversal(rates: Rates, y: Sequence[Number], a: int, low: Number, high: Number) -> tuple[Number, list[Number]]:
@@ -161,22 +186,12 @@ def integrate(equations: Equations, state: Mapping[str, float], h: float) -> End
         size = system.first_step(y)
         while remaining > 0:
             size = min(size, remaining)
-            signs, soon = _signs(system, y, size)
-            rates = system.rates(signs)
-            start = rates(y)
+            start = system.rates([-1 if V < 0 else 1 for V in y[:n]])(y)
             if system.is_settled(start, y):
                 y = _steady_end(system, y, start, remaining)
                 paths = [path + abs(remaining * rate) for path, rate in zip(paths, _pace(start, n), strict=True)]
                 break
-            end, error = leap(rates, y, start, size)
-            taken, size = size, size * growth(error, _TOLERANCE)
-            if not error <= _TOLERANCE:
-                continue
-            for a in range(n):
-                low = soon if y[a] == 0 else mpfr(0)
-                high = taken if signs[a] * end[a] < 0 else _dip(rates, y, end, a, signs[a], taken)
-                if high is not None and high > low:
-                    taken, end = _reversal(rates, y, a, low, high)
+            end, taken, size = until_reversal(system.rates, y, range(n), size, _TOLERANCE)
             moved = [b - a for a, b in zip(y[n : n + 4], end[n : n + 4], strict=True)]
             steps = (gmpy2.hypot(moved[0], moved[1]), abs(moved[2]), abs(moved[3]))
             paths = [path + step for path, step in zip(paths, steps, strict=True)]

@@ -50,11 +50,11 @@ class Body:
     wrenches: Array
     """n x 6: the force and the moment of 1 N of each thruster. Their product with v is the speed of advance there."""
     targets: Array
-    """n: the steady force of each thruster in water at rest, N."""
+    """n: the steady force of each thruster in water at rest, N; or the steady speed of its rotor, if that lags."""
     advances: Array
     """n: the loss of force per speed of advance, N.s/m."""
     lags: Array
-    """n: the time constant of each force, s. Where it is not 0, the force is a state."""
+    """n: the time constant of each force, s. Where it is not 0, the force, or the speed of the rotor, is a state."""
     alpha: Array
     """6: the tuning of the thrust along each axis, (18)."""
     load: Array
@@ -65,11 +65,20 @@ class Body:
     centre_of_buoyancy: Array
     current: Array
     """The velocity of the water, north, east and down, m/s."""
+    rotors: Array
+    """2 x 3 x n: a, b and d ahead, and astern. The force at the speed n of the rotor is (a |n| + b) n - d |n| v_a."""
+    has_rotor: Array
+    """n: True for a thruster whose rotor lags in speed, so that the speed is its state."""
 
     @cached_property
     def places(self) -> list[int]:
         """The places of the vehicle's axes among the six."""
         return [VELOCITIES.index(name) for name in self.axes]
+
+    @cached_property
+    def reversing(self) -> list[int]:
+        """The places in a state of what changes coefficients where it reverses: velocities, and speeds of rotors."""
+        return [*self.places, *(13 + n for n in np.flatnonzero(self.has_rotor[self.lags != 0]).tolist())]
 
     @cached_property
     def inverse(self) -> Array:
@@ -128,27 +137,39 @@ def euler_angles(R: Array) -> tuple[Number, Number, Number]:
     return mp.atan2(R[2][1], R[2][2]), theta, mp.atan2(R[1][0], R[0][0])
 
 
-def forces(body: Body, nu: Array, R: Array, lagging: Array) -> Array:
-    """Return the right side of the equation for all six axes, without the Coriolis terms."""
+def forces(body: Body, nu: Array, R: Array, lagging: Array, signs: Array | None = None) -> Array:
+    """Return the right side of the equation for all six axes, without the Coriolis terms.
+
+    `signs` are those of the velocities and of what lags, if others shall choose the coefficients.
+    """
+    has_lag = body.lags != 0
+    side = np.where(np.concatenate([nu, lagging]) < 0, -1, 1) if signs is None else signs
     linear, quadratic = (
-        np.where(nu < 0, back, ahead) for back, ahead in ((body.linear_astern, body.linear), (body.astern, body.ahead))
+        np.where(side[:6] < 0, back, ahead)
+        for back, ahead in ((body.linear_astern, body.linear), (body.astern, body.ahead))
     )
-    damping = (linear + quadratic * abs(nu)) @ nu
-    steady = body.targets.copy()
-    steady[body.lags != 0] = lagging
-    thrust = body.alpha * ((steady - body.advances * (body.wrenches @ nu)) @ body.wrenches)
-    fins = body.fins * (abs(nu[0]) * nu[0])
+    damping = (linear + quadratic * (side[:6] * nu)) @ nu
+    state, turns = body.targets.copy(), np.ones(len(has_lag), int)
+    state[has_lag], turns[has_lag] = lagging, side[6:]
+    a, b, d = np.where(turns < 0, body.rotors[1], body.rotors[0])
+    steady = np.where(body.has_rotor, (a * (turns * state) + b) * state, state)
+    advances = np.where(body.has_rotor, d * (turns * state), body.advances)
+    thrust = body.alpha * ((steady - advances * (body.wrenches @ nu)) @ body.wrenches)
+    fins = body.fins * (side[0] * nu[0] * nu[0])
     tau: Array = body.load - damping + fins + thrust + body.righting @ R[2]
     for (i, j, k), factor in body.bilinear.items():
         tau[i] += factor * nu[j] * nu[k]
     return tau
 
 
-def rates(body: Body, inverse: Array, state: Array) -> Array:
-    """Return the time derivatives of a state: six velocities, quaternion, position, then the forces with a lag."""
+def rates(body: Body, inverse: Array, state: Array, signs: Array | None = None) -> Array:
+    """Return the time derivatives of a state: six velocities, quaternion, position, then what lags.
+
+    `signs` are those of the velocities and of what lags, if others shall choose the coefficients.
+    """
     nu, quaternion, lagging = state[:6], state[6:10], state[13:]
     R = rotation(quaternion)
-    right = forces(body, nu, R, lagging) - coriolis(body.mass, nu)
+    right = forces(body, nu, R, lagging, signs) - coriolis(body.mass, nu)
     acceleration = 0 * nu
     acceleration[body.places] = inverse @ right[body.places]
     e, vector, omega = quaternion[0], quaternion[1:], nu[3:]
@@ -160,14 +181,14 @@ def rates(body: Body, inverse: Array, state: Array) -> Array:
 
 
 def integrate(body: Body, state: Sequence[float], seconds: float, tolerance: float = 1e-13) -> Floats:
-    """Return the state after some seconds by DOP853, which is started again at each reversal of a velocity."""
+    """Return the state after some seconds by DOP853, which is started again at each reversal of a velocity or rotor."""
     y, t = np.array(state, float), 0.0
 
     def rate(_: float, y: Floats) -> Floats:
         return rates(body, body.inverse, y)
 
     while t < seconds:
-        moving = [i for i in body.places if y[i] != 0.0 or rate(t, y)[i] != 0.0]
+        moving = [i for i in body.reversing if y[i] != 0.0 or rate(t, y)[i] != 0.0]
         events = [_reversal(i, t, rate(t, y)[i]) for i in moving]
         found = solve_ivp(rate, (t, seconds), y, "DOP853", events=events, rtol=tolerance, atol=1e-15)
         y, t = found.y[:, -1], float(found.t[-1])

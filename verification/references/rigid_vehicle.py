@@ -14,8 +14,8 @@ from rov_fmu.equation.catalogue import cross_name
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body
-from .equations import commands, steady_forces
-from .extrapolation import BITS, growth, leap, plain, real
+from .equations import commands, rotor_speed, steady_forces
+from .extrapolation import BITS, plain, real, until_reversal
 from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, rigid_body_mass, rotation, skew
 
 Values = Mapping[str, Number]
@@ -55,6 +55,7 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         else:
             lift[i, j, VELOCITIES.index(others[1])] = value
     beta, thrusters = six("beta", 1.0), _thrusters(rov, inputs, number)
+    rotors, has_rotor = _rotors(rov, inputs, number)
     return Body(
         "".join(layout.velocities),
         mass / np.outer(beta, beta) ** 0.5,
@@ -72,6 +73,8 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         gravity,
         buoyancy,
         np.array([get(name) for name in ("V_N", "V_E", "V_D")]),
+        rotors,
+        has_rotor,
     )
 
 
@@ -91,9 +94,29 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
         wrench = _wrench(thruster.place, thruster.direction.value)
-        rows.append([*wrench, forces[name], loss * abs(command) / curve.n_thrusters, lag])
+        health = mp.mpf(rov.coefficients[f"health_{name}"])
+        target = rotor_speed(rov, curve, command, mp) if curve.has_rotors else forces[name]
+        rows.append([*wrench, target, health * loss * abs(command) / curve.n_thrusters, lag])
     table = np.array([[number(x) for x in row] for row in rows]).reshape(-1, 9)
     return table[:, :6], table[:, 6], table[:, 7], table[:, 8]
+
+
+def _rotors(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) -> tuple[Array, Array]:
+    """Return a, b and d of each rotor whose speed lags, ahead and astern, and which thrusters have one."""
+    curves, k, rows = rov.layout.curve_of, rov.coefficients, []
+    for end in ("", "_reverse"):
+        for key in ("a_t", "b_t", "d"):
+            row = []
+            for name, curve in curves.items():
+                value = mp.mpf(k.get(f"{key}_{curve.name}{end}", k.get(f"{key}_{curve.name}", 0.0)))
+                if "V_0" in curve.keys and key != "d":
+                    U, V_0, n_V = (
+                        mp.mpf(x) for x in (inputs["voltage"], k[f"V_0_{curve.name}"], k[f"n_V_{curve.name}"])
+                    )
+                    value *= (max(U, mp.zero) / V_0) ** n_V
+                row.append(number(mp.mpf(k[f"health_{name}"]) * value / curve.n_thrusters))
+            rows.append(row)
+    return np.array(rows).reshape(2, 3, -1), np.array([curve.has_rotors for curve in curves.values()], bool)
 
 
 def _fins(rov: Vehicle, inputs: Values) -> Array:
@@ -117,7 +140,8 @@ def places(rov: Vehicle, state: Values) -> list[Number]:
     angles = (state.get("phi_0", 0.0), state.get("theta_0", 0.0), state.get("psi_0", state.get("psi", 0.0)))
     quaternion = [state[name] for name in QUATERNION] if "eta" in state else rigid_body.quaternion_of(*angles)
     pose = [state.get(name, 0.0) for name in "xyz"]
-    return [*(state.get(v, 0.0) for v in VELOCITIES), *quaternion, *pose, *(state[F] for F in rov.layout.lagging)]
+    lagging = (state[name] for name in rov.layout.lagging)
+    return [*(state.get(v, 0.0) for v in VELOCITIES), *quaternion, *pose, *lagging]
 
 
 def compared(rov: Vehicle, y: Sequence[Number]) -> list[Number]:
@@ -139,21 +163,27 @@ def end(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
 
 
 def step(rov: Vehicle, inputs: Values, state: Values, h: float) -> list[Number]:
-    """Return the state of the rigid body after h seconds, to some 20 digits."""
+    """Return the state of the rigid body after h seconds, to some 20 digits.
+
+    A step of the extrapolation ends where a velocity or a rotor reverses.
+    """
     with mp.workdps(70), gmpy2.context(gmpy2.get_context(), precision=BITS):
         inverse = np.array([[real(x) for x in row] for row in body(rov, inputs, mp.mpf).inverse])
         of_step = body(rov, inputs, real)
 
-        def rates(y: Sequence[Number]) -> list[Number]:
-            return rigid_body.rates(of_step, inverse, np.array(y)).tolist()  # type: ignore[no-any-return]
+        def rates_with(signs: Sequence[int]) -> Callable[[Sequence[Number]], list[Number]]:
+            sides = dict(zip(of_step.reversing, signs, strict=True))
+
+            def rates(y: Sequence[Number]) -> list[Number]:
+                all_sides = np.array([sides.get(n, 1) for n in (*range(6), *range(13, len(y)))])
+                return rigid_body.rates(of_step, inverse, np.array(y), all_sides).tolist()  # type: ignore[no-any-return]
+
+            return rates
 
         y, rest, size = [real(mp.mpf(x)) for x in places(rov, state)], mpfr(h), mpfr(h)
         while rest > 0:
-            size = min(size, rest)
-            end, error = leap(rates, y, rates(y), size)
-            if error <= _TOLERANCE:
-                y, rest = end, rest - size
-            size *= growth(error, _TOLERANCE)
+            y, taken, size = until_reversal(rates_with, y, of_step.reversing, min(size, rest), _TOLERANCE)
+            rest -= taken
         return [plain(x) for x in y]
 
 
@@ -173,7 +203,13 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
     found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
     found |= {f"der({name})": rate for name, rate in zip(names, rates, strict=True) if name in layout.state}
-    forces = {name: values.get(f"F_{name}", force) for name, force in steady_forces(k, values, mp).items()}
+    steady = steady_forces(k, values, mp)
+    forces = {name: values.get(f"F_{name}", force) for name, force in steady.items()}
+    for n, (name, curve) in enumerate(layout.curve_of.items()):
+        if curve.has_rotors:
+            speed = mp.mpf(values[f"n_{name}"])
+            a, b, _ = (mp.mpf(x) for x in of_vehicle.rotors[int(speed < 0), :, n])
+            forces[name] = (a * abs(speed) + b) * speed
     found |= {f"F_{name}": mp.mpf(F) for name, F in forces.items()}
     for curve in layout.turning_curves:
         own = [t for t in layout.thrusters if t.curve == curve.name]

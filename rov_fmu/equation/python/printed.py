@@ -15,7 +15,7 @@ from ..layout import Layout
 from ..terms import Equation, equation_of, mass_matrix, rate_formula
 from .step import interpolated
 
-_FUNCTIONS = [name for name in FUNCTIONS if name != "abs"]
+_IMPORTED = ["expm1", "inf", "log1p", *(name for name in FUNCTIONS if name != "abs")]
 
 
 def printed(layout: Layout, step: str) -> str:
@@ -29,7 +29,7 @@ def _module(words: str, step: str, text: str) -> str:
     return f"""\
 \"\"\"{words}\"\"\"
 
-from math import {", ".join(["expm1", *_FUNCTIONS])}
+from math import {", ".join(_IMPORTED)}
 
 from {step} import interpolated
 
@@ -37,7 +37,7 @@ from {step} import interpolated
 
 
 def equation_text(layout: Layout) -> str:
-    """Return the module without its imports: expm1, the functions of expression.py, and `interpolated`."""
+    """Return the module without its imports: _IMPORTED from math, and `interpolated`."""
     equation = equation_of(layout)
     quaternion = QUATERNION if layout.has_attitude else ()
     states = [*equation.states, *quaternion]
@@ -94,7 +94,7 @@ def motion(_numbers):
 def model_of(layout: Layout) -> ModuleType:
     """Return the module of a vehicle."""
     module = ModuleType("equation")
-    module.__dict__.update({name: getattr(math, name) for name in ["expm1", *_FUNCTIONS]}, interpolated=interpolated)
+    module.__dict__.update({name: getattr(math, name) for name in _IMPORTED}, interpolated=interpolated)
     exec(compile(equation_text(layout), "<equation>", "exec"), module.__dict__)
     return module
 
@@ -134,7 +134,7 @@ VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
 {_tables(equation)}
 
 def numbers(values):
-    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and lagging forces, and these.\"\"\"
+    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and what lags, and these.\"\"\"
     v = dict(values)
 {_assignments(numbers)}
     return v
@@ -225,11 +225,16 @@ def _arrived(equation: Equation, indent: str) -> str:
 
 
 def _lagging_text(equation: Equation) -> str:
-    """Print the function of the forces that lag."""
+    """Print the functions of the forces and speeds that lag, and of the time until the first rotor reverses."""
     return f"""\
 def lagging(v, _time):
-    \"\"\"Return the forces that lag, at a time since the start of the step.\"\"\"
+    \"\"\"Return the forces and the speeds of rotors that lag, at a time since the numbers were computed.\"\"\"
     return {{{", ".join(_lagging(equation))}}}
+
+
+def until_reversal(v):
+    \"\"\"Return the time from when the numbers were computed until a rotor reverses, and they no longer hold.\"\"\"
+    return min([inf{"".join(_reversals(equation))}])
 """
 
 
@@ -240,6 +245,14 @@ def _lagging(equation: Equation) -> Iterable[str]:
         for force, steady in forces.items():
             before, after = _value(Name(force)), _value(Name(steady))
             yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'
+
+
+def _reversals(equation: Equation) -> Iterable[str]:
+    """Print the time until each rotor reverses, each after a comma."""
+    for progress, rotors in equation.reversals.items():
+        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value)
+        for x in rotors:
+            yield f", log1p({written(x, PYTHON, _value)}) / {rate}"
 
 
 def _tables(equation: Equation) -> str:

@@ -2,8 +2,8 @@
 
 The method is DOP853, whose coefficients are in dop853.py.
 It is a second, independent way to the step that fmu_src/c computes by Taylor series. It moves a `model`: a module that
-printed.py prints for each vehicle. Forces that lag follow their exponential, which makes nothing stiff. A substep ends
-where a velocity reverses, because drag then has other coefficients.
+printed.py prints for each vehicle. What lags follows its exponential, which makes nothing stiff. A substep ends where a
+velocity or a rotor reverses, because drag or thrust then has other coefficients.
 """
 
 from bisect import bisect_right
@@ -54,7 +54,9 @@ class Motion:
     """The states of a model during a step, as offsets from the start where no rate depends on them."""
 
     def __init__(self, model: Any, values: Mapping[str, float]) -> None:
-        self.model, self.values, self.time, self.tried = model, dict(values), 0.0, 0
+        self.model, self.values, self.tried = model, dict(values), 0
+        self.time = 0.0
+        """The time since the start of the step, or since a rotor reversed."""
         self.direction = dict.fromkeys(model.MONITORED, 1.0)
         self.hold()
         starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
@@ -68,6 +70,13 @@ class Motion:
         """Compute all numbers that are constant until the next reversal."""
         self.held = self.model.numbers({**self.values, **self.direction})
         self.of_model = self.model.motion(self.held)
+        self.until: float = self.model.until_reversal(self.held)
+
+    def reverse_rotor(self) -> None:
+        """Let the time begin anew where a rotor reverses."""
+        self.values |= self.model.lagging(self.held, self.time)
+        self.time = 0.0
+        self.hold()
 
     def rates(self, after: float, y: State) -> State:
         """Return the rates of the states some seconds after the start of the substep."""
@@ -100,7 +109,8 @@ class Motion:
         h, shortest = rest, min(_SHORTEST, _SHORTEST * rest)
         while rest > 0.0 and h > shortest and self.tried < MOST_SUBSTEPS:
             self.tried += 1
-            h = min(h, rest)
+            left = self.until - self.time
+            h = min(h, rest, left)
             y, error = self.trial(h)
             if error > 1.0:
                 h *= max(0.1, 0.9 * error**-0.125)
@@ -114,6 +124,8 @@ class Motion:
                 y[reversing] = 0.0
             self.y, self.time, rest = y, self.time + length, rest - length
             self.heading = self.turned(y, self.heading)
+            if length == left:
+                self.reverse_rotor()
             self.begin()
             h *= min(6.0, 0.9 * (error or 1e-9) ** -0.125)
         return rest == 0.0

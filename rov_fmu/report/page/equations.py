@@ -53,6 +53,7 @@ class CurveLines:
     advance: list[Line]
     """The loss of thrust per speed of advance, if there is one."""
     lag: list[Line]
+    """How the force, or the speed of the rotor, follows the command, if it lags."""
     torque: list[Line]
 
 
@@ -99,7 +100,8 @@ def equations_of(layout: Layout) -> Equations:
 
     def thrust(name: Name, shown: Name | None = None) -> list[Line]:
         """Return the equation of a quantity that follows from the commands, if the vehicle has it."""
-        return [line(shown or name, equation.thrust[name.identifier])] if name.identifier in equation.thrust else []
+        formula = {**equation.thrust, **equation.forces}.get(name.identifier)
+        return [line(shown or name, _with_sign(replaced(formula, formulas)))] if formula else []
 
     def motion(form: VehicleAxis) -> Line:
         """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
@@ -122,10 +124,15 @@ def equations_of(layout: Layout) -> Equations:
     for curve in layout.curves:
         thrusters = [t for t in layout.thrusters if t.curve == curve.name]
         first = thrusters[0].name
-        steady, force = steady_name(first, curve, names), Name(f"F_{first}")
-        shown = [line(steady, _with_sign(replaced(equation.thrust[steady.identifier], formulas)), curve.equation)]
+        steady, lagging = steady_name(first, curve, names), Name(curve.lagging(first))
+        shown = thrust(Name(f"F_{first}") if curve.has_rotors else steady)
+        shown = [replace(one, reference=curve.equation) for one in shown]
+        if curve.has_rotors:
+            steady = names("speed", first)
+            shown += thrust(steady)
         shown += thrust(names("beyond", first)) if "c_0" in curve.keys else []
-        lag = [line(Name(curve.coefficient("T")) * _rate(force.identifier), steady - force)] if curve.has_lag else []
+        T = Name(curve.coefficient("T"))
+        lag = [line(T * _rate(lagging.identifier), steady - lagging)] if curve.has_lag else []
         by_arm = any(t.position is None for t in layout.thrusters_along(YAW) if t in thrusters)
         tau = Name(f"tau_{curve.name}")
         turning = equation.forces.get(tau.identifier)
@@ -199,7 +206,7 @@ def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
 def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names, because the page has no equation of these names."""
     names = equation.names
-    kinds = ("saturated", "command", "magnitude", "net_weight", "righting", "arm", "constant")
+    kinds = ("saturated", "command", "magnitude", "by_voltage", "net_weight", "righting", "arm", "constant")
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
     full = {t.name for t in layout.thrusters if "c_0" not in layout.curve_of[t.name].keys}  # without a dead band
     inlined |= {name.identifier for name in names.of_kind("beyond") if full.issuperset(name.owners)}
@@ -235,7 +242,8 @@ def _choices(x: Expression) -> Iterator[Operation]:
 class Symbol:
     """A letter with its indices.
 
-    `mark` is − for a parameter that holds in reverse, ± for one of two parameters by direction, * for a steady force.
+    `mark` is − for a parameter that holds in reverse, ± for one of two parameters by direction, * for a steady force or
+    speed.
     """
 
     letter: str
@@ -246,8 +254,8 @@ class Symbol:
 
 _LETTERS = {
     **{"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"},
-    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u"},
-    **{"command": "c", "beyond": "m", "loss": "k", "table": "f", "steady": "F", "battery": "U", "fraction": "u"},
+    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u", "health": "h", "fraction": "u"},
+    **{"command": "c", "beyond": "m", "loss": "k", "table": "f", "steady": "F", "speed": "n", "battery": "U"},
 }
 """The letters of quantities whose names begin with a word or whose letter is another one."""
 _INDICES = ("t", "d", "a", "0", "V", "max", "u")
@@ -266,7 +274,7 @@ def symbol_of(name: Name) -> Symbol:
         index, _, upper = rest.partition("_")
         if upper and index not in _INDICES:
             index, upper = rest, ""
-    mark = {"": "*" if head == "steady" else "", REVERSE: "−"}.get(name.identifier.removeprefix(stem), "±")
+    mark = {"": "*" if head in ("steady", "speed") else "", REVERSE: "−"}.get(name.identifier.removeprefix(stem), "±")
     return Symbol(_LETTERS.get(head, head), index, upper, mark)
 
 

@@ -28,9 +28,14 @@ def study(
 ) -> Results:
     """Do the missing runs of a study, and open its results.
 
-    `workers` is the number of processes on this machine, by default the number of cores; `scheduler` is the address of
-    a Dask scheduler that is used instead. Worker processes import the calling script, so a script must call this below
-    `if __name__ == "__main__":`.
+    - `plan`, `folder`: the plan (TOML), and the folder of the results, which the same call continues.
+    - `workers`: the number of processes on this machine, by default the number of cores.
+    - `scheduler`: the address of a Dask scheduler that is used instead.
+    - `on_progress`: called with the state of the runs.
+
+        study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
+
+    Worker processes import the calling script, so a script must call this below `if __name__ == "__main__":`.
 
     Raises FileError with a line for each reason, BuildError if the FMU of a vehicle cannot be built, StudyError if the
     workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.

@@ -16,7 +16,7 @@ from lxml import etree
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.python.step import MOST_WAITING
 from tests import fmi3
-from tests.equation.test_thrust_effects import ROV
+from tests.equation.thrust.test_thrust_effects import ROV
 from tests.fmi import CONTINUOUS, ERROR, EVENT, MODEL_EXCHANGE, WARNING, WITH_EVENTS, AnyInstance, Fmu, reals
 from tests.fmu.calls.conftest import modes_of, of_both_versions
 from tests.fmu.calls.test_state_bytes import checksum

@@ -7,7 +7,7 @@ import pytest
 
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.conftest import Made, unzipped
-from tests.equation.test_thrust_effects import immediate
+from tests.equation.thrust.test_thrust_effects import immediate
 from tests.fmi import CONTINUOUS, MODEL_EXCHANGE, WARNING, Fmu
 from tests.fmu.calls.conftest import WRAPPERS
 from tests.vehicles import THRUST_EFFECTS, pulsed

@@ -1,0 +1,57 @@
+"""The command `rov-fmu study`: the study with its progress, the page, and a run for Foxglove."""
+
+import logging
+from pathlib import Path
+
+from rov_fmu.interface.model import load
+from rov_fmu.io.messages import FileError, StudyError
+from rov_fmu.io.output import Output, check_replaced, write_whole
+from rov_fmu.report.console import print_end
+from rov_fmu.report.progress import StudyParts, parts
+from rov_fmu.study.plan.plan import load_plan
+from rov_fmu.study.plan.prepared import vehicle_file
+from rov_fmu.study.results.page import PAGE, page_output
+from rov_fmu.study.results.results import Results
+from rov_fmu.study.results.summary import print_summary
+from rov_fmu.study.run.run_study import run_study
+
+
+def study_plan(
+    plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None, *, force: bool
+) -> None:
+    """Do the missing runs of a study, and write and print what came of it. `run` is written for Foxglove, too.
+
+    Raises StudyError if no run is complete, and what `study` raises.
+    """
+    logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
+    motion = output / f"run-{run}.mcap"
+    if output.is_dir():
+        check_replaced([output / PAGE, *([motion] if run is not None else [])], force=force)
+    vehicle = load_plan(plan).vehicle
+    if run is not None and not vehicle:
+        raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
+    with parts() as shown:
+        spent, results = run_study(
+            plan,
+            output,
+            workers,
+            scheduler,
+            StudyParts(shown).update,
+            lambda message: shown.print(f"warning: {message}"),
+        )
+    written = [page_output(results)]
+    write_whole(*written, force=force)
+    print_summary(results, spent)
+    if vehicle and run is not None:
+        written.append(Output(motion, _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))))
+        write_whole(written[-1], force=force)
+    print_end([one.path for one in written], "open it in a browser")
+    if len(results.failed) + len(results.incomplete) == len(results.runs):
+        raise StudyError(f"{output}: no run is complete with all its figures")
+
+
+def _motion_of(results: Results, run: int, vehicle: Path) -> bytes:
+    """Return the motion of a run as the content of an MCAP file. Raises FileError if the run has no outputs."""
+    if not results.outputs or (motion := results.trajectories([run])).empty:
+        raise FileError(f"{results.folder}: --mcap {run}: there is no such run with outputs, which [keep] names")
+    return load(vehicle).to_mcap(motion)
