@@ -6,6 +6,7 @@ With `-D nb_execution_mode=off` the notebooks are not run, and the build takes a
 import os
 import re
 import sys
+from itertools import pairwise
 from pathlib import Path
 
 from sphinx.application import Sphinx
@@ -98,9 +99,16 @@ def _fly(app: Sphinx, error: Exception | None) -> None:
 
 
 def _plain(*arguments: list[str]) -> None:
-    """Docstrings are plain text: |v| in one is a magnitude, not a substitution, and thrust_ is not a link."""
-    lines = arguments[-1]
-    lines[:] = [re.sub(r"\||\*|_(?!\w)", r"\\\g<0>", line) for line in lines]
+    """Docstrings are plain text: |v| in one is a magnitude, not a substitution, and thrust_ is not a link.
+
+    Their examples, which are indented after an empty line, are shown as they are.
+    """
+    lines, shown = arguments[-1], list[str]()
+    for before, line in pairwise(["", *lines]):
+        is_example = line.startswith(" " * 4)
+        shown += ["::", ""] if is_example and not before.strip() else []
+        shown.append(line if is_example else re.sub(r"\||\*|_(?!\w)", r"\\\g<0>", line))
+    lines[:] = shown
 
 
 def setup(app: Sphinx) -> None:
