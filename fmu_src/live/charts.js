@@ -156,7 +156,7 @@ class Chart {
   fit() {
     this.board.fit();
     const { width, height } = this.board;
-    this.plot = { left: 40, right: width - 4, top: width < 300 ? 34 : 22, bottom: height - 17 };
+    this.plot = { left: 40, right: width - 4, top: 22, bottom: height - 17 };
   }
 
   /** @param {Flight} flight @param {number} span The time span in s. @param {boolean} ghost
@@ -166,10 +166,12 @@ class Chart {
     const { ink, blue, orange, page, muted } = board.colours;
     const { axis } = this.panel;
     const traces = this.panel.traces.filter(({ kind }) => ghost || kind !== "ghost");
-    const { left, right, top, bottom } = this.plot;
     const { time, test } = flight;
     const start = Math.max(0, time - span);
     const marked = axis !== undefined && !flight.steering();
+    const isSecondLine = board.width < 300 && (marked || flight.replay !== null || pointed !== null);
+    this.plot.top = isSecondLine ? 34 : 22;
+    const { left, right, top, bottom } = this.plot;
     const [V, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
     const published =
       marked && test?.axis === axis && test.V !== null
