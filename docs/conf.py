@@ -65,8 +65,8 @@ COCKPIT = f"""<p>Fly it here: the {_LINKS}. Drag a stick in the picture, or clic
 <iframe class="fly" name="fly" src="fly/compact/{FLOWN[0].identifier}.html" title="A vehicle in flight"></iframe>
 
 """
-"""On the first page, in place of the README's moving picture."""
-MOVING_PICTURE = re.compile(r"^\[!\[[^\]]*\]\(fly\.webp\)\].*\n", re.MULTILINE)
+"""In place of the moving picture, which nobody can stop."""
+MOVING_PICTURE = re.compile(r"^\[?!\[[^\]]*\]\(fly\.webp\).*\n", re.MULTILINE)
 
 SHOWN_HERE = re.compile(r"^The site shows \[(.+)\]\(\.\./\1\) here\.$", re.MULTILINE)
 """In a page, in place of a file at the top of the repository."""
@@ -80,11 +80,11 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
 
     def text(match: re.Match[str]) -> str:
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
-        whole = MOVING_PICTURE.sub(lambda _: COCKPIT, whole)
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
         return re.sub(r"\[([^\]]+)\]\((CITATION\.cff|SECURITY\.md)\)", r"\1 (`\2`)", whole)
 
     source[0] = SHOWN_HERE.sub(text, source[0]).replace("](../README.md", "](index.md")
+    source[0] = MOVING_PICTURE.sub(lambda _: COCKPIT, source[0])
 
 
 def _fly(app: Sphinx, error: Exception | None) -> None:

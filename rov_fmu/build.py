@@ -113,7 +113,7 @@ def build(
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
     check_replaced(targets, force=force, is_ours=_is_as_built)
     chosen = chosen_platforms(platforms, fmi) if native else None
-    content = _content(vehicle, native=native, fmi=fmi, interface=interface)
+    content = _content(vehicle, chosen, fmi=fmi, interface=interface)
     on_content()
     start = perf_counter()
     seconds: dict[str, float] = {}
@@ -139,11 +139,14 @@ def build(
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], targets[1:], lost)
 
 
-def _content(vehicle: Vehicle, *, native: bool, fmi: int, interface: str) -> Content:
-    """Return the content of the FMU, with its expected results and its pages."""
+def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> Content:
+    """Return the content of the FMU, with its expected results and its pages; in pure Python without platforms."""
+    native = platforms is not None
     results, module = reference_results(vehicle), web_module(vehicle.layout)
     pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
-    return native_content(vehicle, pages, fmi, interface) if native else python_content(vehicle, pages)
+    if platforms is None:
+        return python_content(vehicle, pages)
+    return native_content(vehicle, pages, fmi, interface, platforms)
 
 
 def _check_options(vehicle: object, backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:

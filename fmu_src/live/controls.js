@@ -23,6 +23,7 @@ const STICKS = [
   ["sway", 2, 1],
   ["surge", 3, -1],
 ];
+const TOLD = 100; // ms between two changes of the numbers beside the picture, which eyes read no faster
 
 /** @param {string} id @returns {HTMLElement} */
 function part(id) {
@@ -35,12 +36,24 @@ function rounded(value, most) {
   return Number((Math.round(value / step) * step).toPrecision(12));
 }
 
-/** A stick on the page, for a finger or a mouse. It returns to its middle when it is let go. */
+/**
+ * A stick on the page, for a finger or a mouse. It returns to its middle when it is let go. It moves only in the directions
+ * in which it drives the vehicle, and names the keys that do the same.
+ */
 class Stick {
-  /** @param {Element} svg */
-  constructor(svg) {
-    drawn(svg, "circle", { class: "rim", r: 44 });
-    this.knob = drawn(svg, "circle", { class: "knob", r: 18 });
+  /** @param {Element} svg @param {string[][]} letters Of the keys to the left and to the right, and up and down; none in a direction without any. */
+  constructor(svg, letters) {
+    const [width, height] = letters.map(({ length }) => (length ? 88 : 46));
+    this.hasAxis = letters.map(({ length }) => length > 0);
+    drawn(svg, "rect", { class: "rim", x: -width / 2, y: -height / 2, width, height, rx: Math.min(width, height) / 2 });
+    letters.forEach((pair, isUpright) => {
+      pair.forEach((letter, n) => {
+        const far = 34 * (2 * n - 1);
+        const at = isUpright ? { x: 0, y: far } : { x: far, y: 0 };
+        drawn(svg, "text", { class: "centred", ...at, dy: 5 }).textContent = letter;
+      });
+    });
+    this.knob = drawn(svg, "circle", { class: "knob", r: 16 });
     /** To the right and down, from -1 to 1. */
     this.at = [0, 0];
     svg.addEventListener("pointerdown", (event) => {
@@ -57,8 +70,8 @@ class Stick {
   /** @param {Element} svg @param {PointerEvent} event */
   move(svg, event) {
     const { left, top, width, height } = svg.getBoundingClientRect();
-    const [x, y] = [(event.clientX - left) / width - 0.5, (event.clientY - top) / height - 0.5].map(
-      (part) => part / 0.3,
+    const [x, y] = [(event.clientX - left) / width - 0.5, (event.clientY - top) / height - 0.5].map((part, n) =>
+      this.hasAxis[n] ? part / 0.3 : 0,
     );
     const far = Math.max(1, Math.hypot(x, y));
     this.put(x / far, y / far);
@@ -67,7 +80,7 @@ class Stick {
   /** @param {number} x @param {number} y */
   put(x, y) {
     this.at = [x, y];
-    place(this.knob, { cx: 26 * x, cy: 26 * y });
+    place(this.knob, { cx: 24 * x, cy: 24 * y });
   }
 }
 
@@ -79,8 +92,9 @@ class Live {
     this.paused = false;
     this.speed = 1;
     /** The axis and the direction of each key, which is known by its place on the keyboard. @type {Record<string, [string, number]>} */
-    this.driving = { ...ARROWS };
-    for (const { name, keys } of this.vehicle.axes) {
+    this.driving = {};
+    for (const { name, keys } of this.vehicle.axes.filter(({ keys }) => keys)) {
+      for (const [arrow, driven] of Object.entries(ARROWS)) if (driven[0] === name) this.driving[arrow] = driven;
       this.driving[`Key${keys[0]}`] = [name, 1];
       this.driving[`Key${keys[1]}`] = [name, -1];
     }
@@ -89,7 +103,7 @@ class Live {
     /** The sticks on the page, left and right; a vehicle may lack one. @type {(Stick | null)[]} */
     this.sticks = ["left", "right"].map((side) => {
       const svg = document.getElementById(`live-${side}`);
-      return svg && new Stick(svg);
+      return svg && new Stick(svg, this.letters(side === "left" ? [0, 1] : [2, 3]));
     });
     /** @type {HTMLInputElement[]} */
     this.sliders = [...part("controls").querySelectorAll("input")].filter((input) => input.type === "range");
@@ -99,13 +113,11 @@ class Live {
       if (dataset.kind === "command") this.held[name] = Number(value);
     /** The place of the pointer in the charts, from 0 to 1 of their width. @type {number | null} */
     this.pointed = null;
-    this.picture = pilot.has("x") ? new Picture(part("picture"), this.flight) : null;
-    this.compass = pilot.has("psi") ? new Compass(part("compass")) : null;
-    this.horizon = pilot.has("phi") ? new Horizon(part("horizon")) : null;
-    this.depth = pilot.has("z") ? new DepthTape(part("depth")) : null;
+    const picture = /** @type {HTMLCanvasElement} */ (part("picture"));
+    this.picture = new Picture(picture, this.flight, new Instruments(pilot));
     /** @type {Chart[]} */
     this.charts = [];
-    const map = document.getElementById("live-map");
+    const map = /** @type {HTMLCanvasElement | null} */ (document.getElementById("live-map"));
     this.track = map && new Track(map);
     /** @type {Chart | null} */
     this.dive = null;
@@ -113,6 +125,8 @@ class Live {
     this.isSeen = true;
     this.changed = true;
     this.last = 0;
+    /** The time in ms at which the numbers were changed. */
+    this.told = 0;
     this.connect();
     const level = this.flight.isHeld ? `${HELD} ` : pilot.has("phi") ? `${NOT_HELD} ` : "";
     this.say(
@@ -122,6 +136,7 @@ class Live {
     this.follow(location.hash);
     const recording = document.getElementById("live-recorded");
     if (recording) this.replay(JSON.parse(recording.textContent ?? ""));
+    this.paused = matchMedia("(prefers-reduced-motion: reduce)").matches && this.flight.replay !== null;
     this.show();
     // The page has no other use than to fly, so keys act at once. A page embedded in another one takes no focus.
     if (document.body.matches(".flown:not(.compact)")) part("stage").focus({ preventScroll: true });
@@ -129,6 +144,16 @@ class Live {
   }
 
   // ---- Controls ----
+
+  /** Returns the letters of the keys that act like the coordinates of a stick, each to the left or up, and to the right or down.
+   * @param {number[]} places Of the coordinates. */
+  letters(places) {
+    return places.map((n) => {
+      const [name, , direction] = STICKS[n];
+      const keys = [...(this.vehicle.axes.find((axis) => axis.name === name)?.keys ?? "")];
+      return direction > 0 ? keys.reverse() : keys;
+    });
+  }
 
   connect() {
     const stage = part("stage");
@@ -171,11 +196,11 @@ class Live {
     stage.addEventListener("keyup", (event) => this.keys.delete(event.code));
     stage.addEventListener("blur", () => this.keys.clear());
     stage.addEventListener("pointerdown", () => stage.focus());
-    const picture = document.getElementById("live-picture");
-    picture?.addEventListener("pointerdown", (event) => picture.setPointerCapture(event.pointerId));
-    picture?.addEventListener("pointermove", (event) => {
+    const picture = part("picture");
+    picture.addEventListener("pointerdown", (event) => picture.setPointerCapture(event.pointerId));
+    picture.addEventListener("pointermove", (event) => {
       if (!picture.hasPointerCapture(event.pointerId)) return;
-      this.picture?.orbit(event.movementX, event.movementY);
+      this.picture.orbit(event.movementX, event.movementY);
       this.show();
     });
     part("charts").addEventListener("pointermove", (event) => this.point(event));
@@ -214,6 +239,11 @@ class Live {
       this.draw(); // before the new size is painted
     });
     for (const name of ["stage", "charts"]) resized.observe(part(name));
+    for (const media of ["(prefers-color-scheme: dark)", "print"])
+      matchMedia(media).addEventListener("change", () => {
+        this.fit();
+        this.draw();
+      });
   }
 
   /** @param {HTMLInputElement} slider */
@@ -267,14 +297,17 @@ class Live {
         ? `${shown(value * 100, 0)} %`
         : `${shown(value, Number(slider.max) < 1 ? 3 : 2)} ${unit ?? ""}`;
       const output = /** @type {HTMLElement} */ (slider.parentElement?.querySelector("output"));
+      if (output.textContent === words) continue;
+      const isUntested = isShare && isBeyond(this.vehicle, value);
       output.textContent = words;
-      slider.setAttribute("aria-valuetext", words);
+      output.classList.toggle("untested", isUntested);
+      slider.setAttribute("aria-valuetext", isUntested ? `${words}, beyond the tested range` : words);
       const [low, high] = [Number(slider.min), Number(slider.max)];
       const ends = [Number(start ?? low), value].map((x) => (x - low) / (high - low));
       slider.style.setProperty("--from", String(Math.min(...ends)));
       slider.style.setProperty("--to", String(Math.max(...ends)));
     }
-    document.getElementById("live-above")?.setAttribute("aria-pressed", String(this.picture?.isFromAbove));
+    part("above").setAttribute("aria-pressed", String(this.picture.isFromAbove));
     const timeline = /** @type {HTMLInputElement} */ (part("timeline"));
     timeline.hidden = !this.flight.replay;
     timeline.value = String(this.flight.time);
@@ -306,23 +339,23 @@ class Live {
 
   /** @param {number} factor */
   zoom(factor) {
-    this.picture?.zoom(factor);
+    this.picture.zoom(factor);
     this.changed = true;
   }
 
   /** Changes between the views from above and from an angle. */
   look() {
-    this.picture?.turn();
+    this.picture.turn();
     this.show();
   }
 
   /** Shows the values at the place of the pointer. @param {PointerEvent | null} event */
   point(event) {
-    const chart = this.charts.find(({ svg }) => svg.contains(/** @type {Node | null} */ (event?.target ?? null)));
+    const chart = this.charts.find(({ board }) => board.canvas === event?.target);
     if (event && !chart) return;
     this.pointed = null;
     if (event && chart) {
-      const { left } = chart.svg.getBoundingClientRect();
+      const { left } = chart.board.canvas.getBoundingClientRect();
       const { plot } = chart;
       this.pointed = Math.max(0, Math.min(1, (event.clientX - left - plot.left) / (plot.right - plot.left)));
     }
@@ -340,7 +373,7 @@ class Live {
     part("section").style.setProperty("--columns", String(Math.ceil(panels.length / this.rows)));
     this.charts = panels.map((panel) => new Chart(part("charts"), panel));
     const heave = PANELS.positions(this.flight).find((_, a) => this.vehicle.axes[a].position === "z");
-    this.dive?.svg.remove();
+    this.dive?.board.canvas.remove();
     this.dive = heave ? new Chart(part("column"), { ...heave, id: "dive", title: "depth", signal: undefined }) : null;
     this.fit();
   }
@@ -357,7 +390,7 @@ class Live {
     this.flight.reset();
     this.arrange();
     this.flight.begun = false;
-    this.picture?.reset();
+    this.picture.reset();
     this.paused = false;
     this.speed = 1;
     this.say("");
@@ -528,9 +561,19 @@ class Live {
 
   // ---- The loop ----
 
-  /** Returns the demands of keys, sticks and gamepad along each axis. */
+  /** How strongly a key pushes: a share of the full command. */
+  get strength() {
+    return Number(/** @type {HTMLInputElement} */ (part("strength")).value);
+  }
+
+  /** The largest command by keys and sticks: the end of the tested range, or more if the pilot lets keys push more strongly. */
+  get most() {
+    return Math.max(this.strength, this.vehicle.tested);
+  }
+
+  /** Returns the demands of keys, sticks and gamepad along each axis. A stick at its end asks for the largest command. */
   demands() {
-    const strength = Number(/** @type {HTMLInputElement} */ (part("strength")).value);
+    const { strength, most } = this;
     /** @type {Map<string, number>} */
     const demands = new Map();
     for (const [axis, direction] of this.keys.values())
@@ -538,7 +581,7 @@ class Live {
     const pad = navigator.getGamepads?.().find((one) => one !== null && one.mapping === "standard");
     for (const [axis, n, direction] of STICKS) {
       const value = (this.sticks[n >> 1]?.at[n % 2] ?? 0) || (pad?.axes[n] ?? 0);
-      if (Math.abs(value) > DEAD_ZONE) demands.set(axis, value * direction);
+      if (Math.abs(value) > DEAD_ZONE) demands.set(axis, value * direction * most);
     }
     return demands;
   }
@@ -552,11 +595,11 @@ class Live {
     }
     if (this.flight.isHeld && !this.flight.test) {
       const { begun } = this.flight;
-      this.flight.steer({ demands, added: this.held });
+      this.flight.steer({ demands, added: this.held, most: this.most });
       if (begun !== this.flight.begun) this.say("");
       return;
     }
-    const commands = commandsOf(this.vehicle, demands);
+    const commands = commandsOf(this.vehicle, demands, this.most);
     for (const [name, value] of Object.entries(this.held)) commands[name] = saturated(commands[name] + value);
     const { model } = this.flight.pilot;
     if (this.vehicle.commands.every((name) => model.get(name) === commands[name])) return;
@@ -574,7 +617,13 @@ class Live {
     if (!this.isSeen) return;
     this.command();
     if (!this.paused && !this.flight.isAtRest()) this.fly(Math.round(passed * this.speed * 1e6) / 1e6);
-    if (this.changed) this.draw();
+    if (!this.changed) return;
+    this.paint();
+    if (now - this.told < TOLD) return;
+    this.told = now;
+    if (this.flight.replay || this.flight.steering()) this.show();
+    this.tell();
+    this.changed = false;
   }
 
   /** @param {number} h */
@@ -586,7 +635,6 @@ class Live {
       this.say(flight.replay.verdict(this.vehicle));
       this.pause(true);
     }
-    if (flight.replay || flight.steering()) this.show();
     if (flight.test && this.hasEnded()) {
       this.say(`${part("message").textContent} The test has ended.`);
       this.pause(true);
@@ -594,39 +642,50 @@ class Live {
     this.changed = true;
   }
 
-  /** Returns the words about the surface or the seabed that stops the vehicle. */
+  /** Returns the words about the surface or the seabed that stops the vehicle, or that it has left because they are off. */
   edge() {
     const { pilot, bed, isBounded, replay, test } = this.flight;
     const z = pilot.model.get("z");
-    if (!isBounded || replay || test) return "";
+    if (!isBounded || replay || test) return z < 0 ? " (surface off)" : test && z > bed ? " (seabed off)" : "";
     return z <= 0 ? " (at the surface)" : z >= bed - RESTING * this.vehicle.size ? " (on the seabed)" : "";
   }
 
+  /** Draws the flight, and writes its numbers. */
   draw() {
-    this.changed = false;
-    const { flight } = this;
-    const { model } = flight.pilot;
+    this.paint();
+    this.tell();
+  }
+
+  /** Draws what moves. */
+  paint() {
+    const { flight, picture } = this;
     const ghost = flight.ghostShown;
-    this.picture?.draw(flight);
-    this.compass?.draw(flight, ghost);
-    this.horizon?.draw(flight, ghost);
-    this.depth?.draw(flight, ghost);
+    picture.draw(flight);
     for (const chart of this.charts) chart.draw(flight, this.span, ghost, this.pointed);
-    this.track?.draw(flight, flight.hasGhostTrack);
+    this.track?.draw(flight, flight.hasGhostTrack, picture.camera.azimuth);
     this.dive?.draw(flight, Math.max(SPAN, flight.times[flight.times.length - 1]), ghost, null);
+  }
+
+  /** Writes the numbers beside the picture, and shows what the legend has to explain. */
+  tell() {
+    const { flight, vehicle } = this;
+    const { model } = flight.pilot;
     const all = this.charts.flatMap(({ panel }) => panel.traces);
     part("steady").hidden = flight.steering() !== null || this.charts.every(({ panel }) => panel.axis === undefined);
-    part("measured").hidden = !flight.test && !all.some(({ kind }) => kind === "line measured");
+    part("measured").hidden = !flight.test && !all.some(({ kind }) => kind === "measured");
     part("banded").hidden = !all.some(({ band }) => band);
-    part("grey").hidden = !ghost;
-    part("hint").hidden = flight.begun;
+    part("grey").hidden = !flight.ghostShown;
+    const untested = vehicle.commands.filter((name) => isBeyond(vehicle, model.get(name)));
+    part("untested").hidden = untested.length === 0;
     const [roll, pitch, heading] = attitudeOf(model);
     const readings = [`${shown(flight.time, 1)} s`];
     if (model.has("x")) readings.push(`north ${shown(model.get("x"), 2)} m`, `east ${shown(model.get("y"), 2)} m`);
     if (model.has("z")) readings.push(`depth ${shown(model.get("z"), 2)} m${this.edge()}`);
     if (model.has("phi")) readings.push(`roll ${shown(roll, 0)}°`, `pitch ${shown(pitch, 0)}°`);
     if (model.has("psi")) readings.push(`heading ${shown(heading, 0)}°`);
+    if (untested.length) readings.push(`beyond the tested range: ${untested.join(", ")}`);
     part("readings").textContent = readings.join(" · ");
+    for (const chart of [...this.charts, this.dive]) chart?.tell();
   }
 }
 

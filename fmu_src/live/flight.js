@@ -70,7 +70,7 @@ class Craft {
       if (this.hold?.until !== time) this.hold = new Hold(model, time);
       if (!this.hold.step(h, sticks)) return false;
     } else {
-      if (sticks) model.give(commandsOf(model.vehicle, sticks.demands));
+      if (sticks) model.give(commandsOf(model.vehicle, sticks.demands, sticks.most));
       if (!model.step(h)) return false;
     }
     model.observe();
@@ -449,16 +449,36 @@ function handedOver(from, to, get) {
   return { ...given, ...commandsOf(to, demands) };
 }
 
+/** The axes along which a vehicle moves. It turns about the others. */
+const MOVES = ["surge", "sway", "heave"];
+const ROOM = 0.25; // of the largest command, which a move leaves to a turn
+
 /**
  * Returns the commands for demands along axes. Each axis drives its commands by their shares.
- * @param {Vehicle} vehicle @param {Map<string, number>} demands @returns {Record<string, number>}
+ *
+ * A turn is a difference about the commands of the moves, whose sum it leaves: the difference shrinks where a command
+ * would become larger than `most`. Saturation of one side would change the sum, and with it the speed.
+ * @param {Vehicle} vehicle @param {Map<string, number>} demands @param {number} most @returns {Record<string, number>}
  */
-function commandsOf(vehicle, demands) {
-  /** @type {Record<string, number>} */
-  const commands = Object.fromEntries(vehicle.commands.map((name) => [name, 0]));
-  for (const { name, shares } of vehicle.axes) {
-    for (const [command, share] of Object.entries(shares)) commands[command] += share * (demands.get(name) ?? 0);
-  }
-  for (const name of vehicle.commands) commands[name] = saturated(commands[name]);
-  return commands;
+function commandsOf({ commands, axes }, demands, most = 1) {
+  const [turns, moves] = [false, true].map((areMoves) =>
+    commands.map((command) =>
+      axes
+        .filter(({ name }) => MOVES.includes(name) === areMoves)
+        .reduce((sum, { name, shares }) => sum + (shares[command] ?? 0) * (demands.get(name) ?? 0), 0),
+    ),
+  );
+  const room = Math.min(ROOM * most, Math.max(0, ...turns.map(Math.abs)));
+  const excess = Math.max(1, ...moves.map((move, n) => Math.abs(move) / (turns[n] ? most - room : most)));
+  const reduced = moves.map((move) => move / excess);
+  const part = Math.min(
+    1,
+    ...turns.map((turn, n) => (turn ? (most - reduced[n] * Math.sign(turn)) / Math.abs(turn) : 1)),
+  );
+  return Object.fromEntries(commands.map((command, n) => [command, within(reduced[n] + part * turns[n], most)]));
+}
+
+/** Returns true for a command that is larger than those for which the model was identified. @param {Vehicle} vehicle @param {number} command */
+function isBeyond(vehicle, command) {
+  return Math.abs(command) > vehicle.tested + 1e-9;
 }

@@ -8,8 +8,8 @@ const TURNING = (3.375 * Math.PI) / 4; // rad/s, by a full stick of yaw
 const COAST = 0.25; // s, for which a turn is braked before the heading is held
 const SLOW = 0.05; // m/s; a slower vehicle holds its depth
 
-/** The demands along the axes, from -1 to 1, and the commands that the sliders add.
- * @typedef {{demands: Map<string, number>, added: Record<string, number>}} Sticks */
+/** The demands along the axes, from -1 to 1, the commands that the sliders add, and the largest command that the demands give.
+ * @typedef {{demands: Map<string, number>, added: Record<string, number>, most?: number}} Sticks */
 
 /** Returns the part of a change that passes a low-pass filter of first order. @param {number} frequency In Hz, 0 for none. @param {number} h */
 const passed = (frequency, h) => (frequency ? h / (h + 0.5 / Math.PI / frequency) : 1);
@@ -86,7 +86,7 @@ class Hold {
   }
 
   /** Returns the commands for the next h seconds. @param {number} h @param {Sticks} sticks @returns {Record<string, number>} */
-  commands(h, { demands, added }) {
+  commands(h, { demands, added, most: limit = 1 }) {
     const { axes, commands: names } = this.model.vehicle;
     const stick = (/** @type {string} */ name) => demands.get(name) ?? 0;
     const [phi, theta, psi, p, q, r] = ["phi", "theta", "psi", "p", "q", "r"].map((name) => this.model.get(name));
@@ -98,17 +98,17 @@ class Hold {
     ].map(([lean, angle, rate], n) => this.turns[n].step(6 * (lean * LEAN - angle), rate, h));
     const yaw = this.yaw.step(this.turning(stick("yaw"), psi, h), r, h);
     const throttle = this.lift(stick("heave"), h);
-    /** @type {Record<string, number>[]} */
+    /** What levels may use all thrust. @type {[number, Record<string, number>][]} */
     const groups = [
-      { roll, pitch, heave: -throttle },
-      { yaw, surge: this.ahead, sway: this.aside },
+      [1, { roll, pitch, heave: -throttle }],
+      [limit, { yaw, surge: this.ahead, sway: this.aside }],
     ];
-    const [turns, moves] = groups.map((asked) => {
+    const [turns, moves] = groups.map(([largest, asked]) => {
       const sums = names.map((name) =>
         axes.reduce((sum, axis) => sum + (axis.held[name] ?? 0) * (asked[axis.name] ?? 0), 0),
       );
-      const most = Math.max(1, ...sums.map(Math.abs));
-      return sums.map((sum) => sum / most);
+      const excess = Math.max(1, ...sums.map((sum) => Math.abs(sum) / largest));
+      return sums.map((sum) => sum / excess);
     });
     return Object.fromEntries(
       names.map((name, n) => [name, within(within(turns[n] + moves[n], 1) + (added[name] ?? 0), 1)]),

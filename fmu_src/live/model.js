@@ -3,7 +3,7 @@
 
 /**
  * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
- * of the keys that drive it in its positive and in its negative direction. `shares` are the commands by which the keys drive it, `held` those
+ * of the keys that drive it in its positive and in its negative direction, if any command does. `shares` are the commands by which the keys drive it, `held` those
  * by which Hold does.
  * `quantities` are those of its motion that a recording may have.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string, quantities: Quantity[],
@@ -33,8 +33,9 @@
  *   pressures: {atmosphere: number, gradient: number, hull: [number, number], least: number}}} Rules
  */
 /**
- * A thruster: the variable of its force, its label, its place and direction in the body frame, its strongest force in N.
- * @typedef {{force: string, label: string, at: Vector, along: Vector, most: number}} Thruster
+ * A thruster: the variable of its force, the commands that drive it, its label, its place and direction in the body frame, its strongest
+ * force in N.
+ * @typedef {{force: string, commands: string[], label: string, at: Vector, along: Vector, most: number}} Thruster
  */
 /**
  * A published step test: a command along an axis from rest, with the measured V_ss and Tau.
@@ -42,9 +43,9 @@
  */
 /**
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
- * Commands are fractions in the page; `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
+ * Commands are fractions in the page; `tested` is the largest for which the model was identified, and `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
  * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[],
- *   columns: CommandColumn[], csv: Rules, pulse: [number, number, number] | null, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
+ *   columns: CommandColumn[], csv: Rules, pulse: [number, number, number] | null, tested: number, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
  *   tests: StepTest[], size: number}} Vehicle
  */
 /**

@@ -27,7 +27,7 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     low, high = vehicle.command_range
     made = vehicle.provenance
     data = [f"Source of the coefficients: {vehicle.source}."]
-    trust = ["Nothing was checked on unseen data: the vehicle file does not say how it was identified."]
+    trust = ["Its publication reports no check on unseen data."]
     holds = ["It has no thrusters: its inputs are forces from outside."]
     if vehicle.layout.actuators:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]

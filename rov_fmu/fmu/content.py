@@ -1,13 +1,21 @@
 """Collect everything that goes into an FMU. The same inputs give the same bytes."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 from uuid import UUID
 
-from rov_fmu.c.compile import C_SOURCES, INTERFACES, MODULE_SOURCES, UNITY_FILE, compile_module, fmi_headers
+from rov_fmu.c.compile import (
+    C_SOURCES,
+    INTERFACES,
+    MODULE_SOURCES,
+    PLATFORMS,
+    UNITY_FILE,
+    compile_module,
+    fmi_headers,
+)
 from rov_fmu.c.prebuilt import MODULE, prebuilt
 from rov_fmu.c.source import generated_sources, unused_sources
 from rov_fmu.c.source import sources as motion_sources
@@ -23,12 +31,12 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 REPORT = "identification.html"
 """The name of the report in documentation/, if the vehicle file names one."""
-_EXTERNAL_DEPENDENCIES = """What the binaries need of the system, and nothing else:
-
-Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)
-Windows  the Universal C Runtime (ucrtbase.dll), which is part of Windows since 10
-macOS    11 or newer
-"""
+_EXTERNAL_DEPENDENCIES = {
+    ".so": "Linux    GLIBC 2.17 or newer (libc.so.6, libm.so.6)",
+    ".dll": "Windows  the Universal C Runtime (ucrtbase.dll), which is part of Windows since 10",
+    ".dylib": "macOS    11 or newer",
+}
+"""What the binaries need of the system, by their suffix."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +52,16 @@ class Content:
 
 
 def native_content(
-    vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({}), fmi: int = 2, interface: str = "both"
+    vehicle: Vehicle,
+    pages: Mapping[str, bytes] = MappingProxyType({}),
+    fmi: int = 2,
+    interface: str = "both",
+    platforms: Collection[str] = PLATFORMS.keys(),
 ) -> Content:
-    """Return the FMU in C for one of INTERFACES. `pages` are further files, by their paths."""
+    """Return the FMU in C for one of INTERFACES.
+
+    `pages` are further files, by their paths. `platforms` are those of PLATFORMS for which it will have binaries.
+    """
     declared = variables(vehicle)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
     left_out = (other_version, *unused_sources(vehicle.layout))
@@ -62,7 +77,7 @@ def native_content(
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
         files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
-        files["documentation/externalDependencies.txt"] = _EXTERNAL_DEPENDENCIES.encode()
+        files["documentation/externalDependencies.txt"] = _external_dependencies(platforms).encode()
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
 
 
@@ -74,6 +89,12 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle, sources)
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
+
+
+def _external_dependencies(platforms: Collection[str]) -> str:
+    suffixes = {PLATFORMS[name].suffix for name in platforms}
+    needed = [words for suffix, words in _EXTERNAL_DEPENDENCIES.items() if suffix in suffixes]
+    return "\n".join(["What the binaries need of the system, and nothing else:", "", *needed]) + "\n"
 
 
 def _guid(description: bytes, sources: Mapping[str, str]) -> str:

@@ -44,7 +44,7 @@ def model_description(
     description = ". ".join(filter(None, (vehicle.summary, " ".join(notes))))
     if fmi == 3:
         variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
-    number = {v.name: v.index for v in variables}
+    number, type_names = {v.name: v.index for v in variables}, _type_names(variables)
     return render(
         "modelDescription.xml.j2",
         vehicle=vehicle,
@@ -56,8 +56,8 @@ def model_description(
         interfaces=interfaces,
         source_files=source_files,
         units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in variables)},
-        types={_type_name(v): v for v in variables},
-        type_name=_type_name,
+        types={type_names[v.name]: v for v in variables},
+        type_names=type_names,
         log_categories=LOG_CATEGORIES,
         card=card_text(vehicle),
         variables=variables,
@@ -72,14 +72,47 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-def _type_name(variable: Variable) -> str:
-    parts = {
-        "shown in {}": variable.display_unit,
-        "at least {:g}": variable.minimum,
-        "at most {:g}": variable.maximum,
-        "about {:g}": variable.nominal,
-    }
-    return ", ".join([variable.unit, *(words.format(value) for words, value in parts.items() if value is not None)])
+_QUANTITIES = {
+    "m": "Length",
+    "m/s": "Velocity",
+    "m/s2": "Acceleration",
+    "rad": "Angle",
+    "rad/s": "Angular velocity",
+    "rad/s2": "Angular acceleration",
+    "kg": "Mass",
+    "kg.m": "Coupled mass",
+    "kg.m2": "Moment of inertia",
+    "N": "Force",
+    "N/s": "Rate of force",
+    "N.m": "Torque",
+    "N.s/m": "Linear damping",
+    "N.s2/m2": "Quadratic damping",
+    "N.m.s/rad": "Linear rotational damping",
+    "N.m.s2/rad2": "Quadratic rotational damping",
+    "N.s2/(m2.rad)": "Lift",
+    "N.s2/(m2.rad2)": "Induced drag",
+    "V": "Voltage",
+    "s": "Duration",
+    "us": "Pulse width",
+    "1": "Number",
+    "1/s": "Rate",
+}
+"""The quantity of each unit; a unit that is not here belongs to a coefficient that couples axes."""
+
+
+def _type_names(variables: Sequence[Variable]) -> dict[str, str]:
+    """Return the name of the type of each variable by the variable's name: its quantity.
+
+    Types of the same quantity that differ in range, display unit or nominal value are numbered.
+    """
+    types: dict[tuple[str, tuple[object, ...]], str] = {}
+    names: dict[str, str] = {}
+    for v in variables:
+        quantity = "Command" if v.display_unit == "%" else _QUANTITIES.get(v.unit, "Coupling coefficient")
+        key = quantity, (v.unit, v.display_unit, v.minimum, v.maximum, v.nominal)
+        count = sum(known == quantity for known, _ in types)
+        names[v.name] = types.setdefault(key, f"{quantity} {count + 1}" if count else quantity)
+    return names
 
 
 _LISTS = {

@@ -211,6 +211,32 @@ KINDS = {"cs": (CO_SIMULATION, MODEL_EXCHANGE), "me": (MODEL_EXCHANGE, CO_SIMULA
 """The kind of instance that an FMU offers, and the one that it refuses."""
 
 
+@pytest.mark.parametrize(
+    ("name", "names"),
+    [("X_ext", "Force"), ("V_N", "Velocity"), ("m_rov", "Mass"), ("I_r", "Moment of inertia"), ("alpha_u", "Number")],
+)
+def test_a_type_has_the_name_of_a_quantity(name: str, names: str, vehicle: Vehicle) -> None:
+    root = etree.fromstring(native_content(vehicle, fmi=3).files["modelDescription.xml"])
+    declared_types = {v.get("name"): v.get("declaredType") for v in root.find("ModelVariables")}
+    assert declared_types[name] == names
+    assert {declared_types[f"u_{one}"] for one in "lrt"} == {"Command"}
+    assert not [one for one in declared_types.values() if "," in one]
+
+
+@pytest.mark.parametrize(
+    ("platforms", "systems"),
+    [
+        (["linux64"], ["Linux"]),
+        (["win64", "aarch64-linux"], ["Linux", "Windows"]),
+        ([*build_options.PLATFORMS], ["Linux", "Windows", "macOS"]),
+    ],
+)
+def test_an_fmu_lists_what_its_own_binaries_need(platforms: list[str], systems: list[str], vehicle: Vehicle) -> None:
+    content = native_content(vehicle, fmi=3, platforms=platforms)
+    _, _, *lines = content.files["documentation/externalDependencies.txt"].decode().splitlines()
+    assert [line.split()[0] for line in lines] == systems
+
+
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_the_description_has_the_elements_of_the_interface_and_its_own_guid(fmi: int, vehicle: Vehicle) -> None:
     contents = {name: native_content(vehicle, fmi=fmi, interface=name) for name in build_options.INTERFACES}

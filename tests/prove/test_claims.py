@@ -94,6 +94,7 @@ def test_every_claim_that_applies_to_the_videoray_holds_and_its_page_loads_nothi
     assert "default-src 'none'; style-src 'unsafe-inline'\"" in page
     assert "<script" not in page
     assert page.count("<svg") == 3
+    assert "<li><b>0</b> fail</li>" in page, "a card without failures has no colour of failures"
     for claim, evidence in proof.evidence:
         assert claim.sentence in page
         assert f'<section class="claim {evidence.result.replace(" ", "-")}">' in page

@@ -152,6 +152,18 @@ def until(page: Any, condition: str) -> None:
     pytest.fail(f"never: {condition}")
 
 
+def chart(page: Any, name: str) -> dict[str, Any]:
+    """Return what a chart shows: its title with the value, its words, the places of Tau and of the measured point."""
+    found: dict[str, Any] = page.evaluate(
+        """name => {
+            const { title, words, Tau, point } = live.charts.find(({ panel }) => panel.id === name);
+            return { title, words, Tau, point };
+        }""",
+        name,
+    )
+    return found
+
+
 def get(page: Any, *names: str) -> list[float]:
     """Return values of the model that flies."""
     found: list[float] = page.evaluate("names => names.map((name) => live.flight.pilot.model.get(name))", names)

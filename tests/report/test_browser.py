@@ -14,7 +14,9 @@ from rov_fmu.prove.claims import prove_claims
 from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
+from tests.commands import ROOT
 from tests.report.conftest import Visit
+from tests.report.fly.boxes import SCHEMES, WIDTHS, problems
 from tests.report.pages import UNFOLD
 from tests.report.results import example
 from tests.tank.readers.motion import DIVE
@@ -60,8 +62,8 @@ def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [375, 1440])
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
 @pytest.mark.parametrize("name", ["documentation", "report", "evidence", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
@@ -74,6 +76,7 @@ def test_a_page_asks_for_nothing_fits_and_is_accessible(
     for action in ("", UNFOLD):  # folded, and unfolded
         seen.page.evaluate(action)
         assert seen.page.evaluate("document.documentElement.scrollWidth") <= width
+        assert problems(seen.page) == [], "nothing overlaps or is cut"
         assert axe.run(seen.page).response["violations"] == []
     cut = "[...document.querySelectorAll('.overview .wide')].filter(t => t.scrollWidth > t.clientWidth).length"
     assert seen.page.evaluate(cut) == 0, "the answers of the report are not cut off"
@@ -83,6 +86,22 @@ def test_a_page_asks_for_nothing_fits_and_is_accessible(
     light = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
     assert (int(light) > 128) == (scheme == "light")
     assert (seen.messages, seen.requests) == ([], [url])
+
+
+@pytest.mark.long
+@pytest.mark.skipif(not (ROOT / "site").exists(), reason="CONTRIBUTING.md says how to build the site")
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
+def test_nothing_overlaps_or_is_cut_on_the_site(width: int, scheme: str, visit: Callable[..., Visit]) -> None:
+    page = visit(width=width, scheme=scheme).page
+    found = {}
+    for path in sorted((ROOT / "site").glob("*.html")):
+        page.goto(path.as_uri())
+        found[path.name] = problems(page, "article" if page.locator("article").count() else "body")
+        cut = "[...document.querySelectorAll('article pre')].filter((e) => e.scrollWidth > e.clientWidth + 1).length"
+        assert page.evaluate(cut) == 0, f"{path.name}: no line of code or output is cut"
+        assert page.evaluate("document.documentElement.scrollWidth") <= width, path.name
+    assert {name: some for name, some in found.items() if some} == {}
 
 
 # ---- The report of an identification ---------------------------------------------------------------------------------

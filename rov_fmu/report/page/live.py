@@ -33,7 +33,18 @@ _VERTICAL = 0.9
 _TILTING = (ROLL, PITCH)
 _FARTHEST = 0.2
 """The farthest that a slider moves a centre of mass or buoyancy, m."""
-_SCRIPTS = ("model.js", "hold.js", "flight.js", "recording.js", "view.js", "picture.js", "controls.js")
+_SCRIPTS = (
+    "model.js",
+    "hold.js",
+    "flight.js",
+    "recording.js",
+    "canvas.js",
+    "shape.js",
+    "instruments.js",
+    "picture.js",
+    "charts.js",
+    "controls.js",
+)
 
 
 @dataclass(frozen=True)
@@ -59,7 +70,10 @@ class Live:
     tests: Sequence[str]
     """The labels of the step tests that a button starts."""
     keys: Sequence[tuple[Axis, str]]
-    """The axes, each with the letters of its keys: that of its positive direction, and that of its negative one."""
+    """The axes that commands drive, each with the letters of its keys: that of its positive direction, and that of its
+    negative one."""
+    tested: float
+    """The largest command for which the model was identified."""
     places: Mapping[str, str]
     """The place of the thruster, by the command that drives only this thruster."""
     start: Mapping[str, float]
@@ -97,7 +111,8 @@ def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> 
         script=script.text,
         policy=f"{script.policy} 'wasm-unsafe-eval'",
         tests=[f"{pilot.layout.axes[t['axis']].axis.name} {number(100.0 * t['command'], 3)} %" for t in tests],
-        keys=_keys(pilot.layout),
+        keys=[(axis, keys) for axis, keys in _keys(pilot.layout) if keys],
+        tested=data[0]["tested"],
         places=_places(pilot),
         start=start,
         loads=list(_loads(pilot, start)),
@@ -143,6 +158,7 @@ def _data(flown: Flown) -> dict[str, Any]:
         "module": base64.b64encode(zlib.compress(flown.module, 9)).decode(),
         "variables": [(v.name, 0.0 if v.name in layout.commands else v.start or 0.0) for v in variables(vehicle)],
         "pulse": layout.pulse,
+        "tested": vehicle.command_range[1],
         "inputs": len(layout.inputs),
         "states": len(layout.state),
         "commands": list(layout.commands),
@@ -179,9 +195,11 @@ def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
 
 
 def _keys(layout: Layout) -> list[tuple[Axis, str]]:
-    """Return each axis with the letters of its keys. Axes without their own letters get the spare ones."""
+    """Return each axis with the letters of its keys; none where no command acts. Axes without their own letters get the
+    spare ones."""
     spare = iter(_SPARE_KEYS)
-    return [(form.axis, _KEYS.get(form.axis.name) or next(spare)) for form in layout.axes]
+    keys = {form.axis: _KEYS.get(form.axis.name) or next(spare) for form in layout.axes}
+    return [(axis, letters if layout.signs(axis) else "") for axis, letters in keys.items()]
 
 
 def _axis(vehicle: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
@@ -239,6 +257,7 @@ def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any
     most = max(abs(vehicle.curve_force(curve, command)) for command in (1.0, -1.0))
     return {
         "force": f"F_{thruster.name}",
+        "commands": list(vehicle.layout.gains[thruster.name]),
         "label": label,
         "at": place(vehicle, thruster),
         "along": thruster.direction.value,

@@ -12,7 +12,7 @@ from rov_fmu.cli import main
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.report.conftest import flown_vehicle, until
+from tests.report.conftest import Visit, chart, flown_vehicle, until
 from tests.report.test_live import a_recording
 from tests.tank.readers.motion import DIVE
 from tests.tank.readers.writers import LOGS
@@ -89,13 +89,29 @@ def test_the_timeline_goes_to_any_time_and_the_charts_show_the_error(
         )
         shown = page.evaluate("[live.flight.pilot, live.flight.ghost].map(({ model }) => model.get('z'))")
         assert shown == pytest.approx([depths[time]] * 2, abs=1e-6)
-        assert "error 0.00" in page.text_content("#live-chart-heave .marks").replace("\N{MINUS SIGN}", "")
+        assert "error 0.00" in chart(page, "heave")["words"].replace("\N{MINUS SIGN}", "")
     page.select_option("#live-view", "error")
     until(page, "!live.changed")
-    assert page.locator("#live-charts svg").count() == 3
+    assert page.locator("#live-charts canvas").count() == 3
     page.locator("input[name=u_t]").fill("0.5")
     until(page, "live.flight.replay === null")
     assert not page.locator("#live-timeline").is_visible(), "the pilot has control"
+
+
+@pytest.mark.interop
+def test_a_recording_waits_where_motion_is_to_be_reduced(
+    csv: Path, tmp_path: Path, visit: Callable[..., Visit]
+) -> None:
+    assert main(["fly", "videoray", "--recording", str(csv), "-o", str(tmp_path / "page.html")]) == 0
+    motions: list[tuple[Any, bool]] = [("reduce", True), ("no-preference", False)]
+    for motion, is_paused in motions:
+        page = visit().page
+        page.emulate_media(reduced_motion=motion)
+        page.goto((tmp_path / "page.html").as_uri())
+        page.wait_for_selector("#live-section:not([hidden])")
+        assert page.evaluate("live.flight.replay !== null && live.paused") is is_paused
+        expected = "auto" if is_paused else "smooth"
+        assert page.evaluate("getComputedStyle(document.documentElement).scrollBehavior") == expected
 
 
 @pytest.mark.interop
@@ -180,8 +196,8 @@ def test_the_bands_and_the_unknown_force_of_the_identification_are_charts(
 ) -> None:
     page = replay(csv, "--identified", str(identified))
     page.evaluate("() => { live.flight.seek(15); live.draw(); }")
-    assert page.text_content("#live-chart-heave .marks").endswith("± 1.50")
+    assert chart(page, "heave")["words"].endswith("± 1.50")
     page.select_option("#live-view", "force")
     until(page, "!live.changed")
-    assert page.text_content("#live-chart-heave .title") == "heave: unknown 3.00 N"
-    assert page.get_attribute("#live-chart-heave .band", "d").endswith("Z")
+    assert chart(page, "heave")["title"] == "heave: unknown 3.00 N"
+    assert page.get_attribute("#live-chart-heave", "aria-label") == "Over time: heave: unknown 3.00 N"

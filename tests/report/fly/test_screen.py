@@ -1,16 +1,30 @@
-"""What the page that flies shows: surface and seabed, one screen, legible instruments, and the keys at first."""
+"""What the page that flies shows: surface and seabed, one screen, legible instruments, one north, and what is drawn."""
 
-from collections import Counter
 from collections.abc import Callable
+from math import cos, sin
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.report.conftest import get
+from tests.report.conftest import flown_vehicle, get, write_page
+from tests.report.fly.boxes import SCHEMES, WIDTHS, drawn_problems, problems, record_drawn_texts
 from tests.report.pages import UNFOLD
 from tests.report.test_live import BOX
 
 pytestmark = pytest.mark.interop
+
+FLOWN_FOR_6_S = """() => {
+    live.pause(true);
+    live.frame = () => {};
+    const { flight } = live;
+    const demands = new Map([["surge", 0.5], ["yaw", 0.2]]);
+    if (flight.isHeld) flight.steer({ demands, added: {} });
+    else flight.set(commandsOf(live.vehicle, demands));
+    flight.advance(6);
+    live.show();
+    live.draw();
+}"""
 
 
 def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) -> None:
@@ -26,34 +40,42 @@ def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) ->
     page.evaluate("() => { live.flight.set({ u_t: 0.8 }); live.flight.advance(60); live.draw(); }")
     assert get(page, "z") == pytest.approx([2.0 - 0.55 * page.evaluate("live.vehicle.size")])
     assert "(on the seabed)" in page.inner_text("#live-readings")
-    assert "bedded" in page.get_attribute("#live-picture", "class")
+    assert page.evaluate("live.picture.isBedded")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize(("width", "height"), [(1366, 650), (390, 844)])
-@pytest.mark.parametrize("kind", ["videoray", "heavy", "bluerov2_heavy"])
-def test_picture_instruments_column_and_an_even_grid_of_charts_are_on_one_screen(
-    kind: str, fly: Callable[..., Any], width: int, height: int, scheme: str
+def test_a_step_test_that_leaves_the_water_says_that_the_surface_is_off(fly: Callable[..., Any]) -> None:
+    """The BlueROV2 is lighter than water, so it rises in a step test along another axis, too."""
+    page = fly("bluerov2")
+    page.evaluate("""() => {
+        live.run();
+        live.pause(true);
+        live.flight.advance(5);
+        live.draw();
+    }""")
+    assert get(page, "z")[0] < 0.0
+    assert "(surface off)" in page.inner_text("#live-readings")
+
+
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kind", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_picture_and_charts_are_on_one_screen_and_nothing_overlaps_or_is_cut(
+    kind: str, fly: Callable[..., Any], width: int, scheme: str
 ) -> None:
     """Nothing moves when a message of one line comes or goes, and axe finds nothing, folded or not."""
     axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    height = 850 if width < 1000 else 800
     page = fly(kind, width=width, height=height, scheme=scheme)
+    record_drawn_texts(page)
+    page.evaluate(FLOWN_FOR_6_S)
     assert page.locator("#live-picture").evaluate(BOX)["height"] > 0.25 * height
-    for element in page.locator("#live-picture, #live-charts svg, #live-column svg, .instruments > svg").all():
-        if element.is_visible():
-            box = element.evaluate(BOX)
-            assert box["x"] >= 0
-            assert box["x"] + box["width"] <= width
-            assert box["y"] + box["height"] <= height
-    charts = [chart.evaluate(BOX) for chart in page.locator(".charts svg").all()]
+    charts = [chart.evaluate(BOX) for chart in page.locator(".charts canvas").all()]
     assert len(charts) == page.evaluate("live.vehicle.axes.length")
+    over = page.locator(".over").evaluate(BOX)
+    assert max(box["bottom"] for box in charts) <= (over["top"] if width < 1000 else height)
+    assert over["bottom"] <= height, "sticks and buttons are under the thumbs"
     assert len({(round(box["width"]), round(box["height"])) for box in charts}) == 1
-    assert len({*Counter(round(box["y"]) for box in charts).values()}) == 1, "each row has as many charts"
-    texts = page.evaluate(
-        "[...document.querySelectorAll('.instruments > svg')].filter((svg) => svg.clientWidth).map((svg) =>"
-        " parseFloat(getComputedStyle(svg.querySelector('text')).fontSize) * svg.getScreenCTM().a)"
-    )
-    assert min(texts) >= 10.0
+    assert (problems(page), drawn_problems(page)) == ([], [])
     places = []
     for words in ("", "short"):
         page.evaluate("words => live.say(words)", words)
@@ -63,3 +85,89 @@ def test_picture_instruments_column_and_an_even_grid_of_charts_are_on_one_screen
     page.evaluate(UNFOLD)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert axe.run(page).response["violations"] == []
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("kind", ["videoray", "bluerov2_heavy"])
+def test_the_frame_on_the_first_page_of_the_site_shows_all_of_itself(
+    kind: str, width: int, fly: Callable[..., Any], tmp_path: Path
+) -> None:
+    """The site leaves it 350 to 740 px."""
+    address = write_page(tmp_path / "compact.html", flown_vehicle(kind), compact=True)
+    page = fly(address, width=min(width - 50, 740), height=640)
+    record_drawn_texts(page)
+    page.evaluate(FLOWN_FOR_6_S)
+    assert (problems(page), drawn_problems(page)) == ([], [])
+    assert page.evaluate("document.documentElement.scrollHeight") <= 640
+    assert page.evaluate("live.picture.instruments.boxes.length") == (4 if kind == "bluerov2_heavy" else 3)
+
+
+def test_there_is_one_north(page: Any) -> None:
+    """The rose, the picture from above and the track turn together, wherever the camera is."""
+    for azimuth in (0.0, 0.5, -2.0):
+        north = page.evaluate(
+            """azimuth => {
+                live.picture.camera = { azimuth, elevation: Math.PI / 2 };
+                live.draw();
+                const { right, down } = live.picture.look([0, 0, 0]);
+                return [right[0], down[0]];
+            }""",
+            azimuth,
+        )
+        assert north == pytest.approx([-sin(azimuth), -cos(azimuth)]), "that of the picture, to the right and down"
+    record_drawn_texts(page)
+    page.evaluate("() => { live.picture.camera.azimuth = Math.PI / 2; live.draw(); }")
+    letters = page.evaluate("[...drawnTexts.values()].flat().filter(([words]) => words === 'N' || words === 'E')")
+    assert [one[0] for one in letters] == ["N", "E"], "no other drawing names a north"
+    (_, x, *_), (_, u, *_) = letters
+    assert x < u - 20.0, "for who looks to the east, north is to the left"
+
+
+def test_a_frame_of_the_heavy_changes_no_layout(fly: Callable[..., Any]) -> None:
+    """What moves is drawn on canvases. The numbers beside them change ten times a second at most."""
+    page = fly("bluerov2_heavy")
+    page.evaluate(FLOWN_FOR_6_S)
+    metrics = page.context.new_cdp_session(page)
+    metrics.send("Performance.enable")
+
+    def layouts() -> float:
+        found = {m["name"]: float(m["value"]) for m in metrics.send("Performance.getMetrics")["metrics"]}
+        return found["LayoutCount"]
+
+    before = layouts()
+    page.evaluate(
+        """() => new Promise((done) => {
+            let left = 30;
+            const next = () => {
+                live.flight.advance(1 / 60);
+                live.paint();
+                if (left--) requestAnimationFrame(next);
+                else done();
+            };
+            next();
+        })"""
+    )
+    assert layouts() == before
+
+
+_SHAPE = """factor => {
+    const moved = ({ at: [x, y, z], ...rest }) => ({ ...rest, at: [x, factor * y, z] });
+    const vehicle = { ...live.vehicle, thrusters: live.vehicle.thrusters.map(moved) };
+    const { plates, thrusters, tubes } = new Shape(vehicle);
+    const arms = tubes.filter(({ kind }) => kind === "arm");
+    const ends = arms.map(({ at, along, ends }) => plus(at, [ends[1], along]));
+    const far = (at) => Math.min(...ends.map((end) => Math.hypot(...plus(at, [-1, end]))));
+    return { plates, far: thrusters.map(({ at }) => far(at)) };
+}"""
+"""Returns the distance of the side plates from the middle, and of each thruster from the end of an arm, with the
+thrusters farther from the middle by a factor."""
+
+
+def test_a_vehicle_is_drawn_from_the_places_of_its_own_thrusters(fly: Callable[..., Any]) -> None:
+    """Side plates enclose the thrusters that push horizontally, at 0.111 m; arms hold the vertical ones, at 0.218 m."""
+    page = fly("bluerov2_heavy")
+    own, wide = page.evaluate(_SHAPE, 1.0), page.evaluate(_SHAPE, 2.0)
+    assert 0.111 < own["plates"] < 0.218
+    assert 0.222 < wide["plates"] < 0.436
+    for shape in (own, wide):
+        assert shape["far"][4:] == pytest.approx([0.0] * 4, abs=1e-9)
