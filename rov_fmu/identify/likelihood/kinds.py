@@ -161,7 +161,9 @@ KINDS = {
         null=0.0,
     ),
     "centre of buoyancy": Kind(
-        Prior("buoyancy", 0.005, "each coordinate of the centre of buoyancy, m", "trimmed vehicles tilt by a few degrees"),
+        Prior(
+            "buoyancy", 0.005, "each coordinate of the centre of buoyancy, m", "trimmed vehicles tilt by a few degrees"
+        ),
         "centre of buoyancy",
         null=0.0,
         unit="m",
