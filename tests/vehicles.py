@@ -120,6 +120,11 @@ _CURVE_NUMBERS = {
 }
 
 
+def _factors(layout: Layout) -> set[str]:
+    """Return the names of the coefficients that are 1 unless a vehicle file gives them."""
+    return {*layout.tuning, *layout.health.values()}
+
+
 def numbered(layout: Layout, **values: float) -> Vehicle:
     """Return a vehicle with the Heavy's numbers, except for the given values, and without tuning."""
     numbers = {
@@ -132,11 +137,8 @@ def numbered(layout: Layout, **values: float) -> Vehicle:
     for key, *axes in layout.cross:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
-    numbers |= _BODY_NUMBERS | values
-    return Vehicle(
-        layout,
-        {name: 1.0 if name in layout.tuning else numbers[name] for name in layout.coefficients},
-    )
+    numbers |= _BODY_NUMBERS | dict.fromkeys(_factors(layout), 1.0) | values
+    return Vehicle(layout, {name: numbers[name] for name in layout.coefficients})
 
 
 def pulsed(rov: _Vehicle, pulse: tuple[float, float, float]) -> _Vehicle:
@@ -350,7 +352,7 @@ def random_vehicle(rng: random.Random, layout: Layout | None = None) -> Vehicle:
     layout = layout or random_layout(rng)
     numbers = {}
     for name, declaration in layout.coefficients.items():
-        if name in layout.tuning:
+        if name in _factors(layout):
             numbers[name] = spread(rng, -0.5, 0.5)
         elif name.startswith(("a_d", "b_d")):
             numbers[name] = spread(rng, -1.0, 2.0, zero=1 / 6)

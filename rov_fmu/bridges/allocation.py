@@ -2,7 +2,8 @@
 
 The wrench w on the body, along and about the axes of the vehicle in the frame of the FMU (forward, starboard, down), is
 w = B F for the forces F of the thrusters. The forces of least size for a wrench are F = B^+ w, with the pseudo-inverse
-(Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, 12.3.2). The tuning alpha is in B.
+(Fossen, Handbook of Marine Craft Hydrodynamics and Motion Control, 2011, 12.3.2). The tuning alpha and the
+health of the thrusters are in B, so F are the forces of whole ones.
 """
 
 from collections.abc import Iterator
@@ -73,7 +74,9 @@ def allocation_matrix(vehicle: Vehicle) -> Array:
     return np.array(
         [
             [
-                vehicle[axis.coefficient("alpha")] * vehicle.effect(thruster, axis)
+                vehicle[axis.coefficient("alpha")]
+                * vehicle[thruster.coefficient("health")]
+                * vehicle.effect(thruster, axis)
                 for thruster in vehicle.layout.thrusters
             ]
             for axis in (part.axis for part in vehicle.layout.axes)

@@ -347,7 +347,7 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
         direction=direction,
         position=np.cross(force, moment) / scale**2 + direction * (direction @ given),
         scale=scale,
-        newtons={c: scale * vehicle.curve_force(curve, c) for c in _COMMANDS},
+        newtons={c: scale * vehicle[thruster.coefficient("health")] * vehicle.curve_force(curve, c) for c in _COMMANDS},
         lost=abs(float(direction @ moment)) / scale,
     )
 

@@ -264,6 +264,17 @@ FIN = {
     "angle_max": Declaration("rad", "Angle of the {fin} at full command", 1e-3, _QUARTER),
 }
 """The coefficients of a control surface."""
+THRUSTER = {
+    "health": Declaration(
+        "1",
+        "Health h of the {thruster}: its force relative to that of a whole one, so 1 is whole and 0 is dead",
+        0.0,
+        10.0,
+        needed=False,
+        tunable=True,
+    ),
+}
+"""The coefficients of a thruster."""
 CURVE = {
     "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),

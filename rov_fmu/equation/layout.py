@@ -54,6 +54,7 @@ from .words import (
     table_of_axis,
     table_of_curve,
     table_of_fin,
+    table_of_thruster,
     thrust_declaration,
     torque_declaration,
 )
@@ -225,6 +226,7 @@ class Layout:
             *map(table_of_curve, self.curves),
             *map(table_of_fin, self.fins),
             *(table_of_axis(vehicle_axis, kinds) for kinds in (AXIS, TUNING) for vehicle_axis in self.axes),
+            *map(table_of_thruster, self.thrusters),
         )
 
     @cached_property
@@ -255,6 +257,17 @@ class Layout:
     def tuning(self) -> tuple[str, ...]:
         """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
         return tuple(vehicle_axis.axis.coefficient(key) for vehicle_axis in self.axes for key in TUNING)
+
+    @cached_property
+    def health(self) -> dict[str, str]:
+        """The names of the health of each thruster, by its name. A vehicle file need not give it; it is 1 then."""
+        return {thruster.name: thruster.coefficient("health") for thruster in self.thrusters}
+
+    @cached_property
+    def ballast(self) -> tuple[str, ...]:
+        """The other tunable coefficients: mass, weight, buoyancy, their centres, and the scales of tables of thrust."""
+        factors = {*self.tuning, *self.health.values()}
+        return tuple(name for name, one in self.coefficients.items() if one.tunable and name not in factors)
 
     @cached_property
     def commands(self) -> dict[str, Declaration]:
@@ -387,9 +400,9 @@ class Layout:
     @cached_property
     def variables(self) -> tuple[str, ...]:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
-        rates = map(rate_name, self.state)
-        known = (*self.calculated, *self.delayed, *self.coefficients, *self.initial)
-        return (*self.inputs, *self.state, *rates, *known)
+        rates, last = map(rate_name, self.state), self.health.values()
+        parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
+        return (*self.inputs, *self.state, *rates, *self.calculated, *self.delayed, *parameters, *last)
 
     @cached_property
     def places(self) -> dict[str, int]:

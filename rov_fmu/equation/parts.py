@@ -145,6 +145,10 @@ class Actuator:
         """The position (m), or the centre of mass where there is none."""
         return self.position.value if self.position else (0.0, 0.0, 0.0)
 
+    def coefficient(self, key: str) -> str:
+        """Return the name of a coefficient by its key."""
+        return f"{key}_{self.name}"
+
 
 @dataclass(frozen=True, kw_only=True)
 class Thruster(Actuator):
@@ -191,10 +195,6 @@ class Fin(Actuator):
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
         effect = effect_along(axis, self.direction.value, self.place)
         return effect if abs(effect) > FAINT else 0.0
-
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key."""
-        return f"{key}_{self.name}"
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
             formulas[mixed.identifier] = total(gain * part for gain, part in parts)
             formulas[command_of] = saturated(mixed)
         if name in layout.curve_of:
-            formulas |= _steady_thrust(name, layout.curve_of[name], names)
+            formulas |= _steady_thrust(name, layout.curve_of[name], names, Name(layout.health[name]))
     for fin in layout.fins:
         angle = Name(fin.coefficient("angle_max")) * names("command", fin.name)
         formulas[names("angle", fin.name).identifier] = angle
@@ -64,7 +64,7 @@ def curve_formulas(curve: Curve) -> Formulas:
     names = Names(curve.coefficient(key) for key in curve.keys)
     command = {names("command", "one").identifier: saturated(Name("u_one"))}
     battery = _battery(names) if "V_0" in curve.keys or len(curve.tables) > 1 else {}
-    return {**battery, **command, **_steady_thrust("one", curve, names)}
+    return {**battery, **command, **_steady_thrust("one", curve, names, of(1.0))}
 
 
 def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
@@ -87,19 +87,22 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
     return where(equal(command, 0.0), 0.0, (command - neutral) / span)
 
 
-def _steady_thrust(name: str, curve: Curve, names: Names) -> Formulas:
-    """Return formulas from the command of a thruster to its steady thrust, which is the last of them."""
+def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) -> Formulas:
+    """Return formulas from the command of a thruster to its steady thrust, which is the last of them.
+
+    The health multiplies the whole force, with what it loses by the speed of advance.
+    """
     command, share = names("command", name), 1.0 / curve.n_thrusters
     formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names)
     if "V_0" in curve.keys:
         by_voltage = names("battery") / Name(curve.coefficient("V_0"))
         force = force * call("pow", by_voltage, Name(curve.coefficient("n_V")))
     if "d" in curve.keys:
-        loss = product(by_direction(command, curve, "d"), call("abs", command), share)
+        loss = product(health, by_direction(command, curve, "d"), call("abs", command), share)
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
         force = product(force, share)
-    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
+    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(health * force)}
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:

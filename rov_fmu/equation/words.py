@@ -11,12 +11,13 @@ from .catalogue import (
     HEAVE,
     SURGE,
     SWAY,
+    THRUSTER,
     TUNING,
     Declaration,
     axis_words,
     cited,
 )
-from .parts import FAINT, Curve, Fin, Thruster, VehicleAxis
+from .parts import FAINT, Actuator, Curve, Fin, Thruster, VehicleAxis
 
 
 class CoefficientTable(NamedTuple):
@@ -44,7 +45,18 @@ def table_of_axis(vehicle_axis: VehicleAxis, kinds: Mapping[str, Declaration]) -
 
 def table_of_fin(fin: Fin) -> CoefficientTable:
     names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": fin.description or f"fin {fin.name}"})
+    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": _words(fin)})
+
+
+def table_of_thruster(thruster: Thruster) -> CoefficientTable:
+    names = {key: thruster.coefficient(key) for key in THRUSTER}
+    return CoefficientTable(("thruster", thruster.name), names, THRUSTER, {"thruster": _words(thruster)})
+
+
+def _words(driven: Actuator) -> str:
+    """Return what a thruster or a fin is called."""
+    kind = "fin" if isinstance(driven, Fin) else "thruster"
+    return driven.description or f"{kind} {driven.name}"
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:
@@ -57,14 +69,12 @@ def _pushes(direction: tuple[float, float, float]) -> str:
     return listed(words)
 
 
-def command_words(driven: Thruster | Fin) -> str:
-    kind = "fin" if isinstance(driven, Fin) else "thruster"
-    words = f"Command u_{driven.name}: {driven.description or f'{kind} {driven.name}'}"
-    return f"{words}, positive {_pushes(driven.direction.value)}"
+def command_words(driven: Actuator) -> str:
+    return f"Command u_{driven.name}: {_words(driven)}, positive {_pushes(driven.direction.value)}"
 
 
 def thrust_declaration(thruster: Thruster, curve: Curve) -> Declaration:
-    words = f"Thrust F_{thruster.name}: {thruster.description or f'thruster {thruster.name}'}"
+    words = f"Thrust F_{thruster.name}: {_words(thruster)}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.n_thrusters, f", 1/{curve.n_thrusters} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
     return Declaration(

@@ -132,7 +132,7 @@ def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
     thrust = {
         name: quantity
         for name, quantity in tables.quantities(layout).items()
-        if quantity and places[name][0] in ("arm", "curves")
+        if quantity and places[name][0] in ("arm", "curves", "thruster")
     }
     vehicle = vehicle.with_(layout)
     numbers = {**dict.fromkeys(kept, UNTUNED), **vehicle.coefficients}

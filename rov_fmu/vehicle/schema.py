@@ -27,6 +27,7 @@ from rov_fmu.equation.catalogue import (
     FIN,
     REPLACED_BY_TABLE,
     RESTORING,
+    THRUSTER,
     Axis,
     Declaration,
     cross_of,
@@ -44,9 +45,9 @@ from rov_fmu.vehicle.thrust_table import read_current, read_thrust
 
 FORMAT = 2
 UNTUNED = 1.0
-"""The value of α and β where the file does not give them."""
+"""The value of α and β, and of the health of a thruster, where the file does not give them."""
 NOT_GIVEN = "not given"
-"""The source of α and β where the file does not give them."""
+"""Their source there."""
 MOST = 32
 """The largest number of thrusters, curves or inputs."""
 _NONE: Mapping[str, Any] = MappingProxyType({})
@@ -322,8 +323,13 @@ class Actuator(Strict):
         return {"name": self.name, "description": self.description, "direction": along, "position": at}
 
 
-class Thruster(Actuator):
+_THRUSTER = {key: kind.filled(thruster="thruster") for key, kind in THRUSTER.items()}
+
+
+class Thruster(_coefficients("Thruster", _THRUSTER, base=Actuator)):  # type: ignore[misc]
     """A thruster: its curve, its direction and its place."""
+
+    model_config = DOCUMENTED
 
     curve: str
     """The name of the thrust curve."""
@@ -451,15 +457,13 @@ class Tables(Strict):
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
-        fins: Any = {fin.name: fin for fin in self.fin}
+        lists: dict[str, list[Any]] = {"thruster": self.thruster, "fin": self.fin}
+        tables: Any = dict(self) | {key: {one.name: one for one in ones} for key, ones in lists.items()}
 
         def entry(table: Any, key: str) -> Any:
             return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
-        return {
-            name: reduce(entry, keys, fins if first == "fin" else getattr(self, first))
-            for name, (first, *keys) in of.keys_in_file.items()
-        }
+        return {name: reduce(entry, keys, tables) for name, keys in of.keys_in_file.items()}
 
 
 class _Head(Strict):

@@ -169,7 +169,7 @@ def test_after_ten_seconds_it_is_within_a_millimetre_at_4_ms_and_a_hundredth_at_
 
 def test_ballast_changes_the_motion_as_in_the_fmu() -> None:
     vehicle, package = loaded("bluerov2")
-    ballast = {"m_rov": 14.0, "F_0_w": 3.0, "alpha_w": 0.5, "beta_u": 0.8}
+    ballast = {"m_rov": 14.0, "F_0_w": 3.0, "alpha_w": 0.5, "beta_u": 0.8, "health_1": 0.3, "health_5": 0.0}
     rov = package.load()
     rov.data.qpos[:3] = 0.0
     rov.coefficients |= ballast

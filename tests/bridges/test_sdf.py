@@ -196,8 +196,8 @@ SIGNS = {"u": 1.0, "v": -1.0, "w": -1.0, "p": 1.0, "q": -1.0, "r": -1.0}
 
 
 def newtons_of(gazebo: Gazebo, rov: Vehicle, thrust: Mapping[str, float]) -> dict[str, float]:
-    """The newtons to send for the thrust of the FMU's curves; alpha is seen in the largest thrust."""
-    full = {name: rov.curve_force(curve, 1.0) for name, curve in rov.layout.curve_of.items()}
+    """The newtons to send for the thrust of the FMU; alpha is seen in the largest thrust."""
+    full = {name: rov[f"health_{name}"] * rov.curve_force(curve, 1.0) for name, curve in rov.layout.curve_of.items()}
     return {name: force * gazebo.largest[name] / full[name] for name, force in thrust.items()}
 
 

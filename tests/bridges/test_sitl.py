@@ -32,7 +32,7 @@ from tests.bridges.ardusub import ArduSub, packet, parsed
 from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
-from tests.vehicles import pulsed, thruster
+from tests.vehicles import numbered, pulsed, thruster
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -276,7 +276,7 @@ def _simple() -> Vehicle:
     places = {"a": ((1.0, 0.0, 0.0), 0.2), "b": ((1.0, 0.0, 0.0), -0.2), "c": ((0.0, 0.0, 1.0), 0.2)}
     places["d"] = (0.0, 0.0, 1.0), -0.2
     thrusters = tuple(thruster(name, "t200", to, (0.0, y, 0.0)) for name, (to, y) in places.items())
-    return Vehicle(replace(HEAVY.layout, thrusters=thrusters), HEAVY.coefficients)
+    return numbered(replace(HEAVY.layout, thrusters=thrusters), **HEAVY.coefficients)
 
 
 SIMPLE = _simple()

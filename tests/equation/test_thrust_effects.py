@@ -88,6 +88,26 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
 
 
+@pytest.mark.parametrize("rov", [VIDEORAY, SIX, NOW], ids=["one curve for two", "by coefficients", "by tables"])
+def test_the_health_of_a_thruster_multiplies_its_force_alone(rov: Vehicle) -> None:
+    whole = rov.with_(**dict.fromkeys(rov.layout.health.values(), 1.0))
+    inputs = rov.layout.usual_inputs | dict.fromkeys(rov.layout.commands, -0.6)
+    forces = whole.commanded(inputs)
+    for thruster, name in rov.layout.health.items():
+        for health in (0.0, 0.5, 2.0):
+            ill = whole.with_(**{name: health}).commanded(inputs)
+            assert ill == forces | {thruster: health * forces[thruster] + 0.0}
+            assert math.copysign(1.0, ill[thruster]) == (1.0 if health == 0.0 else math.copysign(1.0, forces[thruster]))
+
+
+def test_the_health_comes_after_all_variables_that_were_there_before_it() -> None:
+    """Otherwise, the value references of FMI would change."""
+    for layout in (VIDEORAY.layout, SIX.layout, ROV.layout):
+        count = len(layout.thrusters)
+        assert layout.variables[-count:] == tuple(f"health_{thruster.name}" for thruster in layout.thrusters)
+        assert not any(name.startswith("health_") for name in layout.variables[:-count])
+
+
 def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> None:
     def effect(u: float, command: float) -> dict[str, float]:
         state = at_rest(NOW) | {"u": u}

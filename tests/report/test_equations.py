@@ -76,9 +76,9 @@ def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> 
     for curve in shown.curves:
         first = curve.thrusters[0].name
         for line in curve.advance:  # the page mentions the other thrusters in words: "likewise"
-            at |= {
-                f"loss_{t.name}": value_of(line.right, {**at, f"u_{first}": at[f"u_{t.name}"]}) for t in curve.thrusters
-            }
+            for t in curve.thrusters:
+                own = {f"{kind}_{first}": at[f"{kind}_{t.name}"] for kind in ("u", "health")}
+                at[f"loss_{t.name}"] = value_of(line.right, {**at, **own})
     for name in rov.layout.calculated:
         if name not in at and name.startswith("F_"):
             at[name] = exact[name]
@@ -132,9 +132,9 @@ def test_the_equations_of_the_paper_are_those_of_the_paper() -> None:
         "m_rov u' = β_u (α_u (F_l + F_r) + X_ext − b_d_u u − a_d_u |u| u)  (18a)",
         "m_rov w' = β_w (α_w F_t + Z_ext − b_d_w w − a_d_w |w| w)  (18b)",
         "I_r r' = β_r (α_r τ_rear + N_ext − b_d_r r − a_d_r |r| r)  (18c)",
-        "F_l = 0.5 (a_t_rear |u_l| u_l + b_t_rear u_l)  (9)",
+        "F_l = 0.5 h_l (a_t_rear |u_l| u_l + b_t_rear u_l)  (9)",
         "τ_rear = R sin γ (F_l − F_r)  (4)",
-        "F_t = a_t_top |u_t| u_t + b_t_top u_t  (10)",
+        "F_t = h_t (a_t_top |u_t| u_t + b_t_top u_t)  (10)",
         "x' = V_N + u cos ψ",
         "y' = V_E + u sin ψ",
         "z' = w",

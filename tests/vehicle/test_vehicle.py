@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE, YAW
+from rov_fmu.vehicle.schema import NOT_GIVEN
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from tests.commands import ALONE
-from tests.paper.test_paper import TABLE_9
+from tests.paper.test_paper import TABLE_9, WHOLE
 from tests.vehicles import extended, sources_of
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
@@ -21,7 +22,7 @@ WITH_SHIPPED_FOLDERS = re.sub(r'^(data|pictures) = "', r'\1 = "videoray/', TEXT,
 
 
 def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
-    assert vehicle.coefficients == TABLE_9
+    assert vehicle.coefficients == TABLE_9 | WHOLE
     layout, ahead = vehicle.layout, (1.0, 0.0, 0.0)
     assert [*layout.by_name] == ["surge", "heave", "yaw"]
     assert {curve.name: (curve.keys, curve.n_thrusters) for curve in layout.curves} == {
@@ -33,8 +34,9 @@ def test_videoray_is_the_vehicle_of_the_paper(vehicle: Vehicle) -> None:
         "r": ("rear", ahead, "starboard", None),
         "t": ("top", (0.0, 0.0, 1.0), None, None),
     }
-    assert set(vehicle.sources) == set(TABLE_9)
-    assert all("Table 9" in source for source in vehicle.sources.values())
+    assert set(vehicle.sources) == set(TABLE_9 | WHOLE)
+    assert all("Table 9" in vehicle.sources[name] for name in TABLE_9)
+    assert {vehicle.sources[name] for name in WHOLE} == {NOT_GIVEN}
     assert {one.name: [*sources_of(one)] for one in vehicle.layout.thrusters} == {n: ["direction"] for n in "lrt"}
     assert [a.values for a in vehicle.alternatives.values()] == [{"a_t_rear": 100.3, "b_t_rear": -27.09}]
     assert vehicle.command_range == (0.2, 0.7)

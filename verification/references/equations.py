@@ -198,11 +198,14 @@ def commands(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[s
 
 
 def steady_forces(rov: Vehicle, inputs: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
-    """Return the force of every thruster under the commands after its lag has died out."""
+    """Return the force of every thruster under the commands, with its health, after its lag has died out."""
     of_thruster = rov.layout.curve_of
     voltage = inputs.get("voltage", 0)
-    commanded = commands(rov, inputs, numbers).items()
-    return {name: thrust(rov, of_thruster[name], command, numbers, voltage) for name, command in commanded}
+    return {
+        name: numbers.mpf(rov.coefficients[f"health_{name}"])
+        * thrust(rov, of_thruster[name], command, numbers, voltage)
+        for name, command in commands(rov, inputs, numbers).items()
+    }
 
 
 def effect(rov: Vehicle, thruster: Thruster, velocity: str, numbers: Any) -> Number:

@@ -91,7 +91,8 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
         wrench = _wrench(thruster.place, thruster.direction.value)
-        rows.append([*wrench, forces[name], loss * abs(command) / curve.n_thrusters, lag])
+        health = mp.mpf(rov.coefficients[f"health_{name}"])
+        rows.append([*wrench, forces[name], health * loss * abs(command) / curve.n_thrusters, lag])
     table = np.array([[number(x) for x in row] for row in rows]).reshape(-1, 9)
     return table[:, :6], table[:, 6], table[:, 7], table[:, 8]
 

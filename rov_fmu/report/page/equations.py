@@ -246,7 +246,7 @@ class Symbol:
 
 _LETTERS = {
     **{"alpha": "α", "beta": "β", "gamma": "γ", "phi": "φ", "theta": "θ", "psi": "ψ", "eta": "η", "epsilon": "ε"},
-    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u"},
+    **{"tau": "τ", "angle": "δ", "lift": "l", "drag": "d", "delayed": "u", "health": "h"},
     **{"command": "c", "beyond": "m", "loss": "k", "table": "f", "steady": "F", "battery": "U", "fraction": "u"},
 }
 """The letters of quantities whose names begin with a word or whose letter is another one."""

@@ -96,7 +96,6 @@ def documentation_page(
         settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
         card=card(vehicle),
-        ballast=[n for n, one in layout.coefficients.items() if one.tunable and n not in layout.tuning],
         coupled=listed(equations.coupled(layout)),
         equations=equations.equations_of(layout),
         mathml=equations.mathml,

@@ -87,6 +87,11 @@ def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> 
     script = inline_script(*_SCRIPTS, folder=MODULE_SOURCES)
     tests, start = data[0]["tests"], dict(data[0]["variables"])
     names = _names(flown)
+    tunable = {
+        "Ballast and payload": [*_ballast(pilot)],
+        "Health of the thrusters": [*_health(pilot)],
+        "Tuning α and β": [*_tuning(pilot)],
+    }
     return Live(
         data=_json(data),
         script=script.text,
@@ -96,7 +101,7 @@ def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> 
         places=_places(pilot),
         start=start,
         loads=list(_loads(pilot, start)),
-        tunable={"Ballast and payload": list(_ballast(pilot)), "Tuning α and β": list(_tuning(pilot))},
+        tunable={title: sliders for title, sliders in tunable.items() if sliders},
         can_level=any(data[0]["axes"][n]["held"] for n, form in enumerate(pilot.layout.axes) if form.axis in _TILTING),
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
@@ -290,11 +295,19 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
 
 def _ballast(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
     """Yield the sliders of the mass, the weight, the buoyancy, their centres, and the scales of tables of thrust."""
-    for name, one in vehicle.layout.coefficients.items():
-        if one.tunable and name not in vehicle.layout.tuning:
-            value, (low, high) = vehicle[name], (0.8, 1.25) if one.unit == "N" else (0.5, 2.0)
-            ends = (value - _FARTHEST, value + _FARTHEST) if one.unit == "m" else (low * value, high * value)
-            yield name, name, *ends, value, "" if one.unit == "1" else pretty_unit(one.unit), one.description
+    for name in vehicle.layout.ballast:
+        one = vehicle.layout.coefficients[name]
+        value, (low, high) = vehicle[name], (0.8, 1.25) if one.unit == "N" else (0.5, 2.0)
+        ends = (value - _FARTHEST, value + _FARTHEST) if one.unit == "m" else (low * value, high * value)
+        yield name, name, *ends, value, "" if one.unit == "1" else pretty_unit(one.unit), one.description
+
+
+def _health(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
+    """Yield the sliders of the health of the thrusters, from dead to whole."""
+    labels = _labels(vehicle)
+    for thruster, name in vehicle.layout.health.items():
+        description = vehicle.layout.coefficients[name].description
+        yield name, labels[thruster] or thruster, 0.0, max(1.0, vehicle[name]), vehicle[name], "", description
 
 
 def _tuning(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:

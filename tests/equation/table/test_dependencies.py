@@ -15,8 +15,8 @@ def test_every_kind_of_dependency_of_a_vehicle_with_lag() -> None:
     thrusts = dependencies_of(load_vehicle(THRUST_EFFECTS).layout)
     assert thrusts["der(w)"] == {"Z_ext": "tunable", "voltage": "dependent", "w": "dependent"}
     brought = parameters_of(VIDEORAY.layout)
-    assert (brought["der(z)"], brought["F_t"], brought["der(psi)"]) == ((), ("a_t_top", "b_t_top"), ())
-    assert brought["der(w)"] == ("m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w")
+    assert (brought["der(z)"], brought["F_t"], brought["der(psi)"]) == ((), ("a_t_top", "b_t_top", "health_t"), ())
+    assert brought["der(w)"] == ("m_rov", "a_t_top", "b_t_top", "a_d_w", "b_d_w", "alpha_w", "beta_w", "health_t")
 
 
 def test_an_attitude_at_the_start_depends_on_the_angles_that_give_it() -> None:

@@ -54,6 +54,10 @@ beta_u [1] 0 … 1000, 1: Tuning β_u: scales acceleration in surge; at 0 the ve
 beta_v [1] 0.001 … 1000, 1: Tuning β_v: scales acceleration in sway
 beta_w [1] 0 … 1000, 1: Tuning β_w: scales acceleration in heave; at 0 the velocity never changes
 beta_w [1] 0.001 … 1000, 1: Tuning β_w: scales acceleration in heave
+health_l [1] 0 … 10, 1: Health h of the left booster: its force relative to that of a whole one, so 1 is whole \
+and 0 is dead
+health_bow [1] 0 … 10, 1: Health h of the thruster bow: its force relative to that of a whole one, so 1 is whole \
+and 0 is dead
 Y_ur [N.s2/(m.rad)] -1e+06 … 1e+06, 1: Lift in sway by surge and yaw
 """
 """What is said of variables: the unit, the bounds, the nominal value and the description."""
@@ -84,8 +88,8 @@ def test_every_kind_of_variable_is_declared_as_people_read_it() -> None:
         for name, declaration in of.items()
     ]
     assert {*DECLARED.strip().splitlines()} <= {said(*one) for one in declared}
-    axes = {name for rov in rovs for name in rov.layout.tuning}
-    assert {name for name, of in declared if of.tunable} == {*TUNABLE.split(), *axes}
+    factors = {name for rov in rovs for name in (*rov.layout.tuning, *rov.layout.health.values())}
+    assert {name for name, of in declared if of.tunable} == {*TUNABLE.split(), *factors}
     assert {of.start for name, of in in_pulses.layout.commands.items()} == {1500.0}
     assert [[*with_axes(axes).layout.pose][:-4] for axes in ("pr", "wq")] == [[], ["x", "y", "z"]]
     voltage = replace(VIDEORAY.layout, voltage=14.8).inputs["voltage"]

@@ -1,4 +1,4 @@
-"""The mass, the ballast and their places change during a run: velocities go on, and an impossible mass is refused."""
+"""Mass, ballast and the health of thrusters change during a run: velocities go on, an impossible mass is refused."""
 
 import json
 import struct
@@ -17,9 +17,16 @@ from verification.references import rigid_vehicle
 from verification.references.rigid_vehicle import compared, places
 
 ROV = a_vehicle(SIX)
-INPUTS = ROV.layout.usual_inputs | {"X_ext": 6.0, "Y_ext": -2.0, "Z_ext": 3.0, "K_ext": 0.3, "N_ext": 0.2, "V_N": 0.1}
+COMMANDS = {"u_a": 0.5, "u_b": -0.4, "u_c": 0.3}
+INPUTS = (
+    ROV.layout.usual_inputs
+    | COMMANDS
+    | {"X_ext": 6.0, "Y_ext": -2.0, "Z_ext": 3.0, "K_ext": 0.3, "N_ext": 0.2, "V_N": 0.1}
+)
 BALLAST = {name: factor * ROV[name] for name, factor in {"m_rov": 1.3, "W": 1.25, "B": 1.1, "z_G": 0.8}.items()}
 BALLAST |= {"x_B": ROV["x_B"] + 0.01, "y_G": ROV["y_G"] - 0.005}
+CHANGES = BALLAST | {"health_a": 0.3, "health_b": 0.0}
+"""With the ballast, a thruster fouls and another one dies."""
 IMPOSSIBLE = {"m_rov": 2.0 * ROV["m_rov"], "z_G": 50.0}
 
 
@@ -27,9 +34,9 @@ fmu = of_both_versions("six_dir", "outside3_dir", is_two_long=True)
 
 
 def _restarted(folder: Path) -> None:
-    """Write what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the ballast at 10 s."""
+    """Write what the rigid body of 6x6 matrices is compared by after 20 s, restarted with the changes at 10 s."""
     y: Any = places(ROV, ROV.layout.at_rest)
-    for rov in (ROV, ROV.with_(**BALLAST)):
+    for rov in (ROV, ROV.with_(**CHANGES)):
         y = rigid_vehicle.integrate(rov, INPUTS, y, 10.0)
     (folder / "end.json").write_text(json.dumps([float(x) for x in compared(ROV, list(y))]), encoding="utf-8")
 
@@ -41,7 +48,7 @@ def expected(made_once: Made) -> list[float]:
 
 
 @pytest.mark.parametrize("is_event", [False, True])
-def test_a_run_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(
+def test_a_run_with_changes_from_10_s_on_is_the_rigid_body_restarted_there(
     fmu: Fmu, expected: list[float], is_event: bool
 ) -> None:
     """Between steps, and in FMI 3.0 in Event Mode. The flavour in Python agrees by tests/fmu/test_python_flavour.py."""
@@ -52,7 +59,7 @@ def test_a_run_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(
         velocities = rov.get([*ROV.layout.velocities])
         if rov.kind == WITH_EVENTS:
             rov.expect("EnterEventMode")
-        rov.set(BALLAST)
+        rov.set(CHANGES)
         if rov.kind == WITH_EVENTS:
             rov.update()
             rov.expect("EnterStepMode")
@@ -63,12 +70,12 @@ def test_a_run_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
 
 
-def test_ballast_changed_in_python_is_the_rigid_body_restarted_there(expected: list[float]) -> None:
+def test_changes_in_python_are_the_rigid_body_restarted_there(expected: list[float]) -> None:
     """A second run begins with the states at the end of the first one."""
     rov = VehicleModel(**vars(ROV))
     before = rov.simulate([0.0, 10.0], INPUTS)
     start = {name: before[name][-1] for name in ROV.layout.state}
-    after = rov.with_(**BALLAST).simulate([10.0, 20.0], INPUTS, start=start)
+    after = rov.with_(**CHANGES).simulate([10.0, 20.0], INPUTS, start=start)
     assert [after[name][0] for name in ROV.layout.velocities] == [start[name] for name in ROV.layout.velocities]
     state = {name: float(after[name][-1]) for name in ROV.layout.state}
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)

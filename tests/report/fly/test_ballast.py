@@ -1,4 +1,5 @@
-"""The ballast moves while the page flies: its motion is that of the rigid body, an impossible mass is refused."""
+"""Ballast and thrusters change while the page flies: its motion is that of the rigid body, an impossible mass is
+refused."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -6,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.fmu.results.test_ballast import BALLAST, INPUTS, ROV, expected
+from tests.fmu.results.test_ballast import CHANGES, INPUTS, ROV, expected
 from tests.report.conftest import get, write_page
 from verification.references.rigid_vehicle import compared, places
 
@@ -20,19 +21,19 @@ def page(tmp_path: Path, fly: Callable[..., Any]) -> Any:
     return fly(write_page(tmp_path / "six.html", ROV))
 
 
-def test_a_flight_with_ballast_from_10_s_on_is_the_rigid_body_restarted_there(page: Any, expected: list[float]) -> None:
+def test_a_flight_with_changes_from_10_s_on_is_the_rigid_body_restarted_there(page: Any, expected: list[float]) -> None:
     done = page.evaluate(
-        """([inputs, ballast]) => {
+        """([inputs, changes]) => {
             live.pause(true);
             const { flight } = live;
             Object.assign(flight, { isHeld: false, isBounded: false });
             flight.set(inputs);
             flight.advance(10);
-            const done = flight.tune(ballast);
+            const done = flight.tune(changes);
             flight.advance(10);
             return done;
         }""",
-        [INPUTS, BALLAST],
+        [INPUTS, CHANGES],
     )
     assert done
     state = dict(zip(ROV.layout.state, get(page, *ROV.layout.state), strict=True))
@@ -51,6 +52,15 @@ def test_a_slider_moves_the_ballast_and_the_ghost_keeps_that_of_the_file(page: A
     assert get(page, "W", "alpha_u") == [140.0, 1.0]
     page.click("#live-file")
     assert get(page, "W") == [ROV["W"]]
+
+
+def test_a_slider_lets_a_thruster_die(page: Any) -> None:
+    page.locator("summary", has_text="Health").click()
+    page.locator("input[name=u_a]").fill("0.5")
+    page.locator("input[name=health_a]").fill("0")
+    rates = page.evaluate("[live.flight.pilot, live.flight.ghost].map(({ model }) => model.get('der(F_a)'))")
+    assert rates[0] == 0.0 < rates[1]
+    assert page.is_checked("#live-ghost")
 
 
 def test_a_mass_that_is_not_positive_definite_is_refused_in_one_line(page: Any) -> None:

@@ -45,10 +45,13 @@ def test_keys_loads_and_places_of_the_heavy() -> None:
 
 
 def test_sliders_reach_from_half_to_twice_a_mass_and_20_cm_beside_a_centre() -> None:
-    found = live([Flown(flown_vehicle("bluerov2_heavy").with_(alpha_u=0.05, beta_w=2.0), b"")])
-    ballast, tuning = found.tunable.values()
+    found = live([Flown(flown_vehicle("bluerov2_heavy").with_(alpha_u=0.05, beta_w=2.0, health_8=1.1), b"")])
+    ballast, health, tuning = found.tunable.values()
     mass = "m_rov m_rov 6.75 27 13.5 kg, W W 106.1 165.7 132.6 N, B B 105.3 164.5 131.6 N"
     assert shown(row[:-1] for row in ballast) == f"{mass}, z_B z_B -0.21 0.19 -0.01 m"
+    assert shown(row[:-1] for row in (health[0], health[7])) == (
+        "health_1 right front 0 1 1 , health_8 left rear vertical 0 1.1 1.1 "
+    )
     assert shown(row[:-1] for row in (tuning[0], tuning[1], tuning[8])) == (
         "alpha_u α of surge 0.05 3 0.05 , alpha_v α of sway 0.1 3 1 , beta_w β of heave 0.1 4 2 "
     )
