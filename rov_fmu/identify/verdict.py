@@ -8,6 +8,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
+    USUAL,
     Answer,
     Coefficient,
     Disturbance,
@@ -186,7 +187,7 @@ RULES = (
     Rule(
         "errors over 10 s of the fit to all data, relative to σ",
         lambda e: e.structure,
-        1.5,
+        USUAL,
         None,
         "Predictions over 10 s are off by {value:.1f} times the noise of the sensor, so the model lacks something.",
         unit="1",
