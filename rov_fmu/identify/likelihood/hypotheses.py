@@ -32,7 +32,7 @@ WINS, CLOSE = 6.0, 10.0
 """The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
 AHEAD, SETTLING = 10.0, 5.0
 """Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
-_BETWEEN = 0.03
+_BETWEEN = 0.005
 """The least share of a command that must be lost between the rows of a log for it to be momentary."""
 _LEAST_COMMAND = 0.05
 """The least change of a command that counts."""
@@ -451,7 +451,7 @@ class _Unknown:
         """Return how much more probable the unknown force is with a hypothesis: the sum over all axes of N ln (r²/s²).
 
         r is the force, and s what the change of the thrust leaves of it; of a hypothesis with a parameter, the share of
-        the change that leaves least.
+        the change that leaves least along each axis, because the fit has adapted to the wrong structure elsewhere.
         """
         model, found = self.model.applied(variant), dict[str, list[Array]]()
         table = model.table
@@ -468,13 +468,12 @@ class _Unknown:
                 found.setdefault(name, []).append(np.array([self.force[n][:, k], change[:, k]]) / self.scale[name])
         both = [np.concatenate(pairs, axis=1) for pairs in found.values()]
 
-        def gain(share: float) -> float:
-            return sum(
-                len(r) * log((np.mean(r**2) + _SMALL**2) / (np.mean((r - share * change) ** 2) + _SMALL**2))
-                for r, change in both
-            )
+        def gain(share: float, r: Array, change: Array) -> float:
+            rest = r - share * change
+            return len(r) * log((np.mean(r**2) + _SMALL**2) / (np.mean(rest**2) + _SMALL**2))
 
-        return max(map(gain, _SHARES)) if place is not None else gain(1.0)
+        shares = _SHARES if place is not None else (1.0,)
+        return sum(max(gain(share, *pair) for share in shares) for pair in both)
 
 
 def _alone(one: SampledLog, thruster: str) -> tuple[SampledLog, Array]:

@@ -26,6 +26,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.folders import HEAD, folder_of
+from verification.references.autopilot.flights import flown
 
 SECONDS, INTERVAL = 45.0, 0.1
 NOISE = {"surge velocity [m/s]": 0.005, "sway velocity [m/s]": 0.005, "heading [deg]": 0.3, "depth [m]": 0.01}
@@ -172,6 +173,18 @@ def test_momentary_commands_lose_what_changes_between_rows() -> None:
     assert lost_between_rows(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
     assert lost_between_rows(np.repeat(rng.standard_normal(400), 50)) < 0.03
     assert lost_between_rows(np.zeros(10)) == 0.0
+
+
+@pytest.mark.parametrize("vehicle", ["bluerov2", "bluerov2_heavy"])
+def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path: Path) -> None:
+    """The law changes them 400 times a second, so that the log has the noise of the estimates. Its rows stay apart."""
+    logs = {"flight.csv": flown(rov_fmu.load(vehicle), 12.0, 1)}
+    known, recorded, rows = begin(load_tests(folder_of(tmp_path, f'base = "{vehicle}"\n{HEAD}', logs)))
+    assert list(HYPOTHESES["momentary commands"].variants(known, recorded)) == [("flight.csv",)]
+    (one,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
+    assert one.is_momentary
+    assert not list(HYPOTHESES["momentary commands"].variants(known, [one]))
+    assert all(one.between_rows(known.coefficients, form.axis) > 0.0 for form in one.layout.axes)
 
 
 def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(model: Model) -> None:
