@@ -122,7 +122,8 @@ BUOYANT = Vehicle(
     {"m_rov": 11.0, "m_a_w": 14.0, "a_d_v": 60.0, "b_d_v": 2.0, "alpha_v": 0.9, "beta_v": 0.8}
     | {"a_d_w": 40.0, "b_d_w": 5.0, "a_d_w_reverse": 70.0, "b_d_w_reverse": 3.0, "F_0_w": -3.0}
     | {"alpha_w": 1.1, "beta_w": 0.7, "a_t_prop": 30.0, "b_t_prop": 31.0, "c_0_prop": 0.08}
-    | {"a_t_prop_reverse": 22.0, "b_t_prop_reverse": 25.0, "c_0_prop_reverse": 0.1},
+    | {"a_t_prop_reverse": 22.0, "b_t_prop_reverse": 25.0, "c_0_prop_reverse": 0.1}
+    | {"health_port": 1.0, "health_starboard": 1.0, "health_aside": 1.0},
 )
 
 
