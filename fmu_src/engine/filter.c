@@ -3,8 +3,8 @@
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *
  *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
- *     force_i, g, drift_i                  a slow force along each axis, a slow change of all thrust, and a slow velocity over ground:
- *                                          Ornstein-Uhlenbeck processes, each with a size and a time constant
+ *     force_i, g, drift_i                  a slow force and a short one along each axis, a slow change of all thrust, and a slow velocity
+ *                                          over ground: Ornstein-Uhlenbeck processes, each with a size and a time constant
  *     v = h(x, drift)                      what a sensor would measure at once; h knows its place
  *     s' = (v - s) / lag                   what it measures without noise; s = v for a sensor without lag
  *     y = s + n + e                        a sample: n is the sensor's coloured noise, also such a process, and e is white
@@ -42,7 +42,8 @@ enum {
     MOST_SENSORS = 16,
     LAGGED = N_STATES, /* the places of the states after those of the vehicle: first what each sensor with a lag measures */
     FORCE = LAGGED + MOST_SENSORS,
-    GAIN = FORCE + N_AXES,
+    SHORT = FORCE + N_AXES,
+    GAIN = SHORT + N_AXES,
     DRIFT = GAIN + 1,
     NOISE = DRIFT + N_DRIFTS,
     LATENESS = NOISE + MOST_SENSORS,
@@ -390,7 +391,7 @@ static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N
     const bool tilts = f->log->tilts >= 2;
     memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
     for (int i = 0; i < N_AXES; i++) {
-        at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i];
+        at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i] + x[SHORT + i];
     }
     if (tilts) { /* the load along heave is a net weight, which stays vertical */
         rotation(f, x, R);

@@ -1,6 +1,7 @@
 """The optional effects with their evidence, and what the fit found about loggers and sensors."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
@@ -8,11 +9,14 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.hypotheses import lost_between_rows, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
-from rov_fmu.identify.result import Effect, Logging, Sensor
+from rov_fmu.identify.result import Effect, Logging, Sensor, Structure
+from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import percent, significant
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -41,6 +45,40 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, (low, high), unit, evidence, float(beyond), least)
+
+
+def structures_of(fit: Fit) -> Iterator[Structure]:
+    """Yield the hypotheses about the structure that won, with the numbers of their parameters."""
+    posterior, objective = fit.posterior, fit.objective
+    for one in fit.adopted:
+        kind, place = one.variant.kind, posterior.table.place(*one.variant.parameter)
+        of, words = listed(one.variant.of), dict[str, str]()
+        if kind == "momentary commands":
+            words = _lost(fit, one.variant.of)
+        elif kind in ("health", "reversed commands"):
+            of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
+        found = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
+        if place is not None:
+            p = posterior.table.parameters[place]
+            low, high = around(float(posterior.z[place]), posterior.errors[place])
+            ends = np.clip([posterior.z[place], low, high], p.low, p.high)
+            value, low, high = (np.exp(ends) if p.is_log else ends).tolist()
+            found = replace(found, value=value, interval=(low, high), unit=p.unit)
+        yield found
+
+
+def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
+    """Return along which axis most of the command is lost between the rows of some logs, in words."""
+    vehicle, _ = fit.objective.table.model(fit.best.z)
+    shares = {
+        (lost_between_rows(one.thrust(vehicle.coefficients, axis, one.record.inputs)), axis.name, 1.0 / one.interval)
+        for one in fit.objective.logs
+        if one.log.file in files
+        for axis in fit.known.fitted
+        if one.layout.has(axis)
+    }
+    share, axis, rate = max(shares)
+    return {"share": percent(share), "axis": axis, "rate": significant(rate, 2)}
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

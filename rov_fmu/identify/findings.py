@@ -12,8 +12,10 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
+    ALARM,
     DISAGREEMENT,
     LEAST_TESTED,
     MOST_UNKNOWN,
@@ -26,6 +28,7 @@ from rov_fmu.identify.result import (
     Interval,
     Logging,
     Prediction,
+    Structure,
     half_width,
     relative_error,
 )
@@ -68,6 +71,7 @@ _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
+_SURE = 0.99
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
@@ -92,14 +96,17 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
             "many thrusters pulled together, and the battery"
         ),
         "unknown force": (
-            "{what} in {files}{since}. Check the thrusters for weed and damage, the tether, contact with the bottom or "
-            "a wall, a current, and the payload"
+            "{what} in {files}{since}. Check the tether, contact with the bottom or a wall, a current, and the payload"
         ),
         "beyond thrusters": (
             "{axes}: the logs have {largest} and the thrusters of rov.toml give {most} at full command. Check their "
             "thrust, directions and positions, and the units of the logs"
         ),
-        "change of thrust": "{what} in {files}{since}. Check the battery, and the thrusters for weed and damage",
+        "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
+        "structure": (
+            "the model lacks something along {axes}: its predictions over 10 s are {ratio} times the sensor's noise"
+        ),
+        **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
         "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
         "coupling left out": (
@@ -287,6 +294,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         found += [*_on_points(result)]
         if result.verdict.word == "do not use":
             found.append(Finding("do not use", result.axis.name))
+        if result.structure > ALARM:
+            found.append(Finding("structure", result.axis.name, names={"ratio": significant(result.structure, 2)}))
         if may_rock(identification.folder, result.axis):
             found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -305,6 +314,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             numbers = {"share": sensor.outliers}
             found.append(Finding("outliers", sensor.axis.name, names={"quantity": sensor.quantity}, numbers=numbers))
     found += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
+    found += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
         found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
     return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
@@ -681,6 +691,15 @@ def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
         surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in one.channels) for a in COUPLED_AXES)
         if yaw and (surge or sway):
             yield Finding("coupling left out", file=one.file)
+
+
+def _structure(one: Structure) -> Finding | None:
+    """Return the finding about a hypothesis that won; None where only its effect is told."""
+    if one.value > HYPOTHESES[one.kind].most:
+        return None
+    value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
+    odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
+    return Finding(one.kind, names={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
 
 
 def _logging(one: Logging) -> Finding | None:

@@ -16,17 +16,16 @@ from rov_fmu.identify.beginning import table_rows
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, Part, TableRow, cost, modelled
+from rov_fmu.identify.likelihood.hypotheses import AHEAD, SETTLING, unchanged
+from rov_fmu.identify.likelihood.objective import Objective, Part, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
-from rov_fmu.identify.result import Point, Prediction, least_error
+from rov_fmu.identify.result import Point, Prediction
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
 
-AHEAD, SETTLING = 10.0, 5.0
-"""Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
 INFORMED = 0.5
 """The least share of what all data tell of an axis that a fit must know to hold out the rest."""
 _CENTRAL = (0.5,)
@@ -199,7 +198,7 @@ def _predicted(
                 measured=measured,
                 predicted=measured - off,
                 deviation=deviation,
-                unchanged=_unchanged(record.time[at], measured, span),
+                unchanged=unchanged(record.time[at], measured, span),
                 noise=objective.table.get(z, "white noise", m.channel.quantity.name),
                 error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
@@ -235,36 +234,6 @@ def ahead(
     wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
     lost = wraps[objective.records[number].sensor]
     return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
-
-
-def _unchanged(time: Array, values: Array, span: float) -> float:
-    """Return the RMS change of a quantity since the start of its prediction."""
-    if span == inf:
-        return rms(values - values[0])
-    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
-    return rms(values - values[first])
-
-
-def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
-    """Return the largest error of the predictions over 10 s along each axis, relative to the noise of the sensor.
-
-    The fit has seen these data, so only its structure can be wrong. It is near 1 where it is right, even where noise
-    explains each next sample. Outliers do not count, and the noise is at least 1 % of the motion.
-    """
-    found: dict[Axis, float] = {}
-    for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        try:
-            off = objective.run(best.z, n, begin=SETTLING, span=AHEAD).innovations
-        except DivergedError:
-            off = np.full(len(record.time), inf)
-        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
-        for number, m in enumerate(one.measured):
-            at = usual & (record.sensor == number)
-            if at.sum() < 10:
-                continue
-            ratio = rms(off[at]) / least_error(m.noise, _unchanged(record.time[at], record.value[at], AHEAD))
-            found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), ratio)
-    return found
 
 
 # ---- Rows of tables --------------------------------------------------------------------------------------------------

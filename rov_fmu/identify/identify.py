@@ -12,10 +12,10 @@ from rov_fmu.equation.catalogue import AXES, SURGE, SWAY, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of
 from rov_fmu.identify.findings import beyond_thrusters, may_rock, told
 from rov_fmu.identify.given import Tests
-from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions, structure
+from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
@@ -73,18 +73,15 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors)
+    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors, fit.adopted)
     values = held_out_rows(fit.objective, fit.best)
-    errors = structure(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests)
     axes = []
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
         pushes = assess.pushes_of_thrusters(vehicle, of_file, axis)
-        one = _axis(
-            tests, fit, vehicle, coefficients, axis, out, predicted, slow, wrong, values, effects, errors, pushes
-        )
+        one = _axis(tests, fit, vehicle, coefficients, axis, out, predicted, slow, wrong, values, effects, pushes)
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
@@ -108,6 +105,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         agreement=fit.difference,
         unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
+        structures=tuple(structures_of(fit)),
     )
     return told(found)
 
@@ -124,7 +122,6 @@ def _axis(
     wrong: Sequence[Slip],
     values: Values,
     effects: Sequence[Effect],
-    errors: Mapping[Axis, float],
     pushes: Sequence[float],
 ) -> AxisResult:
     own, tested = tuple(p for p in predicted if p.axis is axis), fit.tested(axis)
@@ -134,7 +131,9 @@ def _axis(
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     if is_told and is_steady:
-        answers = assess.answers(fit.posteriors, axis, vehicle, pushes, fit.command_range[1], fits, least)
+        answers = assess.answers(
+            (*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least
+        )
     unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
@@ -153,9 +152,7 @@ def _axis(
         effects=acting,
         slips=[s for s in wrong if s.file in files],
         misfits=misfits,
-        structure=max(
-            (ratio for other, ratio in errors.items() if _share_thrusters(vehicle, axis, other)), default=0.0
-        ),
+        structure=fit.structure.get(axis, 0.0),
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
         is_assumed=bool(tests.description.assumed),
         difference=fit.difference,
@@ -169,13 +166,9 @@ def _axis(
         predictions=own,
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        structure=evidence.structure,
         lagged=assess.time_with_lag(fit.posteriors, axis, vehicle, pushes, fits) if answers else None,
     )
-
-
-def _share_thrusters(vehicle: Vehicle, one: Axis, other: Axis) -> bool:
-    """Return True if a thruster drives both axes: what it lacks in one of them it lacks in both."""
-    return one is other or any(t in vehicle.layout.thrusters_along(other) for t in vehicle.layout.thrusters_along(one))
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:

@@ -32,6 +32,9 @@ LEAST_TESTED = 0.05
 """A direction of an axis is tested by commands from this one."""
 LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
+USUAL, ALARM = 1.5, 3.0
+"""The largest error of predictions over 10 s that a right structure usually has, relative to the noise, and that from
+which the structure is clearly wrong."""
 DISAGREEMENT = 40.0
 """The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
 
@@ -173,6 +176,24 @@ class Effect:
     def kept(self) -> bool:
         """True if it is reported. The vehicle file has those of the vehicle, but not those of water or sensors."""
         return self.evidence > KEPT and self.value > self.least
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A hypothesis about the structure of the model that won, so that it is part of the model."""
+
+    kind: str
+    """Its key in HYPOTHESES (likelihood/hypotheses.py)."""
+    of: str
+    """The thrusters or files in words; empty where it is about all of them."""
+    probability: float
+    """Against the model without it."""
+    value: float = nan
+    """The number of its parameter; NaN if it has none."""
+    interval: Interval = (nan, nan)
+    unit: str = "1"
+    words: tuple[tuple[str, str], ...] = ()
+    """What else its sentence needs."""
 
 
 @dataclass(frozen=True)
@@ -367,6 +388,8 @@ class AxisResult:
     """The time to 63 % of the steady velocity at half command with the lag of the thrusters, s; None without a lag."""
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
+    structure: float = 0.0
+    """The error over 10 s of predictions by the fit to all data, relative to the noise of the sensor."""
 
     @property
     def main(self) -> Prediction | None:
@@ -408,6 +431,8 @@ class Identification:
     """The slow force along each moving axis of each log."""
     slips: tuple[Slip, ...] = ()
     """The mistakes that would explain a file better."""
+    structures: tuple[Structure, ...] = ()
+    """The hypotheses about the structure that won."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
     """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()

@@ -9,6 +9,7 @@ from rov_fmu.identify.result import (
     DISAGREEMENT,
     LEAST_TESTED,
     MOST_UNKNOWN,
+    USUAL,
     Answer,
     Coefficient,
     Disturbance,
@@ -190,7 +191,7 @@ RULES = (
     Rule(
         "errors over 10 s of the fit to all data, relative to σ",
         lambda e: e.structure,
-        1.5,
+        USUAL,
         None,
         "Predictions over 10 s are off by {size} times the noise of the sensor, so the model lacks something.",
         unit="1",

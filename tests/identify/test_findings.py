@@ -31,6 +31,7 @@ from rov_fmu.identify.result import (
     NextTest,
     Point,
     Slip,
+    Structure,
     UnknownForce,
     Verdict,
     coverage_of,
@@ -114,7 +115,32 @@ OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -
 SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
+HEALTH = Structure("health", "l", 0.999, 0.5, (0.48, 0.52))
+LOST = Structure("momentary commands", "a.csv", 1.0, words=(("share", "30%"), ("axis", "yaw"), ("rate", "10")))
+
+
+def structured(one: Structure, **changes: Any) -> Identification:
+    return quiet(structures=(replace(one, **changes),))
+
+
 CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
+    (
+        "structure",
+        surge(structure=5.0),
+        "lacks something along surge: its predictions over 10 s are 5.0 times the",
+        quiet(),
+    ),
+    (
+        "health",
+        structured(HEALTH),
+        "thruster l: its force is 50% of that of a whole one",
+        structured(HEALTH, value=0.8),
+    ),
+    ("momentary commands", structured(LOST), "about 30% of the yaw command is lost between its rows (10 per", quiet()),
+    ("reversed commands", quiet(structures=(Structure("reversed commands", "l", 0.97),)), "(probability 97%)", quiet()),
+    ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
+    ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
+    ("slew limit", structured(HEALTH, kind="slew limit", value=0.8, unit="1/s"), "at most 0.80 1/s, where 1", quiet()),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),
     ("second start", quiet(agreement=41.0), "two fits from different starts ended at", quiet(agreement=39.0)),

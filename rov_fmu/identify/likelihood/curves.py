@@ -100,8 +100,9 @@ class Shapes:
         names, changed = [*layout.inputs], dict[int, Array]()
         for name, curve in layout.curve_of.items():
             place = names.index(f"u_{name}")
-            changed[place] = self.commands(curve.name, inputs[:, place]).T
-        found = np.empty((*np.broadcast_shapes(*(some.shape[:-1] for some in changed.values())), *inputs.shape))
+            changed[place] = self.commands(curve.name, inputs[..., place].T).T
+        sets = np.broadcast_shapes(*(some.shape[:-1] for some in changed.values()))
+        found = np.empty((*sets, *inputs.shape[-2:]))
         found[...] = inputs
         for place, commands in changed.items():
             found[..., place] = commands

@@ -96,6 +96,8 @@ class Parameters:
     """The standard deviation of the white noise of each sensor."""
     noise: tuple[Slow, ...]
     """The coloured noise of each sensor."""
+    short: tuple[Slow, ...] = ()
+    """The force along each axis of what momentary commands lack between their rows, N or N m. Empty: there is none."""
     levers: tuple[tuple[Number, ...], ...] = ()
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
     lags: tuple[Number | None, ...] = ()
@@ -114,6 +116,11 @@ class Parameters:
     """The rows of inputs, if they are others than those of the record: sets x rows x inputs, or equal for all sets."""
     count: int = 1
     """The number of sets."""
+
+    @property
+    def slow(self) -> list[Slow]:
+        """All slow and short processes, in the order of filter.c."""
+        return [*self.forces, *(self.short or [Slow()] * len(self.forces)), self.gain, *self.drifts, *self.noise]
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +186,8 @@ class Filter:
         self._where = np.array(_where(layout, self._places), np.intc)
         self.vehicle_states = [*layout.state]
         first = len(self.vehicle_states) + MOST_SENSORS  # after what the sensors with a lag measure
-        self.force, self.gain, self.drift = first, first + axes, first + axes + 1
+        self.force, self.short = first, first + axes
+        self.gain, self.drift = self.short + axes, self.short + axes + 1
         self.noise = self.drift + len(DRIFTS)
         """The places of the slow processes among the states of the filter."""
 
@@ -275,12 +283,12 @@ class Filter:
             if name in self._places:
                 at[self._places[name]] = value
         rest = MOST_SENSORS - len(parameters.noise)
-        slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise, *[Slow()] * rest]
+        slow = [*parameters.slow, *[Slow()] * rest]
         levers = [*parameters.levers, *[AT_ORIGIN] * (MOST_SENSORS - len(parameters.levers))]
         lags = [lag if lag is not None else 0.0 for lag in parameters.lags]
         units: list[Number] = [1.0] * self.states
         axes = [form.axis.name for form in self.layout.axes]
-        for first, names in ((0, self.vehicle_states), (self.force, axes)):
+        for first, names in ((0, self.vehicle_states), (self.force, axes), (self.short, axes)):
             units[first : first + len(names)] = [parameters.units.get(name, 1.0) for name in names]
         columns = [
             *at,
@@ -299,9 +307,8 @@ class Filter:
 
     def _record(self, record: Record, parameters: Parameters) -> _Record:
         """Return the struct `record`, which is made once for each log and set of states with a covariance."""
-        slow = [*parameters.forces, parameters.gain, *parameters.drifts, *parameters.noise]
         lagging = [lag is not None for lag in parameters.lags] or [False] * len(record.sensors)
-        acting = (*lagging, *(bool(np.all(one.size > 0.0)) for one in slow))
+        acting = (*lagging, *(bool(np.all(one.size > 0.0)) for one in parameters.slow))
         found = self._records.get((record, acting))
         if found is None:  # another thread may have made it meanwhile, and its arrays must stay alive
             found = self._records.setdefault((record, acting), self._arrays(record, acting))

@@ -2,7 +2,7 @@
 samples, and the posterior there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -11,11 +11,12 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
+from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, structure, with_shared
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
+from rov_fmu.identify.likelihood.parameters import Beginning, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledLog
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, minimise
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
@@ -23,8 +24,6 @@ from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
-_QUICK = 8.0
-"""The reduction of J by new derivatives at which a quick fit ends."""
 STARTS: tuple[Mapping[str, float], ...] = (
     {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
     {"slow": 1.0, "white": 2.0},
@@ -33,6 +32,8 @@ STARTS: tuple[Mapping[str, float], ...] = (
 
 With much noise, J has few minima far from the data.
 """
+_QUICK = 8.0
+"""The reduction of J by new derivatives at which a quick fit ends."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -53,6 +54,12 @@ class Fit:
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
     """How much larger J is at the end of the second start."""
+    adopted: tuple[Adopted, ...] = ()
+    """The hypotheses about the structure that won."""
+    rivals: tuple[Posterior, ...] = ()
+    """Fits with others, which the data do not exclude."""
+    structure: Mapping[Axis, float] = field(default_factory=dict)
+    """The error of predictions over 10 s along each axis or one that shares thrusters, relative to the noise."""
 
     @property
     def posteriors(self) -> tuple[Posterior, Posterior]:
@@ -96,10 +103,9 @@ def fit_all(
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends.
     """
-    noises = sorted({row.noise for row in rows})
-    table = table_of(known, logs, noises)
-    quick = Objective(table, logs, rows, thinned=True)
-    full = Objective(table, logs, rows)
+    model = Model(known, logs, rows)
+    quick, full = model.objective(thinned=True), model.objective()
+    table = full.table
     starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
     ends: list[Minimum] = []
     for n, start in enumerate(starts):
@@ -118,13 +124,17 @@ def fit_all(
     ends.sort(key=lambda end: end.value)
 
     show = moving(on_progress, "all samples", 0.3, 0.7)
-    near = minimise(full, _scaled(full, ends[0].z), show, last=False)
+    near = minimise(full, scaled(full, ends[0].z), show, last=False)
+    on_progress("hypotheses", 0.65)
+    best_model = explained(model, full, near, _search)
+    model, full, near = best_model.model, best_model.objective, best_model.minimum
+    known = model.known
     for n, curve in enumerate(known.measured_curves):
-        other, needed = replace(known, bent=known.bent | {curve}), _evidence(full, near.value, near.information) + KEPT
-        objective = Objective(table_of(other, logs, noises), logs, rows)
+        other, needed = replace(known, bent=known.bent | {curve}), evidence(full, near.value, near.information) + KEPT
+        objective = replace(model, known=other).objective()
 
         def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
-            return _evidence(objective, value, information) > needed
+            return evidence(objective, value, information) > needed
 
         low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
         show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
@@ -133,18 +143,33 @@ def fit_all(
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     on_progress("exact derivatives", 0.8)
-    best = minimise(full, _scaled(full, near.z), most=0)
+    best = minimise(full, scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
-    apart = np.abs(ends[-1].z - ends[0].z) / np.maximum(posterior.errors, _SAME * full.deviation)
-    if max((apart[n] for n in posterior.of_vehicle), default=0.0) < 2.0:
+    apart = [
+        abs(ends[-1].z[place] - ends[0].z[place]) / max(posterior.errors[n], _SAME * full.deviation[n])
+        for n in posterior.of_vehicle
+        if (place := table.place(*full.table.parameters[n].key)) is not None
+    ]
+    if max(apart, default=0.0) < 2.0 or best_model.adopted:  # other vehicles had the wrong structure
         difference = 0.0
     file, least = full, best
     if known.bent:
-        plain = replace(known, bent=frozenset[str]())
-        file = Objective(table_of(plain, logs, noises), logs, rows)
+        file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
         least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88), enough=_QUICK)
-    return Fit(known, full, best, posterior, without_weak_effects(file, least), float(difference))
+    errors = with_shared(known.layout, structure(full, best))
+    of_file = without_weak_effects(file, least)
+    return Fit(
+        known,
+        full,
+        best,
+        posterior.widened(errors),
+        replace(of_file, posterior=of_file.posterior.widened(errors)),
+        float(difference),
+        best_model.adopted,
+        best_model.rivals,
+        errors,
+    )
 
 
 def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:
@@ -166,6 +191,13 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     return min(end, other, key=lambda found: found.value)
 
 
+def _search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
+    """Return the minimum of J of thinned logs from the first start, in which some parameters have other numbers."""
+    start = start_of(objective, STARTS[0])
+    start[[*numbers]] = [*numbers.values()]
+    return _least(objective, start, lambda _: None, _QUICK)
+
+
 def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
     """Return the means of the priors, but for some kinds of parameters, which are so many deviations above them."""
     kinds = [parameter.kind.split()[0] for parameter in objective.table.parameters]
@@ -176,30 +208,3 @@ def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
 def _is_loud(table: Table, z: Array) -> bool:
     """Return True if a slow process is much larger than usual."""
     return any(p.is_slow_size and z[n] - p.mean > _LOUD for n, p in enumerate(table.parameters))
-
-
-def _evidence(objective: Objective, value: float, information: Array) -> float:
-    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
-    widths = np.diag(objective.deviation)
-    return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
-
-
-def _scaled(objective: Objective, z: Array) -> Array:
-    """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
-
-    Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
-    The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
-    """
-    kinds = np.array([p.kind for p in objective.table.parameters])
-    loads = kinds == "load"
-    no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
-    direction = np.isin(kinds, ("thrust scale", "inertia", "quadratic drag", "linear drag")) * 1.0
-    direction[loads] = (z - no_load)[loads]
-    if not direction.any():
-        return z
-    weight = direction / objective.deviation**2
-    change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
-    moved = z + direction * np.where(loads, np.expm1(change), change)  # the others are logarithms
-    moved = np.clip(moved, objective.low, objective.high)
-    before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
-    return moved if after < before else z

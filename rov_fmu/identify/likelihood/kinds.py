@@ -18,6 +18,8 @@ PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
 SLOW = {"slow force": 8.0, "slow gain": 60.0, "slow velocity": 8.0}
 """The time constants of the slow processes, s."""
+SIZES = (*SLOW, "short force")
+"""The kinds of the sizes of all processes."""
 
 
 @dataclass(frozen=True)
@@ -205,6 +207,12 @@ KINDS = {
         1e-7,
         0.1,
     ),
+    "short force": Kind(
+        Prior("short_force", 2.5, "ln of the force that momentary commands lack", "seen in the changes between rows"),
+        is_log=True,
+        of_motion=False,
+        low=log(1e-6),
+    ),
     "slow gain": _slow(
         Prior(
             "slow_gain",
@@ -221,6 +229,38 @@ KINDS = {
         0.001,
         1e-7,
         0.3,
+    ),
+    "health": Kind(
+        None,
+        "force of the thruster relative to a whole one",
+        keys=("health",),
+        mean=0.75,
+        deviation=0.5,
+        low=0.0,
+        high=1.0,
+        null=1.0,
+    ),
+    "command limit": Kind(
+        None,
+        "command beyond which the thrusters push no more",
+        ". The vehicle file does not have it",
+        mean=0.8,
+        deviation=0.3,
+        low=0.1,
+        high=1.0,
+        null=1.0,
+    ),
+    "slew limit": Kind(
+        None,
+        "rate at which commands act at most",
+        ". The vehicle file does not have it",
+        is_log=True,
+        mean=log(2.0),
+        deviation=1.5,
+        low=log(0.05),
+        high=log(50.0),
+        null=log(50.0),
+        unit="1/s",
     ),
     "white noise": Kind(
         Prior("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),

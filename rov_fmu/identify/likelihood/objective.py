@@ -67,7 +67,7 @@ class TableRow:
         """Return True if a parameter changes the value by the model."""
         parts = {self.subject.name}
         if not isinstance(self.subject, Curve):
-            parts |= {"", *(thruster.curve for thruster in layout.thrusters_along(self.subject))}
+            parts |= {"", *(name for t in layout.thrusters_along(self.subject) for name in (t.curve, t.name))}
         return parameter.of_motion and parameter.of in parts
 
 
@@ -262,12 +262,12 @@ class Objective:
         one = self.logs[number]
         if parameter.log is not None:
             return parameter.of == one.log.file
-        axes, curves = one.layout.by_name, {curve.name for curve in one.layout.curves}
+        parts = {*one.layout.curves_by_name, *one.layout.curve_of}
         if parameter.kind == "row noise" or parameter.low == parameter.high:
             return False
         if parameter.kind in ("white noise", "coloured noise", "correlation time"):
             return parameter.of in {m.channel.quantity.name for m in one.measured}
-        return parameter.of in {"", "horizontal", *axes, *curves}
+        return parameter.of in {"", "horizontal", *one.layout.by_name, *parts}
 
     # ---- All data ----
 

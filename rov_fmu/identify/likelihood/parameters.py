@@ -13,13 +13,15 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
-from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SLOW, Coordinate
+from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SIZES, SLOW, Coordinate
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
+_LEAST_SHORT = 1e-3
+"""The least force between momentary commands, relative to full thrust."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
 CURRENT = ("to the north", "to the east")
@@ -49,14 +51,19 @@ class Parameter(Coordinate):
     """The index of the log that alone has it."""
 
     @property
+    def key(self) -> tuple[str, str, str]:
+        """What no other parameter of a table has: the kind, what has it, and which part."""
+        return self.kind, self.of, self.part
+
+    @property
     def is_effect(self) -> bool:
         """True for an effect of the motion, which may be absent from the vehicle."""
         return self.null is not None and self.of_motion
 
     @property
     def is_slow_size(self) -> bool:
-        """True for the size of a slow process."""
-        return self.kind in SLOW
+        """True for the size of a slow or short process."""
+        return self.kind in SIZES
 
     @property
     def step(self) -> float:
@@ -100,7 +107,7 @@ class Table:
 
     @cached_property
     def _places(self) -> dict[tuple[str, str, str], int]:
-        return {(p.kind, p.of, p.part): n for n, p in enumerate(self.parameters)}
+        return {p.key: n for n, p in enumerate(self.parameters)}
 
     # The coordinates of p parameters are an array of p numbers, or of p x n for n sets of parameters. All that follows
     # from them is then a number, or an array of n.
@@ -119,6 +126,8 @@ class Table:
             self._axis(found, z, form)
         for curve in self.layout.curves:
             self._curve(found, z, curve)
+        for thruster, name in self.layout.health.items():
+            found[name] = self.get(z, "health", thruster, default=found[name])
         for part, key in CENTRE.items():
             if key in found:
                 found[key] = found[key] + self.get(z, "centre of buoyancy", "", part)
@@ -238,6 +247,9 @@ class Table:
             coefficients=found,
             forces=tuple(Slow(units[a.name] * self.get(z, "slow force", a.name), SLOW["slow force"]) for a in axes),
             units=units,
+            short=tuple(Slow(units[a.name] * self.get(z, "short force", a.name), 0.5 * one.interval) for a in axes)
+            if one.is_momentary
+            else (),
             gain=Slow(whole, SLOW["slow gain"]),
             drifts=(along, along, down if is_inside else Slow()),
             white=tuple(white),
@@ -246,9 +258,31 @@ class Table:
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
             offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
             width=self.get(z, "logging width", file),
-            inputs=shapes.inputs(layout, one.record.inputs),
+            inputs=shapes.inputs(layout, self.followed(z, one)),
             count=1 if z.ndim == 1 else z.shape[1],
         )
+
+    def followed(self, z: Array, one: SampledLog) -> Array:
+        """Return the inputs that thrusters can follow, by a limit and a slew limit: (sets x) rows x inputs."""
+        limit, slew = (self.get(z, kind, default=None) for kind in ("command limit", "slew limit"))
+        inputs = one.record.inputs
+        if one.log.follows_axis or (limit is None and slew is None):
+            return inputs
+        places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
+        found = np.array(np.broadcast_to(inputs, (*np.shape(z)[1:], *inputs.shape)))
+        values = found[..., places]
+        if limit is not None:
+            most = np.reshape(limit, (*np.shape(limit), 1, 1))
+            values = np.clip(values, -most, most)
+        if slew is not None:
+            steps = np.diff(one.record.told)
+            now = values[..., 0, :]
+            for row, step in enumerate(steps.tolist()):  # the mean over a row is that at its middle
+                most = np.reshape(slew, (*np.shape(slew), 1)) * step
+                before, now = now, now + np.clip(values[..., row, :] - now, -most, most)
+                values[..., row, :] = 0.5 * (before + now)
+        found[..., places] = values
+        return found
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
@@ -284,6 +318,8 @@ class Beginning:
     """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
     has_times: bool = False
     """True if there are tables of time constants, which contain the lag."""
+    assumed: tuple[tuple[str, str], ...] = ()
+    """The kinds of the parameters of hypotheses about the structure, and what has each of them."""
     bent: frozenset[str] = frozenset()
     """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
 
@@ -332,6 +368,8 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
     for number, one in enumerate(logs):
         yield from _of_one_log(one, number, make)
     yield from _of_noise(known, logs, make)
+    for kind, of in known.assumed:
+        yield from make(kind, of)
     for name in row_noises:
         yield from make("row noise", name)
 
@@ -415,8 +453,12 @@ def _of_axes(known: Beginning, make: Make) -> Iterator[Parameter]:
 
 def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
     file, half = one.log.file, 0.5 * one.interval
-    yield from make("logging offset", file, mean=-half, deviation=max(half, 0.005), log=number)
-    yield from make("logging width", file, log=number)
+    if one.is_momentary:
+        yield from make("logging offset", file, mean=-half, deviation=max(0.5 * half, 0.005), log=number)
+        yield from make("logging width", file, mean=1.0, low=1.0, log=number)
+    else:
+        yield from make("logging offset", file, mean=-half, deviation=max(half, 0.005), log=number)
+        yield from make("logging width", file, log=number)
     if one.has_positions or one.has_velocities:
         for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
             yield from make("current", file, part, log=number)
@@ -442,6 +484,10 @@ def _of_noise(known: Beginning, logs: Sequence[SampledLog], make: Make) -> Itera
     for axis in (form.axis for form in known.layout.axes):
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield from make("slow force", axis.name)
+            momentary = [one for one in logs if one.is_momentary and axis.name in one.layout.by_name]
+            if momentary:
+                size = max(one.between_rows(known.coefficients, axis) for one in momentary) / known.full[axis.name]
+                yield from make("short force", axis.name, mean=log(max(size, _LEAST_SHORT)))
     if logs and not known.layout.fins:
         yield from make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):

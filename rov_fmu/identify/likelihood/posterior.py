@@ -4,22 +4,27 @@ The posterior is normal in the coordinates of the parameters, with the inverse o
 covariance. Intervals take Student's distribution with 10 degrees of freedom, because the noise is estimated as well.
 """
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from math import log
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.result import Interval
+from rov_fmu.identify.result import USUAL, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
 
 DEGREES_OF_FREEDOM = 10.0
 QUANTILE = quantile(DEGREES_OF_FREEDOM)
 """Half the width of a 95 % interval in standard errors."""
+_ALIKE = 6.0
+"""The number of samples in turn in which the structure lacks the same: those of about half a second at 10 Hz."""
+_WORST = 1e3
+"""The largest error of predictions that counts. It is infinite where a motion diverges."""
 _LEAST = 1e-10
 """The least eigenvalue of the scaled information: what is below is rounding."""
 
@@ -46,6 +51,30 @@ class Posterior:
         covariance = np.zeros_like(information)
         covariance[np.ix_(free, free)] = root @ root.T
         return cls(table, z, covariance, frozenset(absent))
+
+    def widened(self, ratios: Mapping[Axis, float]) -> "Posterior":
+        """Return the posterior with larger errors of what concerns axes whose structure is wrong.
+
+        `ratios` are the errors R of predictions along each axis, relative to the noise. As with Birge's ratio (Birge
+        1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1): what the structure
+        lacks is the same in n samples in turn, while noise differs from sample to sample.
+        """
+        layout, worst = self.table.layout, max(ratios.values(), default=0.0)
+        of = {axis.name: ratio for axis, ratio in ratios.items()}
+        for t in layout.thrusters:
+            along = [ratio for axis, ratio in ratios.items() if t in layout.thrusters_along(axis)]
+            for name in (t.name, t.curve):
+                of[name] = max([of.get(name, 0.0), *along])
+        parameters = self.table.parameters
+        errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
+        factors = np.sqrt(1.0 + np.where(errors > USUAL, _ALIKE * (errors**2 - 1.0), 0.0))
+        if np.all(factors == 1.0):
+            return self
+        prior = np.diag(1.0 / np.array([p.deviation for p in parameters]) ** 2)
+        free = np.ix_(*[[n for n in range(len(parameters)) if n not in self.absent]] * 2)
+        data = np.zeros_like(prior)
+        data[free] = np.linalg.inv(self.covariance[free]) - prior[free]
+        return self.of(self.table, self.z, 2.0 * (prior + data / np.outer(factors, factors)), self.absent)
 
     @cached_property
     def errors(self) -> Array:

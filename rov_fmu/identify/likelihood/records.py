@@ -63,6 +63,24 @@ class SampledLog:
     """The same with fewer samples."""
     interval: float
     """The usual time between two rows of commands, s."""
+    is_momentary: bool = False
+    """True if its rows have the commands of a moment, between which they follow a straight line, on the average."""
+
+    def with_inputs(self, inputs: Array) -> "SampledLog":
+        """Return the log with other commands in its rows."""
+        record, thinned = (replace(some, inputs=inputs) for some in (self.record, self.thinned))
+        return replace(self, record=record, thinned=thinned)
+
+    def refined(self, interval: float) -> "SampledLog":
+        """Return the log with rows that are at most so far apart, s, and have the same commands."""
+        told, since = self.record.told, self.record.since
+        counts = np.maximum(np.ceil(np.diff(told) / interval), 1.0).astype(int)
+        rows = np.append(np.repeat(np.arange(len(counts)), counts), len(told) - 1)
+        parts = np.concatenate([*(np.arange(count) / count for count in counts.tolist()), [0.0]])
+        later = told[rows] + parts * np.append(np.diff(told), 0.0)[rows]
+        earlier = np.where(parts > 0.0, later, since[rows])
+        made = {"told": later, "since": earlier, "inputs": self.record.inputs[rows]}
+        return replace(self, record=replace(self.record, **made), thinned=replace(self.thinned, **made))
 
     @property
     def has_positions(self) -> bool:
@@ -85,6 +103,16 @@ class SampledLog:
         vehicle, names, usual = self.vehicle(coefficients), [*self.layout.inputs], self.layout.usual_inputs
         forces = (vehicle.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
         return np.array([vehicle.along(axis, F) for F in forces])
+
+    def between_rows(self, coefficients: Mapping[str, float], axis: Axis) -> float:
+        """Return the usual size of the thrust along an axis that lines between momentary commands lack, N or N m.
+
+        Second differences have 1.5 times the variance of what changes from row to row, and lines lack 5/3 of it: what
+        the rows have of it, and what passes between them. Few large steps do not count.
+        """
+        thrust = self.thrust(coefficients, axis, self.record.inputs)
+        beside = thrust[1:-1] - 0.5 * (thrust[2:] + thrust[:-2])
+        return float(np.sqrt(5.0 / 3.0 / 1.5) * 1.4826 * np.median(np.abs(beside)))
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

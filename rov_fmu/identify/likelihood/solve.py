@@ -242,3 +242,30 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
             break
         moving &= ~beyond
     return z + change
+
+
+def evidence(objective: Objective, value: float, information: Array) -> float:
+    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
+    widths = np.diag(objective.deviation)
+    return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
+
+
+def scaled(objective: Objective, z: Array) -> Array:
+    """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
+
+    Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
+    The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
+    """
+    kinds = np.array([p.kind for p in objective.table.parameters])
+    loads = kinds == "load"
+    no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
+    direction = np.isin(kinds, ("thrust scale", "inertia", "quadratic drag", "linear drag")) * 1.0
+    direction[loads] = (z - no_load)[loads]
+    if not direction.any():
+        return z
+    weight = direction / objective.deviation**2
+    change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
+    moved = z + direction * np.where(loads, np.expm1(change), change)  # the others are logarithms
+    moved = np.clip(moved, objective.low, objective.high)
+    before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
+    return moved if after < before else z

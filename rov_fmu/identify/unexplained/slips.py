@@ -29,8 +29,9 @@ from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
+from rov_fmu.identify.likelihood.hypotheses import Adopted, Model
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import Beginning, table_of
+from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
@@ -87,10 +88,18 @@ Hypothesis = frozenset[tuple[_Compared, float]]
 """Channels with their scales."""
 
 
-def slips(tests: Tests, known: Beginning, objective: Objective, best: Array, errors: Array) -> tuple[Slip, ...]:
+def slips(
+    tests: Tests,
+    known: Beginning,
+    objective: Objective,
+    best: Array,
+    errors: Array,
+    adopted: Sequence[Adopted] = (),
+) -> tuple[Slip, ...]:
     """Return the mistakes that explain the logs much better. `best` is where J is least for the files as they stand.
 
-    `errors` are the standard errors there. Where several explanations are about as good, each is told for its files.
+    `errors` are the standard errors there, and `adopted` has the hypotheses about the structure that won. Where several
+    explanations are about as good, each is told for its files.
     """
     compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
     inertias = {*_inertias(known, objective, best, errors)}
@@ -102,7 +111,7 @@ def slips(tests: Tests, known: Beginning, objective: Objective, best: Array, err
 
     def least(hypothesis: Hypothesis, start: Array | None = None) -> float:
         unlikely = sum(_lightness(hypothesis, *one) for one in inertias) + _drag(hypothesis, compared, known.guessed)
-        return _least(tests, hypothesis, start) + unlikely
+        return _least(tests, adopted, hypothesis, start) + unlikely
 
     as_it_is, J = least(frozenset(), best), dict[Hypothesis, float]()
     while untried:  # The best explanation may need fewer channels than it has.
@@ -180,12 +189,15 @@ def _hypotheses(likely: Mapping[_Compared, Sequence[float]]) -> Iterator[Hypothe
         yield frozenset((one, scales[0]) for one, scales in likely.items())
 
 
-def _least(tests: Tests, hypothesis: Hypothesis, start: Array | None = None) -> float:
+def _least(tests: Tests, adopted: Sequence[Adopted], hypothesis: Hypothesis, start: Array | None = None) -> float:
     """Return the least J of thinned logs, as a density of the values in the files; inf if no simulation is finite."""
     scales = {one.channel: scale for one, scale in hypothesis}
     logs = [_corrected(one, scales) for one in tests.folder.logs]
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
-    quick = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows, thinned=True)
+    model = Model(known, recorded, rows)
+    for one in adopted:
+        model = model.applied(one.variant)
+    quick = model.objective(thinned=True)
     try:
         value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
     except DivergedError:

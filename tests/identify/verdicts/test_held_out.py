@@ -8,9 +8,10 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.held_out import Knowledge, held_out, predictions, structure, unseen_current
+from rov_fmu.identify.held_out import Knowledge, held_out, predictions, unseen_current
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.hypotheses import structure
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.solve import minimise

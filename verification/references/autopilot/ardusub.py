@@ -1,9 +1,9 @@
 """The law by which ArduSub holds depth, heading and attitude, with its default gains, filters and limits.
 
 It follows ArduPilot's sources: `AP_Motors6DOF.cpp` (the factors of the frame `vectored_6dof`, and the mixing),
-`AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp` (the cascades). It leaves out the noise of sensors, the
-filter that estimates the state, and the shaping of targets. `fmu_src/live/hold.js`, of the page that flies, is the same
-law in JavaScript, and the tests compare the two.
+`AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp` (the cascades). It leaves out the filter that estimates
+the state, and the shaping of targets; `flights.py` flies it with noisy estimates, and writes logs.
+`fmu_src/live/hold.js`, of the page that flies, is the same law in JavaScript, and the tests compare the two.
 """
 
 from dataclasses import dataclass, field
@@ -20,6 +20,8 @@ VECTORED_6DOF = (
     (-1, 1, 0, -1, 0, 0),
 )
 """Roll, pitch, yaw, throttle, forward and lateral factor of each motor."""
+VECTORED = (*VECTORED_6DOF[:4], (1, 0, 0, -1, 0, 0), (-1, 0, 0, -1, 0, 0))
+"""The same of the frame of six motors."""
 STICK = 0.8
 """The time constant with which a stick moves, s. After a jump to full thrust ahead, the vehicle would turn over before
 the integrators of the law hold its bow down."""
@@ -91,6 +93,7 @@ class Hold:
     heading: float = 0.0
     """The heading to hold, rad."""
     throttle: float = 0.0
+    frame: tuple[tuple[int, ...], ...] = VECTORED_6DOF
     roll: Pid = field(default_factory=lambda: Pid(0.135, 0.09, 0.0036, 0.444, 30.0, 0.0, 30.0))
     pitch: Pid = field(default_factory=lambda: Pid(0.135, 0.09, 0.0036, 0.444, 30.0, 0.0, 30.0))
     yaw: Pid = field(default_factory=lambda: Pid(0.18, 0.018, 0.0, 0.222, 5.0, 0.0, 5.0))
@@ -111,8 +114,8 @@ class Hold:
             for pid, target, rate in zip((self.roll, self.pitch, self.yaw), wanted, motion.rates, strict=True)
         )
         throttle = self._throttle(motion, dt)
-        turns = [roll * f[0] + pitch * f[1] + throttle * f[3] for f in VECTORED_6DOF]
-        moves = [yaw * f[2] + forward * f[4] + lateral * f[5] for f in VECTORED_6DOF]
+        turns = [roll * f[0] + pitch * f[1] + throttle * f[3] for f in self.frame]
+        moves = [yaw * f[2] + forward * f[4] + lateral * f[5] for f in self.frame]
         most_turn, most_move = max(1.0, *map(abs, turns)), max(1.0, *map(abs, moves))
         return [
             max(-1.0, min(1.0, turn / most_turn + move / most_move)) for turn, move in zip(turns, moves, strict=True)

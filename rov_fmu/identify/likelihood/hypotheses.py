@@ -1,0 +1,500 @@
+"""What the structure of the model may lack: one table of hypotheses, which are compared by J.
+
+Noise hides a wrong structure: a slow force, a slow gain and coloured noise explain each next sample, and the
+innovations look right. Predictions over 10 s do not: relative to the noise of the sensor, their errors are near 1 where
+the structure is right. Above ALARM, each hypothesis changes the model, J is minimised anew, and 2 ln of the Bayes
+factor (Laplace approximation), with the prior probability, decides. What wins is part of the model.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+from math import exp, inf, log, nan
+
+import numpy as np
+
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.curves import NO_SHAPES
+from rov_fmu.identify.likelihood.filter import DivergedError
+from rov_fmu.identify.likelihood.kinds import SIZES
+from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow
+from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, scaled
+from rov_fmu.identify.result import ALARM, least_error
+from rov_fmu.tank.arrays import Array, rms
+from rov_fmu.tank.clocks import first_in_each
+
+WINS, CLOSE = 6.0, 10.0
+"""The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
+AHEAD, SETTLING = 10.0, 5.0
+"""Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
+_BETWEEN = 0.005
+"""The least share of a command that must be lost between the rows of a log for it to be momentary."""
+_LEAST_COMMAND = 0.05
+"""The least change of a command that counts."""
+_FITTED = 2
+"""The most hypotheses that change the thrust that are fitted."""
+_STEP = 0.5
+"""The time between two values of the unknown force, s."""
+_SHARES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
+"""The shares of a change of the thrust of which the best is taken."""
+_SMALL = 1e-3
+"""An unknown force, relative to full thrust, that explains itself."""
+_MOST = 3
+"""The most hypotheses that may hold at once."""
+_FINEST = 0.05
+"""The time between two rows within which a slew limit moves a command, s."""
+
+Logs = Sequence[SampledLog]
+Of = tuple[str, ...]
+Change = Callable[[Beginning, Logs, Of], tuple[Beginning, Logs]]
+Search = Callable[[Objective, Mapping[int, float]], Minimum]
+"""A function that minimises J of thinned logs from a start in which some parameters, by their places, have numbers."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """How the model may be wrong, and what changes it."""
+
+    probability: float
+    """The prior probability of all its variants together: how many folders have it."""
+    variants: Callable[[Beginning, Logs], Iterator[Of]]
+    """What may have it: thrusters, or files."""
+    change: Change
+    """The model with it."""
+    starts: tuple[float, ...] = ()
+    """The coordinates from which its parameter begins; empty if it has none."""
+    sentence: str = ""
+    """What is told, with `of`, the thrusters or files, `value`, the number of the parameter, and `odds`."""
+    most: float = inf
+    """A number of its parameter above this one is told as an effect alone."""
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A hypothesis about some thrusters or files."""
+
+    kind: str
+    """Its key in HYPOTHESES, which is also the kind of its parameter."""
+    of: Of
+
+    @property
+    def parameter(self) -> tuple[str, str]:
+        """The kind of its parameter, and what has it."""
+        return self.kind, self.of[0] if self.of else ""
+
+    def applied(self, known: Beginning, logs: Logs) -> tuple[Beginning, Logs]:
+        """Return what is known before the fit, and the logs, if this is so."""
+        return HYPOTHESES[self.kind].change(known, logs, self.of)
+
+
+# ---- The changes -----------------------------------------------------------------------------------------------------
+
+
+def _with_parameter(kind: str) -> Change:
+    def change(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+        return replace(known, assumed=(*known.assumed, (kind, of[0] if of else ""))), logs
+
+    return change
+
+
+def _momentary(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+    return known, [replace(one, is_momentary=one.is_momentary or one.log.file in of) for one in logs]
+
+
+def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
+    """Return the change of the commands of some thrusters to those of others, with a sign."""
+
+    def change(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+        others, sign = places(of)
+        found = []
+        for one in logs:
+            inputs, names = one.record.inputs.copy(), [*one.layout.inputs]
+            for thruster, other in zip(of, others, strict=True):
+                if {f"u_{thruster}", f"u_{other}"} <= {*names}:
+                    inputs[:, names.index(f"u_{thruster}")] = sign * one.record.inputs[:, names.index(f"u_{other}")]
+            found.append(one.with_inputs(inputs))
+        return known, found
+
+    return change
+
+
+def _slewing(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+    known, logs = _with_parameter("slew limit")(known, logs, of)
+    return known, [one if one.log.follows_axis else one.refined(_FINEST) for one in logs]
+
+
+# ---- What may have them ----------------------------------------------------------------------------------------------
+
+
+def commands_of(one: SampledLog) -> dict[str, Array]:
+    """Return the commands of a dive's thrusters, by their names, in each row."""
+    names = [*one.layout.inputs]
+    return {t.name: one.record.inputs[:, names.index(f"u_{t.name}")] for t in one.layout.thrusters}
+
+
+def lost_between_rows(values: Array) -> float:
+    """Return the share of the variance of a command that straight lines between its rows do not have."""
+    whole = float(np.var(values))
+    return 1.0 - float(np.var(0.5 * (values[1:] + values[:-1]))) / whole if whole > 0.0 else 0.0
+
+
+def _momentary_files(_: Beginning, logs: Logs) -> Iterator[Of]:
+    """Yield the files whose commands change from row to row."""
+    files = []
+    for one in logs:
+        moving = [c for c in commands_of(one).values() if np.ptp(c) > _LEAST_COMMAND] if not one.is_momentary else []
+        if any(lost_between_rows(c) > _BETWEEN and np.mean(np.diff(c) != 0.0) > 0.5 for c in moving):
+            files.append(one.log.file)
+    if files:
+        yield tuple(files)
+
+
+def _thrusters(known: Beginning, logs: Logs) -> Iterator[Of]:
+    """Yield each thruster that the logs command, one of those that no log tells apart."""
+    seen = list[Array]()
+    for thruster in known.layout.thrusters:
+        shown = _signature(known, logs, thruster.name)
+        if shown is not None and not any(np.array_equal(shown, other) for other in seen):
+            seen.append(shown)
+            yield (thruster.name,)
+
+
+def _signature(known: Beginning, logs: Logs, name: str) -> Array | None:
+    """Return the effects of a thruster along the axes times its commands in the logs; None if nothing commands it."""
+    effects = [t.effect(form.axis) for t in known.layout.thrusters if t.name == name for form in known.layout.axes]
+    values = [c[name] for one in logs if name in (c := commands_of(one))]
+    commands = np.concatenate(values) if values else np.zeros(1)
+    if not any(effects) or np.ptp(commands) < _LEAST_COMMAND:
+        return None
+    sign = 1.0 if next(filter(None, effects)) > 0.0 else -1.0
+    return np.outer(np.round(np.multiply(effects, sign), 9), sign * commands)
+
+
+def twins(known: Beginning, logs: Logs, name: str) -> list[str]:
+    """Return the thrusters that no log tells from one of them, with its name."""
+    shown = {t.name: _signature(known, logs, t.name) for t in known.layout.thrusters}
+    own = shown[name]
+    return [other for other, one in shown.items() if one is not None and own is not None and np.array_equal(own, one)]
+
+
+def _pairs(known: Beginning, logs: Logs) -> Iterator[Of]:
+    alone = [of[0] for of in _thrusters(known, logs)]
+    for pair in combinations(alone, 2):
+        commands = [[commands_of(one).get(name, np.zeros(1)) for name in pair] for one in logs]
+        if not all(np.array_equal(first, second) for first, second in commands):
+            yield pair
+
+
+def _commanded(known: Beginning, logs: Logs) -> Iterator[Of]:
+    if [*_thrusters(known, logs)]:
+        yield ()
+
+
+HYPOTHESES = {
+    "momentary commands": Hypothesis(
+        0.2,
+        _momentary_files,
+        _momentary,
+        sentence=(
+            "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
+            "({rate} per second). Fly in MANUAL, or log at 50 Hz"
+        ),
+    ),
+    "health": Hypothesis(
+        0.1,
+        _thrusters,
+        lambda known, logs, of: _with_parameter("health")(
+            replace(known, exact=known.exact - {known.layout.health[of[0]]}), logs, of
+        ),
+        (0.0,),
+        "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
+        most=0.79,
+    ),
+    "reversed commands": Hypothesis(
+        0.03,
+        _thrusters,
+        _permuted(lambda of: (of, -1.0)),
+        sentence=(
+            "thruster {of}: it pushes against its commands in the logs{odds}. Check its direction, the order of its "
+            "wires, and its propeller"
+        ),
+    ),
+    "swapped commands": Hypothesis(
+        0.03,
+        _pairs,
+        _permuted(lambda of: (of[::-1], 1.0)),
+        sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
+    ),
+    "command limit": Hypothesis(
+        0.03,
+        _commanded,
+        _with_parameter("command limit"),
+        (0.4, 0.6, 0.8),
+        "all thrusters: beyond a command of {value}, they push no more{odds}. Check the limits of the speed "
+        "controllers, and use only commands below",
+    ),
+    "slew limit": Hypothesis(
+        0.03,
+        _commanded,
+        _slewing,
+        (log(0.3), log(1.0), log(3.0)),
+        "all thrusters: commands act at a rate of at most {value}, where 1 is full command{odds}. Check the ramp of "
+        "the speed controllers, or a limit in the autopilot",
+    ),
+    # A lag of the rotor's speed, F = F(n) with T dn/dt = c - n, belongs here as soon as the equation has it.
+}
+"""All hypotheses about the structure, by the kind of their parameter. Each is tried after the alarm."""
+
+
+# ---- The alarm -------------------------------------------------------------------------------------------------------
+
+
+def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
+    """Return the largest error of the predictions over 10 s along each axis, relative to the noise of the sensor.
+
+    The fit has seen these data, so only its structure can be wrong. It is near 1 where it is right, even where noise
+    explains each next sample. Outliers do not count. The noise is at least 1 % of the motion, and contains what
+    momentary commands lack between their rows.
+    """
+    found: dict[Axis, float] = {}
+    for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
+        try:
+            off = objective.run(best.z, n, begin=SETTLING, span=AHEAD).innovations
+        except DivergedError:
+            off = np.full(len(record.time), inf)
+        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
+        between = _between_rows(objective, best.z, n) if one.is_momentary else np.zeros(len(record.time))
+        for number, m in enumerate(one.measured):
+            at = usual & (record.sensor == number)
+            if at.sum() < 10:
+                continue
+            change = unchanged(record.time[at], record.value[at], AHEAD)
+            least = max(least_error(m.noise, change), float(np.sqrt(np.mean(between[at]))))
+            found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), rms(off[at]) / least)
+    return found
+
+
+def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
+    """Return the largest error of each axis and of those that share a thruster: what it lacks, it lacks in both."""
+    axes = [form.axis for form in layout.axes]
+    along = {axis: {t.name for t in layout.thrusters_along(axis)} for axis in axes}
+    return {
+        axis: max(
+            (error for other, error in errors.items() if other is axis or along[axis] & along[other]), default=0.0
+        )
+        for axis in axes
+    }
+
+
+def _between_rows(objective: Objective, z: Array, number: int) -> Array:
+    """Return the variance of predictions over 10 s of a log by what its commands lack between their rows."""
+    parameters = objective.table.parameters
+    quiet = np.array([p.low if p.kind in SIZES and p.kind != "short force" else z[n] for n, p in enumerate(parameters)])
+    return objective.run(quiet, number, begin=SETTLING, span=AHEAD).variances
+
+
+def unchanged(time: Array, values: Array, span: float) -> float:
+    """Return the RMS change of a quantity since the start of its prediction."""
+    if span == inf:
+        return rms(values - values[0])
+    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
+    return rms(values - values[first])
+
+
+def probability(odds: float) -> float:
+    """Return the probability for 2 ln of the odds."""
+    return 1.0 / (1.0 + exp(min(max(-0.5 * odds, -50.0), 50.0)))
+
+
+# ---- The trial -------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What is fitted: what is known before, the logs, and the rows of tables."""
+
+    known: Beginning
+    logs: Logs
+    rows: Sequence[TableRow]
+
+    @property
+    def table(self) -> Table:
+        """All parameters."""
+        return table_of(self.known, self.logs, sorted({row.noise for row in self.rows}))
+
+    def objective(self, *, thinned: bool = False) -> Objective:
+        """Return J. Raises BuildError."""
+        return Objective(self.table, self.logs, self.rows, thinned=thinned)
+
+    def applied(self, variant: Variant) -> "Model":
+        """Return the model if a hypothesis is true."""
+        known, logs = variant.applied(self.known, self.logs)
+        return replace(self, known=known, logs=logs)
+
+
+@dataclass(frozen=True)
+class Adopted:
+    """A hypothesis that won."""
+
+    variant: Variant
+    odds: float
+    """2 ln of its posterior odds against the model without it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """The model with the hypotheses that won."""
+
+    model: Model
+    objective: Objective
+    minimum: Minimum
+    adopted: tuple[Adopted, ...] = ()
+    rivals: tuple[Posterior, ...] = ()
+    """The fits with hypotheses that did not win, and whose odds are near even."""
+
+
+def explained(model: Model, full: Objective, near: Minimum, search: Search) -> Explained:
+    """Try the hypotheses where the alarm asks for it, and return the model with those that win, one after the other.
+
+    `near` is the minimum of `full`. `search` fits thinned logs from a start with much noise.
+    """
+    now = Explained(model, full, near)
+    for _ in range(_MOST):
+        if max(structure(now.objective, now.minimum).values(), default=0.0) <= ALARM:
+            break
+        fits = [_fitted(now, one, z) for one, z in _likely(now, search)]
+        if not (fits := [one for one in fits if one]):
+            break
+        best = max(fits, key=lambda one: one.adopted[-1].odds)
+        if best.adopted[-1].odds <= WINS:
+            rivals = [one for one in fits if one.adopted[-1].odds > -CLOSE]
+            posteriors = [Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals]
+            return replace(now, rivals=tuple(posteriors))
+        now = best
+    return now
+
+
+def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]:
+    """Yield the hypotheses that are worth a fit to all samples, with their minima for thinned logs.
+
+    Of the variants that change the thrust, those are fitted that explain most of the unknown force, which the filter
+    follows with a slow process of the largest size.
+    """
+    model = now.model
+    variants = {
+        Variant(kind, of): [*hypothesis.starts] or [nan]
+        for kind, hypothesis in HYPOTHESES.items()
+        for of in hypothesis.variants(model.known, model.logs)
+    }
+    unknown = _Unknown(now)
+    gains = {
+        (one, start): unknown.explained(one, start)
+        for one, starts in variants.items()
+        for start in starts
+        if one.kind != "momentary commands"
+    }
+    best = {one: max(starts, key=lambda start: gains.get((one, start), inf)) for one, starts in variants.items()}
+    order = sorted(best, key=lambda one: -gains.get((one, best[one]), inf))
+    fits = []
+    for one in order[: _FITTED + sum(one.kind == "momentary commands" for one in order)]:
+        objective = model.applied(one).objective(thinned=True)
+        own = objective.table.place(*one.parameter)
+        with suppress(DivergedError):
+            fits.append((one, objective, search(objective, {} if own is None else {own: best[one]})))
+    most = max((_evidence(objective, end) for _, objective, end in fits), default=-inf)
+    for one, objective, end in fits:
+        if one.kind == "momentary commands" or _evidence(objective, end) > most - WINS:
+            yield one, end
+
+
+class _Unknown:
+    """The unknown force along each axis, and how much of it a change of the commands explains."""
+
+    def __init__(self, now: Explained) -> None:
+        objective, z = now.objective, now.minimum.z.copy()
+        self.model, table = now.model, objective.table
+        for n, p in enumerate(table.parameters):
+            if p.kind == "slow force":
+                z[n] = p.high
+            elif p.is_slow_size:
+                z[n] = p.low
+        self.vehicle, _ = table.model(now.minimum.z)
+        self.scale = {axis.name: float(table.force_unit(z, axis)) for axis in (f.axis for f in table.layout.axes)}
+        self.time, self.force = [], []
+        for n, one in enumerate(now.model.logs):
+            first, record = objective.filters[n].force, objective.records[n]
+            at = first_in_each(record.time, 1.0 / _STEP)
+            run = objective.run(z, n, with_states=True)
+            self.time.append(record.time[at])
+            self.force.append(run.states[at, first : first + len(one.layout.axes)])
+        self.before = [
+            self._thrust(one, one.record.inputs, time) for one, time in zip(now.model.logs, self.time, strict=True)
+        ]
+
+    def _thrust(self, one: SampledLog, inputs: Array, time: Array) -> Array:
+        """Return the thrust along each axis of a log at some times: n x axes."""
+        rows = np.maximum(np.searchsorted(one.record.told, time, side="right") - 1, 0)
+        found, names = np.zeros((len(time), len(one.layout.axes))), [*one.layout.inputs]
+        for t in one.layout.thrusters:
+            curve = one.layout.curve_of[t.name]
+            forces = NO_SHAPES.forces(self.vehicle, curve, inputs[rows, names.index(f"u_{t.name}")]) / curve.n_thrusters
+            effects = [self.vehicle.effect(t, form.axis) for form in one.layout.axes]
+            found += self.vehicle[one.layout.health[t.name]] * np.outer(forces, effects)
+        return found
+
+    def explained(self, variant: Variant, start: float) -> float:
+        """Return how much more probable the unknown force is with a hypothesis: the sum over all axes of N ln (r²/s²).
+
+        r is the force, and s what the change of the thrust leaves of it; of a hypothesis with a parameter, the share of
+        the change that leaves least along each axis, because the fit has adapted to the wrong structure elsewhere.
+        """
+        model, found = self.model.applied(variant), dict[str, list[Array]]()
+        table = model.table
+        z = np.array([p.mean for p in table.parameters])
+        if (place := table.place(*variant.parameter)) is not None:
+            z[place] = start
+        for n, one in enumerate(model.logs):
+            if variant.kind == "health":
+                change = (start - 1.0) * self._thrust(*_alone(one, variant.of[0]), self.time[n])
+            else:
+                change = self._thrust(one, table.followed(z, one), self.time[n]) - self.before[n]
+            for k, form in enumerate(one.layout.axes):
+                name = form.axis.name
+                found.setdefault(name, []).append(np.array([self.force[n][:, k], change[:, k]]) / self.scale[name])
+        both = [np.concatenate(pairs, axis=1) for pairs in found.values()]
+
+        def gain(share: float, r: Array, change: Array) -> float:
+            rest = r - share * change
+            return len(r) * log((np.mean(r**2) + _SMALL**2) / (np.mean(rest**2) + _SMALL**2))
+
+        shares = _SHARES if place is not None else (1.0,)
+        return sum(max(gain(share, *pair) for share in shares) for pair in both)
+
+
+def _alone(one: SampledLog, thruster: str) -> tuple[SampledLog, Array]:
+    """Return a log, and its inputs with the commands of one thruster alone."""
+    inputs, place = np.zeros_like(one.record.inputs), [*one.layout.inputs].index(f"u_{thruster}")
+    inputs[:, place] = one.record.inputs[:, place]
+    return one, inputs
+
+
+def _fitted(now: Explained, one: Variant, quick: Minimum) -> Explained | None:
+    """Return the minimum of J with a hypothesis for all samples, from that for thinned logs; None if it diverges."""
+    model = now.model.applied(one)
+    objective, hypothesis = model.objective(), HYPOTHESES[one.kind]
+    try:
+        end = minimise(objective, scaled(objective, quick.z), last=False)
+    except DivergedError:
+        return None
+    count = sum(1 for _ in hypothesis.variants(now.model.known, now.model.logs))
+    odds = _evidence(objective, end) - _evidence(now.objective, now.minimum) + 2.0 * log(hypothesis.probability / count)
+    return Explained(model, objective, end, (*now.adopted, Adopted(one, odds)))
+
+
+def _evidence(objective: Objective, minimum: Minimum) -> float:
+    return evidence(objective, minimum.value, minimum.information)

@@ -1,0 +1,237 @@
+"""Hypotheses about the structure: what each changes, where the alarm tries them, and which one wins.
+
+The logs are simulated by the vehicle of the FMU, whose thrusters are ill, or whose commands are changed on their way
+from the log to the thrusters. So what is named is what was done.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import rov_fmu
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.hypotheses import (
+    HYPOTHESES,
+    Model,
+    Variant,
+    lost_between_rows,
+    probability,
+    twins,
+)
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.shipped import SHIPPED
+from tests.folders import HEAD, folder_of
+from verification.references.autopilot.flights import flown
+
+SECONDS, INTERVAL = 45.0, 0.1
+NOISE = {"surge velocity [m/s]": 0.005, "sway velocity [m/s]": 0.005, "heading [deg]": 0.3, "depth [m]": 0.01}
+OUTPUTS = {"surge velocity [m/s]": "u", "sway velocity [m/s]": "v", "heading [deg]": "psi", "depth [m]": "z"}
+Commands = dict[str, Array]
+
+
+def slewed(u: Array, rate: float) -> Array:
+    """A command that follows another one at a rate, in 1/s; both are held for INTERVAL."""
+    found = [u[0]]
+    for value in u[1:]:
+        found.append(found[-1] + np.clip(value - found[-1], -rate * INTERVAL, rate * INTERVAL))
+    return np.array(found)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """What is wrong with a vehicle or its log."""
+
+    kind: str
+    """The hypothesis that must win; empty for none."""
+    of: str = ""
+    health: float = 1.0
+    acting: Callable[[Commands], Commands] = dict
+    """From the commands of the log to those that act."""
+    value: float | None = None
+
+
+def faults(names: list[str]) -> dict[str, Fault]:
+    """One fault of each kind, of the first thrusters of a vehicle."""
+    one, two = names[:2]
+    return {
+        "healthy": Fault(""),
+        "dead": Fault("health", one, 0.0, value=0.0),
+        "half": Fault("health", two, 0.5, value=0.5),
+        "reversed": Fault("reversed commands", two, acting=lambda u: {**u, two: -u[two]}),
+        "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
+        "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
+        "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=0.8),
+    }
+
+
+def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
+    """A log of steps of all thrusters, each at its own levels, with the noise of sensors."""
+    whole = rov_fmu.load(vehicle)
+    names = [t.name for t in whole.layout.thrusters]
+    n = round(SECONDS / INTERVAL) + 1
+    time = INTERVAL * np.arange(n)
+    parts = (time // 3.0).astype(int)
+    logged = {name: rng.choice([-0.8, -0.5, -0.3, 0.0, 0.0, 0.3, 0.5, 0.8], parts[-1] + 1)[parts] for name in names}
+    if fault.health != 1.0:
+        whole = whole.with_(**{f"health_{fault.of}": fault.health})
+    acting = fault.acting(logged)
+    motion = whole.simulate(time, {f"u_{name}": acting[name] for name in names})
+    columns = {f"{name} [1]": logged[name] for name in names}
+    for title, variable in OUTPUTS.items():
+        if variable in motion:
+            values = np.degrees(motion[variable]) if "deg" in title else motion[variable]
+            columns[title] = values + NOISE[title] * rng.standard_normal(n)
+    rows = np.column_stack([time, *columns.values()]).tolist()
+    lines = [",".join(f"{value:.5g}" for value in row) for row in rows]
+    return "\n".join([",".join(["time [s]", *columns]), *lines]) + "\n"
+
+
+def folder(path: Path, vehicle: str, fault: Fault, seed: int = 0, dives: int = 1) -> Path:
+    rng = np.random.default_rng(seed)
+    return folder_of(
+        path, f'base = "{vehicle}"\n{HEAD}', {f"dive_{n}.csv": dive(vehicle, fault, rng) for n in range(dives)}
+    )
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """A dive of the VideoRay."""
+    tests = load_tests(folder(tmp_path_factory.mktemp("model"), "videoray", Fault("")))
+    return Model(*begin(tests))
+
+
+# ---- What each changes -----------------------------------------------------------------------------------------------
+
+
+def test_each_hypothesis_changes_what_acts(model: Model) -> None:
+    """A variant changes the commands that the filter reads, or adds a parameter, and nothing else."""
+    (one,), plain = model.logs, {p.key for p in model.table.parameters}
+    for kind, hypothesis in HYPOTHESES.items():
+        for of in hypothesis.variants(model.known, model.logs):
+            changed = model.applied(Variant(kind, of))
+            added = {p.key for p in changed.table.parameters} - plain
+            is_other = not np.array_equal(changed.logs[0].record.inputs, one.record.inputs)
+            if kind == "momentary commands":
+                assert {key[0] for key in added} == {"short force"}
+                continue
+            assert added == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
+            assert added or is_other
+    assert sum(one.probability for one in HYPOTHESES.values()) < 0.5
+
+
+def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
+    """The commands that act are those of a loop written out separately."""
+    (one,) = model.logs
+    names = [name for name in one.layout.inputs if name in one.layout.commands]
+    u = one.record.inputs[:, [[*one.layout.inputs].index(name) for name in names]]
+    limited = model.applied(Variant("command limit", ()))
+    z = np.array([p.mean for p in limited.table.parameters])
+    place = limited.table.place("command limit")
+    assert place is not None
+    sets = np.repeat(z[:, None], 2, axis=1)
+    sets[place] = 0.55, 1.0
+    found = limited.table.followed(sets, limited.logs[0])
+    assert np.array_equal(found[0][:, : len(names)], np.clip(u, -0.55, 0.55))
+    assert np.array_equal(found[1], one.record.inputs)
+    slow = model.applied(Variant("slew limit", ()))
+    (fine,), z = slow.logs, np.array([p.mean for p in slow.table.parameters])
+    place = slow.table.place("slew limit")
+    assert place is not None
+    z[place] = np.log(0.8)
+    acting = slow.table.followed(z, fine)[:, 0]
+    now, told = fine.record.inputs[0, 0], fine.record.told
+    for n, step in enumerate(np.diff(told)):
+        after = now + np.clip(fine.record.inputs[n, 0] - now, -0.8 * step, 0.8 * step)
+        assert acting[n] == pytest.approx(0.5 * (now + after))
+        now = after
+    assert np.diff(told).max() <= 0.05 + 1e-9
+    assert {*one.record.told} <= {*told}
+
+
+def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
+    known, (one,) = model.known, model.logs
+    assert [*HYPOTHESES["health"].variants(known, model.logs)] == [(name,) for name in ("l", "r", "t")]
+    inputs = one.record.inputs.copy()
+    inputs[:, 1] = inputs[:, 0]
+    alike = [one.with_inputs(inputs)]
+    assert twins(known, alike, "l") == ["l"]  # the pair turns the vehicle to opposite sides
+    straight = replace(
+        known, layout=replace(known.layout, axes=tuple(f for f in known.layout.axes if f.axis.name == "surge"))
+    )
+    assert twins(straight, alike, "l") == ["l", "r"]
+    assert list(HYPOTHESES["health"].variants(straight, alike)) == [("l",)]
+
+
+def test_momentary_commands_lose_what_changes_between_rows() -> None:
+    """White commands lose half of their variance, and held ones that change seldom nearly nothing."""
+    rng = np.random.default_rng(0)
+    assert lost_between_rows(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
+    assert lost_between_rows(np.repeat(rng.standard_normal(400), 50)) < 0.03
+    assert lost_between_rows(np.zeros(10)) == 0.0
+
+
+@pytest.mark.parametrize("vehicle", ["bluerov2", "bluerov2_heavy"])
+def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path: Path) -> None:
+    """The law changes them 400 times a second, so that the log has the noise of the estimates. Its rows stay apart."""
+    logs = {"flight.csv": flown(rov_fmu.load(vehicle), 12.0, 1)}
+    known, recorded, rows = begin(load_tests(folder_of(tmp_path, f'base = "{vehicle}"\n{HEAD}', logs)))
+    assert list(HYPOTHESES["momentary commands"].variants(known, recorded)) == [("flight.csv",)]
+    (one,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
+    assert one.is_momentary
+    assert not list(HYPOTHESES["momentary commands"].variants(known, [one]))
+    assert all(one.between_rows(known.coefficients, form.axis) > 0.0 for form in one.layout.axes)
+
+
+def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(model: Model) -> None:
+    table = model.table
+    deviation = np.array([p.deviation for p in table.parameters])
+    narrow = Posterior(table, np.array([p.mean for p in table.parameters]), np.diag((0.01 * deviation) ** 2))
+    axes = [form.axis for form in model.known.layout.axes]
+    assert narrow.widened(dict.fromkeys(axes, 1.4)) is narrow
+    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes})
+    for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
+        if p.kind == "inertia":
+            factor = np.sqrt(1.0 + 6.0 * 24.0) if p.of == "heave" else 1.0
+            assert after == pytest.approx(factor * before, rel=0.02)
+        assert after <= prior * (1.0 + 1e-6)
+    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf)).errors <= deviation * (1.0 + 1e-6))
+
+
+def test_a_probability_follows_from_the_odds() -> None:
+    assert probability(0.0) == 0.5
+    assert probability(2.0 * np.log(19.0)) == pytest.approx(0.95)
+    assert probability(-1e9) < 1e-9
+
+
+# ---- What wins -------------------------------------------------------------------------------------------------------
+
+
+def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None:
+    found = identify(load_tests(folder(path, vehicle, fault, seed, dives)))
+    assert [(one.kind, one.of) for one in found.structures] == [(fault.kind, fault.of)] * bool(fault.kind)
+    for one in found.structures:
+        assert one.probability > 0.95
+        if fault.value is not None:
+            low, high = one.interval
+            assert low - 0.03 <= fault.value <= high + 0.03
+    if fault.kind == "health":
+        assert found.vehicle[f"health_{fault.of}"] == pytest.approx(fault.health, abs=0.05)
+
+
+@pytest.mark.long
+def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
+    check(tmp_path, "videoray", faults(["l", "r"])["dead"], 1, 1)
+
+
+@pytest.mark.weekly
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("name", [*faults(["l", "r"])])
+@pytest.mark.parametrize(("vehicle", "names"), [("videoray", ["l", "r"]), ("bluerov2", ["1", "2"])])
+def test_faults_are_named(vehicle: str, names: list[str], name: str, seed: int, tmp_path: Path) -> None:
+    assert vehicle in SHIPPED
+    check(tmp_path, vehicle, faults(names)[name], seed, 2)
