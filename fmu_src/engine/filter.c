@@ -72,6 +72,7 @@ typedef struct {
     int position[N_DRIFTS];  /* the states of the position: north, east, down */
     int quaternion, heading; /* the first state of the quaternion, or the state of the heading */
     int load;                /* the coefficient of the constant load along heave */
+    int health, thrusters;   /* the coefficient of the health of the first thruster; those of the others follow */
 } places;
 
 /* A log. */
@@ -373,10 +374,10 @@ static real over_ground(const filter *f, const real x[N_X], const real row[3], i
     return found;
 }
 
-/* Multiply what a row commands by the slow change of all thrust. */
+/* Multiply what a row commands by the slow change of all thrust. The command of a rotor that lags is a speed, and stays. */
 static void scale_thrust(const real x[N_X], const real held[N_HELD], model_held *q)
 {
-    const real gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
+    const real gain = HAS_ROTORS ? 1.0 + 0.0 * x[GAIN] : exp(x[GAIN]); /* above 0: thrust never changes its direction */
     real scaled[N_HELD];
     for (int i = 0; i < N_HELD; i++) {
         scaled[i] = held[i] * gain;
@@ -384,12 +385,26 @@ static void scale_thrust(const real x[N_X], const real held[N_HELD], model_held 
     memcpy(q, scaled, sizeof scaled);
 }
 
+#if HAS_ROTORS
+/* Multiply the thrust that follows from the speeds of the rotors by its slow change. */
+static void scale_health(const filter *f, const real x[N_X])
+{
+    const real gain = exp(x[GAIN]);
+    for (int i = f->where->health; i < f->where->health + f->where->thrusters; i++) {
+        f->at[i] = f->set->at[i] * gain;
+    }
+}
+#endif
+
 /* Compute the rates of the vehicle's states under the thrust in q, whose other numbers change. */
 static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N_STATES])
 {
     real *const at = f->at, R[3][3];
     const bool tilts = f->log->tilts >= 2;
     memcpy(at + FIRST_STATE, x, N_STATES * sizeof x[0]);
+#if HAS_ROTORS
+    scale_health(f, x);
+#endif
     for (int i = 0; i < N_AXES; i++) {
         at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i] + x[SHORT + i];
     }

@@ -511,8 +511,6 @@ def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
         keys = (*curve.keys, *(["table"] if curve.tables else []))
         for key in (key for key in keys if key not in _FITTED):
             found[f"curves.{curve.name}.{key}"] = _UNKNOWN_EFFECTS.get(key, f"identification does not fit {key}")
-        if curve.lag == "speed":
-            found[f"curves.{curve.name}.lag"] = "identification fits a lag of the force, and not of the rotor's speed"
     if layout.has_dead_time:
         found["commands.T_d"] = "identification finds delays itself"
     if layout.pulse:

@@ -196,25 +196,34 @@ class Motions:
             return _closed_form({"A": A, "B": B, "C": self.of["C"], "v": v, "share": share})
 
 
-def measured_time_constant(motions: Motions, load: Array, T: Array) -> Array:
+def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Array | float = 1.0) -> Array:
     """Return the times from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
 
+    `linear` is its share that is linear in what lags. It is 1 where the force lags. Where the speed of the rotor does,
+    the rest of the thrust is quadratic in the speed, and the thrust lacks (2 - linear) e - (1 - linear) e^2 of itself,
+    e = exp(-t/T).
+
     There is no closed form: the motions take Runge-Kutta steps whose length is proportional to Tau + T. The steps are
-    those of w = v - ahead, where ahead = (C - load) T exp(-t/T) is the velocity that the lag still withholds: w' is the
-    acceleration without a lag, so that a lag much shorter than a step does not spoil them, nor derivatives for T. The
+    those of w = v - ahead, where ahead is the velocity that the lag still withholds, the integral of what the thrust
+    lacks: w' is the acceleration without a lag, so that a lag much shorter than a step does not spoil them, nor derivatives for T. The
     result is infinite if V_ss is not reached.
     """
     V_ss, Tau = motions.response()
     goal, h, lagging = RISE * V_ss, (Tau + T) / 50.0, motions.of["C"] - load
 
     def ahead(t: Array) -> Array:
-        return np.asarray(lagging * T * np.exp(-t / T))
+        e = np.exp(-t / T)
+        return np.asarray(lagging * T * ((2.0 - linear) * e - 0.5 * (1.0 - linear) * e**2))
+
+    def lacking(t: Array) -> Array:
+        e = np.exp(-t / T)
+        return np.asarray(lagging * ((2.0 - linear) * e - (1.0 - linear) * e**2))
 
     def rate(t: Array, w: Array) -> Array:
         return np.asarray(motions.acceleration(w + ahead(t)))
 
     def slope(t: Array, w: Array) -> Array:
-        return np.asarray(h * (rate(t, w) - ahead(t) / T))
+        return np.asarray(h * (rate(t, w) - lacking(t)))
 
     w, found, waits = -ahead(0.0 * h), np.full(goal.shape, inf), np.isfinite(Tau)
     for n in range(1000):

@@ -373,4 +373,6 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
         *of(DRIFTS, layout.state),
         *of([QUATERNION[0], "psi"], layout.state),
         *of([layout.by_name[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
+        min((places[name] for name in layout.health.values()), default=0),
+        len(layout.health),
     ]

@@ -72,6 +72,11 @@ class Hypothesis:
     """What is told, with `of`, the thrusters or files, `value`, the number of the parameter, and `odds`."""
     most: float = inf
     """A number of its parameter above this one is told as an effect alone."""
+    alarm: float = ALARM
+    """The error over 10 s, relative to the noise, above which it is tried."""
+    changes_thrust: bool = True
+    """True if it changes the steady thrust, so that the unknown force shows how likely it is. Others are always fitted
+    to thinned logs."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +126,16 @@ def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
         return known, found
 
     return change
+
+
+def _with_rotors(known: Beginning, logs: Logs, _: Of) -> tuple[Beginning, Logs]:
+    def lagging(layout: Layout) -> Layout:
+        return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
+
+    return (
+        replace(known, layout=lagging(known.layout), curves=[replace(curve, lag="speed") for curve in known.curves]),
+        [replace(one, layout=lagging(one.layout)) for one in logs],
+    )
 
 
 def _slewing(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
@@ -195,6 +210,13 @@ def _commanded(known: Beginning, logs: Logs) -> Iterator[Of]:
         yield ()
 
 
+def _lagging(known: Beginning, logs: Logs) -> Iterator[Of]:
+    """Yield nothing in particular if all forces may lag, and no curve is a table or the force of a wrench."""
+    curves, is_dive = known.layout.curves, any(commands_of(one) for one in logs)
+    if curves and is_dive and all(c.has_lag and not (c.has_rotors or c.tables) for c in curves):
+        yield ()
+
+
 HYPOTHESES = {
     "momentary commands": Hypothesis(
         0.2,
@@ -204,6 +226,18 @@ HYPOTHESES = {
             "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
             "({rate} per second). Fly in MANUAL, or log at 50 Hz"
         ),
+        changes_thrust=False,
+    ),
+    "rotor lag": Hypothesis(
+        0.3,
+        _lagging,
+        _with_rotors,
+        sentence=(
+            "all thrusters: the speed of the rotors lags behind the command, and not the force{odds}. The vehicle file "
+            'says so by lag = "speed"'
+        ),
+        alarm=1.3,
+        changes_thrust=False,
     ),
     "health": Hypothesis(
         0.1,
@@ -246,7 +280,6 @@ HYPOTHESES = {
         "all thrusters: commands act at a rate of at most {value}, where 1 is full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
     ),
-    # A lag of the rotor's speed, F = F(n) with T dn/dt = c - n, belongs here as soon as the equation has it.
 }
 """All hypotheses about the structure, by the kind of their parameter. Each is tried after the alarm."""
 
@@ -365,9 +398,8 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
     """
     now = Explained(model, full, near)
     for _ in range(_MOST):
-        if max(structure(now.objective, now.minimum).values(), default=0.0) <= ALARM:
-            break
-        fits = [_fitted(now, one, z) for one, z in _likely(now, search)]
+        error = max(structure(now.objective, now.minimum).values(), default=0.0)
+        fits = [_fitted(now, one, z) for one, z in _likely(now, error, search)]
         if not (fits := [one for one in fits if one]):
             break
         best = max(fits, key=lambda one: one.adopted[-1].odds)
@@ -379,9 +411,10 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
     return now
 
 
-def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]:
+def _likely(now: Explained, error: float, search: Search) -> Iterator[tuple[Variant, Minimum]]:
     """Yield the hypotheses that are worth a fit to all samples, with their minima for thinned logs.
 
+    `error` is the largest one over 10 s, relative to the noise.
     Of the variants that change the thrust, those are fitted that explain most of the unknown force, which the filter
     follows with a slow process of the largest size.
     """
@@ -389,26 +422,25 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
     variants = {
         Variant(kind, of): [*hypothesis.starts] or [nan]
         for kind, hypothesis in HYPOTHESES.items()
+        if error > hypothesis.alarm
         for of in hypothesis.variants(model.known, model.logs)
     }
-    unknown = _Unknown(now)
+    ranked = {one: starts for one, starts in variants.items() if HYPOTHESES[one.kind].changes_thrust}
+    unknown = _Unknown(now) if ranked else None
     gains = {
-        (one, start): unknown.explained(one, start)
-        for one, starts in variants.items()
-        for start in starts
-        if one.kind != "momentary commands"
+        (one, start): unknown.explained(one, start) for one, starts in ranked.items() for start in starts if unknown
     }
     best = {one: max(starts, key=lambda start: gains.get((one, start), inf)) for one, starts in variants.items()}
     order = sorted(best, key=lambda one: -gains.get((one, best[one]), inf))
     fits = []
-    for one in order[: _FITTED + sum(one.kind == "momentary commands" for one in order)]:
+    for one in order[: _FITTED + len(variants) - len(ranked)]:
         objective = model.applied(one).objective(thinned=True)
         own = objective.table.place(*one.parameter)
         with suppress(DivergedError):
             fits.append((one, objective, search(objective, {} if own is None else {own: best[one]})))
     most = max((_evidence(objective, end) for _, objective, end in fits), default=-inf)
     for one, objective, end in fits:
-        if one.kind == "momentary commands" or _evidence(objective, end) > most - WINS:
+        if one not in ranked or _evidence(objective, end) > most - WINS:
             yield one, end
 
 

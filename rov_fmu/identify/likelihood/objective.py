@@ -25,7 +25,7 @@ from typing import TypeVar
 import numpy as np
 
 from rov_fmu.c.simulation import usable_cores
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
@@ -71,6 +71,13 @@ class TableRow:
         return parameter.of_motion and parameter.of in parts
 
 
+def _half_speed(vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
+    """Return the commands that hold half of the speeds of rotors, which lack the dead bands of their commands."""
+    bands = [float(np.mean(vehicle.coefficients.get(curve.coefficient(f"c_0{end}"), 0.0))) for end in ("", REVERSE)]
+    band = np.where(commands < 0.0, bands[1] or bands[0], bands[0])
+    return np.asarray(np.sign(commands) * 0.5 * (np.abs(commands) + np.minimum(band, np.abs(commands))))
+
+
 def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_lag: float = 0.0) -> Array:
     """Return the values of m rows by the model, in the unit of each row; m x n for n vehicles.
 
@@ -92,7 +99,12 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
         lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
         if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
             load = shapes.motions(vehicle, subject, np.zeros(1)).of["C"]
-            Tau = np.where(lag > 0.0, measured_time_constant(motions, load, np.maximum(lag, _LEAST_DELAY)), Tau)
+            linear: Array | float = 1.0
+            if rotors := [curve for curve in curves if curve.has_rotors]:  # F(n/2) = a n²/4 + b n/2
+                half = shapes.motions(vehicle, subject, _half_speed(vehicle, rotors[0], commands)).of["C"]
+                linear = 4.0 * (half - load) / (motions.of["C"] - load) - 1.0
+            lagged = measured_time_constant(motions, load, np.maximum(lag, _LEAST_DELAY), linear)
+            Tau = np.where(lag > 0.0, lagged, Tau)
         for n, *pair in zip(places, V_ss, Tau, strict=True):
             found[n] = pair[rows[n].quantity == "Tau"]
     return np.array([found[n] for n in range(len(rows))])

@@ -225,8 +225,8 @@ class Table:
         whole = self.get(z, "slow gain")
         axes = [form.axis for form in layout.axes]
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
-        for thruster, curve in layout.curve_of.items():
-            units[f"F_{thruster}"] = self.get(z, "thrust scale", curve.name, default=1.0)
+        for thruster, curve in ((t, c) for t, c in layout.curve_of.items() if not c.has_rotors):
+            units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
 
         def drift(axis: Axis | None) -> Slow:
             size = self.get(z, "slow velocity", axis.name if axis else "horizontal")
