@@ -104,7 +104,7 @@ def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) ->
         formulas[names("loss", name).identifier] = loss
     if curve.tables:
         force = product(force, share)
-    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(health * force)}
+    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
 
 
 def _by_voltage(curve: Curve, names: Names) -> Expression:
