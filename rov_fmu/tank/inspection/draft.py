@@ -11,6 +11,7 @@ from tomlkit.items import AbstractTable
 
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.io.messages import brief, first_of, listed, one_line
+from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection
@@ -61,8 +62,6 @@ def draft(
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     vehicle = load_vehicle(SHIPPED[likely.base]) if likely.base else None
     columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
-    from rov_fmu.io.templates import render  # imports Jinja2, which commands without a draft do not need
-
     return render(
         "rov.toml.j2",
         Path(__file__).parent,
