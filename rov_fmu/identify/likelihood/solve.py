@@ -71,11 +71,12 @@ def minimise(
         on_step(count)
         try:
             data = objective.data(now.z, now.runs, exact=stalled > 0)
+            information = total(objective, now.z, data)[1]
         except DivergedError:
             if not now.data:
                 raise
             break
-        before = now = replace(now, data=data, information=total(objective, now.z, data)[1])
+        before = now = replace(now, data=data, information=information)
         if promises and not promises(*_within_reach(objective, now)):
             break
         now = _descended(objective, now)
@@ -193,13 +194,18 @@ def information_of(objective: Objective, best: Minimum, part: Part) -> Array:
 
 
 def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
-    """Return the gradient and the information of J, with those of the prior."""
+    """Return the gradient and the information of J, with those of the prior.
+
+    Raises DivergedError where they are no numbers: a motion nearly overflows.
+    """
     weight = 1.0 / objective.deviation**2
     size = len(z)
     gradient, information = np.zeros(size), np.zeros((size, size))
     for n, some in enumerate(data):
         g, H = some.information(objective.chosen(n))
         gradient, information = gradient + g, information + H
+    if not np.isfinite(information).all() or not np.isfinite(gradient).all():
+        raise DivergedError
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)
         if parameter.is_slow_size
