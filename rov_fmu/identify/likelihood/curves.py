@@ -205,8 +205,8 @@ def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Arra
 
     There is no closed form: the motions take Runge-Kutta steps whose length is proportional to Tau + T. The steps are
     those of w = v - ahead, where ahead is the velocity that the lag still withholds, the integral of what the thrust
-    lacks: w' is the acceleration without a lag, so that a lag much shorter than a step does not spoil them, nor derivatives for T. The
-    result is infinite if V_ss is not reached.
+    lacks. w' is the acceleration without a lag, so that a lag much shorter than a step does not spoil the steps, nor
+    derivatives for T. The result is infinite if V_ss is not reached.
     """
     V_ss, Tau = motions.response()
     goal, h, lagging = RISE * V_ss, (Tau + T) / 50.0, motions.of["C"] - load

@@ -229,7 +229,7 @@ HYPOTHESES = {
         changes_thrust=False,
     ),
     "rotor lag": Hypothesis(
-        0.3,
+        0.07,
         _lagging,
         _with_rotors,
         sentence=(

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import rov_fmu
+from rov_fmu.equation.catalogue import CURVE
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.hypotheses import (
@@ -23,8 +24,10 @@ from rov_fmu.identify.likelihood.hypotheses import (
     twins,
 )
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import HEAD, folder_of
 from verification.references.autopilot.flights import flown
 
@@ -53,6 +56,8 @@ class Fault:
     acting: Callable[[Commands], Commands] = dict
     """From the commands of the log to those that act."""
     value: float | None = None
+    rotor_lag: float = 0.0
+    """The time constant of the rotors' speeds, s."""
 
 
 def faults(names: list[str]) -> dict[str, Fault]:
@@ -65,8 +70,24 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "reversed": Fault("reversed commands", two, acting=lambda u: {**u, two: -u[two]}),
         "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
+        "rotors": Fault("rotor lag", rotor_lag=0.15),
         "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=0.8),
     }
+
+
+def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
+    """The vehicle with rotors whose speed lags by T, s."""
+    curves = tuple(
+        replace(one, lag="speed", keys=tuple(key for key in CURVE if key in {*one.keys, "T"}))
+        for one in vehicle.layout.curves
+    )
+    lags = {one.coefficient("T"): T for one in curves}
+    layout = replace(vehicle.layout, curves=curves)
+    return rov_fmu.load(
+        replace(
+            Vehicle(vehicle.layout, vehicle.coefficients), layout=layout, coefficients={**vehicle.coefficients, **lags}
+        )
+    )
 
 
 def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
@@ -79,6 +100,8 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     logged = {name: rng.choice([-0.8, -0.5, -0.3, 0.0, 0.0, 0.3, 0.5, 0.8], parts[-1] + 1)[parts] for name in names}
     if fault.health != 1.0:
         whole = whole.with_(**{f"health_{fault.of}": fault.health})
+    if fault.rotor_lag:
+        whole = with_rotors(whole, fault.rotor_lag)
     acting = fault.acting(logged)
     motion = whole.simulate(time, {f"u_{name}": acting[name] for name in names})
     columns = {f"{name} [1]": logged[name] for name in names}
@@ -114,6 +137,10 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     for kind, hypothesis in HYPOTHESES.items():
         for of in hypothesis.variants(model.known, model.logs):
             changed = model.applied(Variant(kind, of))
+            if kind == "rotor lag":
+                assert all(one.has_rotors for one in changed.logs[0].layout.curves)
+                assert {p.key for p in changed.table.parameters} == plain
+                continue
             added = {p.key for p in changed.table.parameters} - plain
             is_other = not np.array_equal(changed.logs[0].record.inputs, one.record.inputs)
             if kind == "momentary commands":
@@ -226,6 +253,11 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
 @pytest.mark.long
 def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["dead"], 1, 1)
+
+
+@pytest.mark.long
+def test_rotors_whose_speed_lags_are_told_from_a_lag_of_the_force(tmp_path: Path) -> None:
+    check(tmp_path, "videoray", faults(["l", "r"])["rotors"], 1, 1)
 
 
 @pytest.mark.weekly
