@@ -195,12 +195,6 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
     ),
     (f"{BLUEROV2}[fit]\nadvance = true\n", HEAVE_ALONE, "/rov.toml: fit.advance: "),
     (
-        DOWN.replace("[curves.t200]\n", '[curves.t200]\nlag = "speed"\n'),
-        HEAVE_ALONE,
-        "/rov.toml: curves.t200.lag: identification fits a lag of the force, and not of the rotor's speed"
-        " | : no thrust_t200*.csv",
-    ),
-    (
         f"{BLUEROV2}[fit]\nvoltage = true\n",
         HEAVE_ALONE,
         "/rov.toml: fit.voltage: every log must have the column voltage [V], but there is no log",

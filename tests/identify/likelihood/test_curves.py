@@ -1,13 +1,15 @@
 """The shape of thrust curves: how a command is warped, its prior, and the quadratic curve that a vehicle file has."""
 
+from dataclasses import replace
 from math import exp
+from typing import get_args
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.catalogue import HEAVE, Lag
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import COUNT, KNOTS, NO_SHAPES, Shapes, nearest
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
@@ -98,17 +100,24 @@ def test_a_shape_is_fitted_where_it_was_tested() -> None:
         assert error({**found, name: 1.01 * value}) > error(found) < error({**found, name: 0.99 * value})
 
 
+@pytest.mark.parametrize("lag", get_args(Lag))
 @pytest.mark.parametrize("command", [0.5, -0.5])
-def test_a_measured_time_constant_contains_the_lag(command: float) -> None:
-    """SciPy integrates w and the thrust from rest, beside a load, until 63 % of V_ss."""
-    T, M = 0.4, VIDEORAY["m_rov"] / VIDEORAY["beta_w"]
-    k = extended(VIDEORAY, T_top=T, F_0_w=0.1)
+def test_a_measured_time_constant_contains_the_lag(command: float, lag: Lag) -> None:
+    """SciPy integrates w, and the thrust or the speed of the rotor, from rest, beside a load, until 63 % of V_ss."""
+    T, M, c_0 = 0.4, VIDEORAY["m_rov"] / VIDEORAY["beta_w"], 0.06
+    k = extended(VIDEORAY, T_top=T, F_0_w=0.1, c_0_top=c_0)
+    k = k.with_(replace(k.layout, curves=tuple(replace(one, lag=lag) for one in k.layout.curves)))
+    beyond = float(np.copysign(abs(command) - c_0, command))
+
+    def thrust(n: float) -> float:
+        return float((k["a_t_top"] * abs(n) + k["b_t_top"]) * n)
 
     def rates(_: float, x: np.ndarray) -> list[float]:
-        w, F = x
-        steady = (k["a_t_top"] * abs(command) + k["b_t_top"]) * command
+        w, lagging = x
         drag = (k["a_d_w"] * abs(w) + k["b_d_w"]) * w
-        return [(k["alpha_w"] * F + 0.1 - drag) / M, (steady - F) / T]
+        F = lagging if lag == "force" else thrust(lagging)
+        follows = thrust(beyond) if lag == "force" else beyond
+        return [(k["alpha_w"] * F + 0.1 - drag) / M, (follows - lagging) / T]
 
     def reached(_: float, x: np.ndarray) -> float:
         return float(abs(x[0]) - (1.0 - exp(-1.0)) * abs(k.response(HEAVE, command)[0]))
