@@ -140,7 +140,7 @@ def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, v
     shown = " ".join(seen.page.locator(".broad .values span").all_inner_texts()).replace("−", "-")
     expected = example().axes[0].predictions[0]
     values = [np.interp(at, expected.time, values) for values in (expected.measured, expected.predicted)]
-    pattern = r"time \(s\): (\S+) Distance \(m\): measured ([-\d.]+); predicted, with 95 % band ([-\d.]+)"
+    pattern = r"time \(s\): (\S+) Distance, 10 s ahead \(m\): measured ([-\d.]+); predicted, with 95 % band ([-\d.]+)"
     assert [float(text) for text in re.findall(pattern, shown)[0]] == pytest.approx([at, *values], abs=0.2)
     assert re.search(r"Commands \(%\): .*u_t 50", shown)
     seen.page.mouse.move(5, 5)
