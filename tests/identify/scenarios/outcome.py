@@ -4,7 +4,7 @@ import shutil
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from math import inf, nan
+from math import inf, isfinite, nan
 from pathlib import Path
 
 import numpy as np
@@ -78,7 +78,7 @@ class Outcome:
 
     estimates: tuple[Estimate, ...] = ()
     effects: tuple[tuple[str, str, float], ...] = ()
-    """The kind of each effect that is reported, what has it, and its value."""
+    """The kind of each effect and hypothesis that is reported, what has it, and its value; 0 where it has none."""
     disturbances: tuple[tuple[str, str], ...] = ()
     """The axis of each disturbance that is reported (`thrust` for all of them), and its cause: empty if unknown."""
     verdicts: Mapping[str, Word] = field(default_factory=dict)
@@ -151,7 +151,10 @@ def read_result(result: Identification, truths: Truths, predictions: Sequence[Pr
     """Return what is judged of a result."""
     return Outcome(
         tuple(_estimates(result, truths)),
-        tuple((effect.kind, effect.of, effect.value) for effect in result.effects if effect.kept),
+        (
+            *((effect.kind, effect.of, effect.value) for effect in result.effects if effect.kept),
+            *((one.kind, one.of, one.value if isfinite(one.value) else 0.0) for one in result.structures),
+        ),
         tuple((d.axis.name if d.axis else "thrust", d.cause) for d in result.disturbances if d.kept),
         {each.axis.name: each.verdict.word for each in result.axes},
         tuple(map(_band, predictions)),
