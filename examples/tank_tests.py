@@ -61,6 +61,7 @@ OTTER = Vehicle(
         "beta_u": 0.72,
         "beta_w": 0.55,
         "beta_r": 0.45,
+        **dict.fromkeys(_LAYOUT.health.values(), 1.0),
     },
 )
 """The true coefficients, which an identification should find."""

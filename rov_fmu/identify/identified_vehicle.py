@@ -292,12 +292,13 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
         return (effect, of) in present or (effect == "reverse thrust" and fit.known.measured_curves.get(of, False))
 
-    layout = table.layout.with_keys(has)
+    layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
     with_voltage = tests.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    kept = layout.with_keys(has)
     return replace(
-        layout,
-        curves=tuple(curve if curve.has_lag else replace(curve, lag="force") for curve in layout.curves),
+        kept,
+        curves=tuple(curve if curve.has_lag else replace(curve, lag="force") for curve in kept.curves),
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=tests.vehicle.layout.mix,
