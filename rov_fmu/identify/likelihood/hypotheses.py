@@ -147,7 +147,12 @@ def _slewing(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
 
 
 def commands_of(one: SampledLog) -> dict[str, Array]:
-    """Return the commands of a dive's thrusters, by their names, in each row."""
+    """Return the commands of a dive's thrusters, by their names, in each row.
+
+    It is empty for a log of one axis, whose thrusters all follow one command: no contrast tells them apart.
+    """
+    if one.log.follows_axis:
+        return {}
     names = [*one.layout.inputs]
     return {t.name: one.record.inputs[:, names.index(f"u_{t.name}")] for t in one.layout.thrusters}
 
@@ -212,8 +217,13 @@ def _commanded(known: Beginning, logs: Logs) -> Iterator[Of]:
 
 def _lagging(known: Beginning, logs: Logs) -> Iterator[Of]:
     """Yield nothing in particular if all forces may lag, and no curve is a table or the force of a wrench."""
-    curves, is_dive = known.layout.curves, any(commands_of(one) for one in logs)
-    if curves and is_dive and all(c.has_lag and not (c.has_rotors or c.tables) for c in curves):
+    curves = known.layout.curves
+    if (
+        logs
+        and curves
+        and not known.layout.has_wrench
+        and all(c.has_lag and not (c.has_rotors or c.tables) for c in curves)
+    ):
         yield ()
 
 
