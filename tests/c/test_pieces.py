@@ -77,9 +77,8 @@ class Run:
     def own(self, vehicle: int) -> tuple[Vehicle, dict[str, float]]:
         """Return a vehicle with its coefficients, and its states at the start."""
         mine = {name: float(column[vehicle, 0]) for name, column in self.start.items()}
-        return self.rov.with_(**{name: mine[name] for name in self.rov.coefficients}), {
-            name: mine[name] for name in self.layout.state
-        }
+        own = {name: mine[name] for name in self.rov.coefficients}  # the weight of a random body may be negative
+        return replace(self.rov, coefficients=own), {name: mine[name] for name in self.layout.state}
 
 
 def near(found: Array, expected: Array) -> None:
