@@ -206,8 +206,14 @@ def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> No
     assert not told(write_folder(tmp_path, recordings(axis)[:2]))
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("column", ["surge velocity [m/s]", "depth [m]", "heading [deg]"])
+@pytest.mark.parametrize(
+    "column",
+    [
+        pytest.param("surge velocity [m/s]", marks=pytest.mark.weekly),
+        pytest.param("depth [m]", marks=pytest.mark.weekly),
+        pytest.param("heading [deg]", marks=pytest.mark.long),
+    ],
+)
 def test_a_mirrored_column_of_a_dive_in_all_axes_is_the_only_one_named(column: str, tmp_path: Path) -> None:
     """The other columns of the file are right, though all thrusters move the vehicle at once."""
     COMPLETE["pilot"].write(0, tmp_path)

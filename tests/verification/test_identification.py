@@ -226,7 +226,7 @@ def test_the_command_writes_the_scores(
 
 @pytest.mark.parametrize(
     "known",
-    [pytest.param(CALM, marks=pytest.mark.long), pytest.param(ROUGH, marks=pytest.mark.weekly)],
+    [pytest.param(CALM, marks=pytest.mark.weekly), pytest.param(ROUGH, marks=pytest.mark.weekly)],
     ids=lambda one: one.name,
 )
 def test_our_bands_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Path) -> None:

@@ -224,7 +224,7 @@ def test_quantities_that_are_named_alike_stay_different(name: str, is_compiled: 
         check(random.Random(1), KEELED, other)
 
 
-@often("vehicles", 1, 12, 300)
+@often("vehicles", 1, 6, 300)
 def test_random_names_change_nothing(vehicles: int) -> None:
     rng, compared = random.Random(8 + vehicles), 0
     while compared < vehicles:
