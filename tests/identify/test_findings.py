@@ -139,6 +139,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("momentary commands", structured(LOST), "about 30% of the yaw command is lost between its rows (10 per", quiet()),
     ("reversed commands", quiet(structures=(Structure("reversed commands", "l", 0.97),)), "(probability 97%)", quiet()),
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
+    (
+        "rotor lag",
+        quiet(structures=(Structure("rotor lag", "", 0.98),)),
+        "the speed of the rotors lags behind",
+        quiet(),
+    ),
     ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
     ("slew limit", structured(HEALTH, kind="slew limit", value=0.8, unit="1/s"), "at most 0.80 1/s, where 1", quiet()),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
