@@ -374,15 +374,21 @@ static real over_ground(const filter *f, const real x[N_X], const real row[3], i
     return found;
 }
 
-/* Multiply what a row commands by the slow change of all thrust. The command of a rotor that lags is a speed, and stays. */
+/* Multiply what a row commands by the slow change of all thrust. The command of a rotor that lags is a speed, which stays: its
+ * thrust is multiplied in scale_health. */
 static void scale_thrust(const real x[N_X], const real held[N_HELD], model_held *q)
 {
-    const real gain = HAS_ROTORS ? 1.0 + 0.0 * x[GAIN] : exp(x[GAIN]); /* above 0: thrust never changes its direction */
+#if HAS_ROTORS
+    (void)x;
+    memcpy(q, held, N_HELD * sizeof held[0]);
+#else
+    const real gain = exp(x[GAIN]); /* above 0: thrust never changes its direction */
     real scaled[N_HELD];
     for (int i = 0; i < N_HELD; i++) {
         scaled[i] = held[i] * gain;
     }
     memcpy(q, scaled, sizeof scaled);
+#endif
 }
 
 #if HAS_ROTORS

@@ -190,6 +190,10 @@ class Layout:
         """Return the thrusters that act on an axis."""
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]
 
+    def shares_thrusters(self, one: Axis, other: Axis) -> bool:
+        """Return True if a thruster acts on both axes."""
+        return any(thruster in self.thrusters_along(other) for thruster in self.thrusters_along(one))
+
     def signs(self, axis: Axis) -> dict[str, float]:
         """Return the sign of each command that acts on an axis: 1 or -1, whichever drives it in its positive direction.
 

@@ -462,8 +462,10 @@ def extrapolated(identification: Identification) -> list[str]:
         for direction, strongest in zip((one.axis.negative, one.axis.positive), one.tested, strict=True)
         if strongest < LEAST_TESTED
     ]
-    ways = f"No test drives the vehicle {listed(untested)}, so the numbers for that are extrapolated."
-    return [full] * (SHARES[-1] > high) + [ways] * bool(untested)
+    lines = [full] if SHARES[-1] > high else []
+    if untested:
+        lines.append(f"No test drives the vehicle {listed(untested)}, so the numbers for that are extrapolated.")
+    return lines
 
 
 def with_lag(identification: Identification) -> list[str]:

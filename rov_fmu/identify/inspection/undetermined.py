@@ -95,7 +95,7 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
     others = [
         other
         for other in (form.axis for form in layout.axes)
-        if other is not axis and _shares(layout, axis, other) and axis.is_rotation + other.is_rotation < 2
+        if other is not axis and layout.shares_thrusters(axis, other) and axis.is_rotation + other.is_rotation < 2
     ]
     alone, largest, beside = 0.0, 0.0, dict.fromkeys(others, 0.0)
     for commands in logs:
@@ -113,11 +113,6 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
         return largest, []
     words = f"{axis.name}: known less well, because it is never commanded alone, only together with {listed(together)}"
     return largest, [f"{words}. Command it alone for some seconds, both ways"]
-
-
-def _shares(layout: Layout, one: Axis, other: Axis) -> bool:
-    """Return True if a thruster drives both axes."""
-    return any(thruster in layout.thrusters_along(other) for thruster in layout.thrusters_along(one))
 
 
 def _push(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:

@@ -216,7 +216,7 @@ def _commanded(known: Beginning, logs: Logs) -> Iterator[Of]:
 
 
 def _lagging(known: Beginning, logs: Logs) -> Iterator[Of]:
-    """Yield nothing in particular if all forces may lag, and no curve is a table or the force of a wrench."""
+    """Yield one variant, about all thrusters, if all forces may lag, and no curve is a table or a wrench's force."""
     curves = known.layout.curves
     if (
         logs
@@ -324,13 +324,12 @@ def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
 
 def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
     """Return the largest error of each axis and of those that share a thruster: what it lacks, it lacks in both."""
-    axes = [form.axis for form in layout.axes]
-    along = {axis: {t.name for t in layout.thrusters_along(axis)} for axis in axes}
     return {
         axis: max(
-            (error for other, error in errors.items() if other is axis or along[axis] & along[other]), default=0.0
+            (error for other, error in errors.items() if other is axis or layout.shares_thrusters(axis, other)),
+            default=0.0,
         )
-        for axis in axes
+        for axis in (form.axis for form in layout.axes)
     }
 
 
