@@ -22,7 +22,6 @@ from rov_fmu.equation.expression import (
 )
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import Equation, equation_of, rate_formula
-from rov_fmu.io.templates import render
 
 
 class EquationSource:
@@ -322,6 +321,8 @@ def generated_sources(layout: Layout) -> dict[str, str]:
     source = EquationSource(layout)
     formulas = {name: written(rate_formula(terms), PYTHON) for name, terms in source.equation.rows.items()}
     given = {"source": source, "equation": source.equation, "formulas": formulas, "quaternion": QUATERNION}
+    from rov_fmu.io.templates import render  # imports Jinja2, which commands that generate no C do not need
+
     return {name: render(f"{name}.j2", **given) for name in ("model.h", "equation.h")}
 
 

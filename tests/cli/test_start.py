@@ -67,7 +67,7 @@ _NEEDED: list[tuple[list[str], set[str]]] = [
     (["build", "--help"], set()),
     (["--version"], set()),
     (["tables"], {"pydantic", "rich"}),
-    (_TUNE, {"jinja2", "numpy", "pydantic", "rich", "scipy"}),
+    (_TUNE, {"numpy", "pydantic", "rich", "scipy"}),
 ]
 """The arguments of commands that run one after the other, and the slow packages that are imported at most."""
 _IMPORTED = """
