@@ -160,6 +160,20 @@ class Names:
         return [name for name in self._names.values() if name.kind == kind]
 
 
+class Formulas(dict[str, Expression]):
+    """Formulas by the identifiers of their names, in the order of their evaluation: each may use those before it."""
+
+    def __init__(self, names: Names, formulas: "Mapping[str, Expression]" = MappingProxyType({})) -> None:
+        super().__init__(formulas)
+        self.names = names
+
+    def define(self, formula: Expression, kind: str, *owners: str) -> Name:
+        """Add a formula for a quantity of the equation, and return the name of the quantity."""
+        name = self.names(kind, *owners)
+        self[name.identifier] = formula
+        return name
+
+
 def unused(text: str, taken: Iterable[str]) -> str:
     """Return a text, with the first number from 2 on that makes it none of the taken ones, if it is one of them."""
     number, free = 1, text

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
-from .expression import Expression, Name, Names, product, total
+from .expression import Expression, Formulas, Name, Names, product, total
 
 _KIRCHHOFF = {
     "u": ((1, "v", "r"), (-1, "w", "q")),
@@ -64,42 +64,46 @@ class MassMatrix:
     def _name(self, kind: str, row: str, column: str) -> Name:
         return self.names(kind, row + column)
 
-    def parameters(self) -> dict[str, Expression]:
+    def parameters(self) -> Formulas:
         """Return the formulas of the names in `inverse` and of the entries."""
-        formulas = {self.names("gain", axis).identifier: formula for axis, formula in self.gains.items()}
-        entries = {self._name("mass", *pair).identifier: formula for pair, formula in self.entries.items()}
+        formulas, entries = Formulas(self.names), dict(self.entries)
+        for axis, formula in self.gains.items():
+            formulas.define(formula, "gain", axis)
         for block in self.blocks:
-            formulas |= {self._name("mass", axis, axis).identifier: 1.0 / self.names("gain", axis) for axis in block}
-            own = [self._name("mass", *pair).identifier for pair in self.entries if {*pair} <= {*block}]
-            formulas |= {name: entries[name] for name in own}
-            formulas |= self._inverse_of(block)
-        return formulas | {name: formula for name, formula in entries.items() if name not in formulas}
+            for axis in block:
+                formulas.define(1.0 / self.names("gain", axis), "mass", axis + axis)
+            for a, b in [pair for pair in entries if {*pair} <= {*block}]:
+                formulas.define(entries.pop((a, b)), "mass", a + b)
+            self._add_inverse(formulas, block)
+        for (a, b), formula in entries.items():
+            formulas.define(formula, "mass", a + b)
+        return formulas
 
-    def _inverse_of(self, block: tuple[str, ...]) -> dict[str, Expression]:
-        """Return formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
-        pivot = {axis: self.names("pivot", axis) for axis in block}
-        formulas, factor = self._decomposed(block, pivot)
+    def _add_inverse(self, formulas: Formulas, block: tuple[str, ...]) -> None:
+        """Add formulas for the inverse of a block, K^T D^-1 K with M = L D L^T and K = L^-1."""
+        pivot, factor = self._decomposed(formulas, block)
         for n, row in enumerate(block):  # K L = 1, from the diagonal outwards; K has the names undo_..
             for m in reversed(range(n)):
                 column = block[m]
-                formulas[self._name("undo", row, column).identifier] = total(
+                parts = (
                     -(factor[k, column] if k == row else self._name("undo", row, k) * factor[k, column])
                     for k in block[m + 1 : n + 1]
                     if (k, column) in factor
                 )
+                formulas.define(total(parts), "undo", row + column)
         for n, row in enumerate(block):  # K^T D^-1 K
             for column in block[n:]:
-                formulas[self._name("inverse", row, column).identifier] = total(
+                parts = (
                     product(*(self._name("undo", k, axis) for axis in (row, column) if axis != k)) / pivot[k]
                     for k in block[block.index(column) :]
                 )
-        return formulas
+                formulas.define(total(parts), "inverse", row + column)
 
     def _decomposed(
-        self, block: tuple[str, ...], pivot: Mapping[str, Name]
-    ) -> tuple[dict[str, Expression], dict[tuple[str, str], Name]]:
-        """Return formulas for M = L D L^T, row by row, and the names of the factors in L. D has the pivots."""
-        formulas: dict[str, Expression] = {}
+        self, formulas: Formulas, block: tuple[str, ...]
+    ) -> tuple[dict[str, Name], dict[tuple[str, str], Name]]:
+        """Add formulas for M = L D L^T, row by row. Return the names of the pivots in D, and of the factors in L."""
+        pivot: dict[str, Name] = {}
         factor: dict[tuple[str, str], Name] = {}
         for n, row in enumerate(block):
             for m, column in enumerate(block[:n]):
@@ -110,11 +114,10 @@ class MassMatrix:
                     if {(row, k), (column, k)} <= factor.keys()
                 ]
                 if parts:
-                    factor[row, column] = self._name("factor", row, column)
-                    formulas[factor[row, column].identifier] = total(parts) / pivot[column]
+                    factor[row, column] = formulas.define(total(parts) / pivot[column], "factor", row + column)
             squares = [-(factor[row, k] * factor[row, k] * pivot[k]) for k in block[:n] if (row, k) in factor]
-            formulas[pivot[row].identifier] = total([self._name("mass", row, row), *squares])
-        return formulas, factor
+            pivot[row] = formulas.define(total([self._name("mass", row, row), *squares]), "pivot", row)
+        return pivot, factor
 
     def coriolis(self, axis: str) -> dict[tuple[str, str], Expression]:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""

@@ -28,12 +28,12 @@ from functools import cached_property, lru_cache
 
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import Expression, Name, Names, call, directed, of, product, total, where
+from .expression import Expression, Formulas, Name, Names, call, directed, of, product, total, where
 from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
-from .thrust import rotor_formulas, steady_name, thrust_formulas, until_reversal
+from .thrust import add_rotor, steady_name, thrust_formulas, until_reversal
 
 
 @dataclass(frozen=True)
@@ -311,12 +311,12 @@ class _Table:
         self.layout, self.names = layout, names
         self._mass = mass_matrix(layout, names)
         self._declared = [*forces_of(layout, names)]
-        self.parameters = _parameters(layout, self._mass, names)
+        self.parameters = _parameters(layout, self._mass)
         self.directed: dict[str, Directed] = {}
-        self.forces: dict[str, Expression] = {}
+        self.forces = Formulas(names)
         for name, curve in layout.curve_of.items():
             if curve.has_rotors:
-                self.forces |= rotor_formulas(name, curve, names, Name(layout.health[name]))
+                add_rotor(self.forces, name, curve, Name(layout.health[name]))
         self.forces |= {
             f"tau_{curve.name}": total(thrusts(layout, YAW, names, curve)) for curve in layout.turning_curves
         }
@@ -327,9 +327,7 @@ class _Table:
 
     def _named(self, formula: Expression, kind: str, *owners: str) -> Name:
         """Return a name for a formula, which becomes one of `parameters` or of `forces`."""
-        name = self.names(kind, *owners)
-        (self.parameters if self._is_constant(formula) else self.forces)[name.identifier] = formula
-        return name
+        return (self.parameters if self._is_constant(formula) else self.forces).define(formula, kind, *owners)
 
     def motion(self, v: str) -> tuple[Term, ...]:
         """Return the terms of the acceleration of an axis, (18).
@@ -484,21 +482,20 @@ _OF_CENTRE = {
 sign and a coordinate."""
 
 
-def _parameters(layout: Layout, mass: MassMatrix, names: Names) -> dict[str, Expression]:
+def _parameters(layout: Layout, mass: MassMatrix) -> Formulas:
     """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
     formulas = mass.parameters()
     if layout.has_arm:
-        formulas[names("arm").identifier] = Name("R") * call("sin", Name("gamma"))
+        formulas.define(Name("R") * call("sin", Name("gamma")), "arm")
     for curve in layout.curves:
         if curve.has_lag:
-            formulas[names("rate", curve.name).identifier] = 1.0 / Name(curve.coefficient("T"))
+            formulas.define(1.0 / Name(curve.coefficient("T")), "rate", curve.name)
     if layout.restoring:
-        formulas[names("net_weight").identifier] = Name("W") - Name("B")
+        formulas.define(Name("W") - Name("B"), "net_weight")
         for axis in "xyz":
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
-            formulas[names("righting", axis).identifier] = total(
-                sign * (Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring
-            )
+            own = [(sign, Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring]
+            formulas.define(total(sign * moment for sign, moment in own), "righting", axis)
     return formulas
 
 
@@ -520,7 +517,7 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
     """
     if not layout.identified:
         return {}
-    formulas: dict[str, Expression] = {}
+    formulas = Formulas(names)
     limited = {*layout.velocities, *(name for name in ("phi", "theta") if name in layout.angles)}
     largest: Expression = of(0.0)
     for one in layout.identified:
@@ -528,10 +525,8 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
         if one.name == EVERY_COMMAND:
             quantities = {(one.name, t.name): call("abs", names("command", t.name)) for t in layout.thrusters}
         for owners, x in quantities.items():
-            beyond, up_to = names("outside", *owners), names("largest", *owners)
-            formulas[beyond.identifier] = _beyond(x, one)
-            formulas[up_to.identifier] = where(largest < beyond, beyond, largest)
-            largest = up_to
+            beyond = formulas.define(_beyond(x, one), "outside", *owners)
+            largest = formulas.define(where(largest < beyond, beyond, largest), "largest", *owners)
     return {**formulas, "outside": largest}
 
 

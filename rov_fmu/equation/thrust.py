@@ -6,6 +6,7 @@ from math import inf
 from .catalogue import REVERSE
 from .expression import (
     Expression,
+    Formulas,
     Name,
     Names,
     beyond_dead_band,
@@ -22,7 +23,6 @@ from .expression import (
 from .layout import Layout
 from .parts import Curve
 
-Formulas = dict[str, Expression]
 _VOLTAGE = Name("voltage")
 
 
@@ -31,41 +31,35 @@ def thrust_formulas(layout: Layout, names: Names) -> Formulas:
 
     Each input saturates at ±1, and so does each sum of inputs.
     """
-    formulas: Formulas = {}
+    formulas = Formulas(names)
     if layout.voltage is not None:
-        formulas |= _battery(names)
+        _add_battery(formulas)
     for name, gains in layout.gains.items():
         parts: list[tuple[float, Expression]] = []
         for command, gain in gains.items():
             acting = Name(layout.acting.get(command, command))
             if layout.pulse:
-                fraction = names("fraction", command)
-                formulas[fraction.identifier] = _fraction(acting, layout.pulse)
-                acting = fraction
-            limited = names("saturated", command)
-            formulas[limited.identifier] = saturated(acting)
-            parts.append((gain, limited))
-        command_of = names("command", name).identifier
-        if list(gains.values()) == [1.0]:
-            formulas[command_of] = parts[0][1]
-        else:
-            mixed = names("mixed", name)
-            formulas[mixed.identifier] = total(gain * part for gain, part in parts)
-            formulas[command_of] = saturated(mixed)
+                acting = formulas.define(_fraction(acting, layout.pulse), "fraction", command)
+            parts.append((gain, formulas.define(saturated(acting), "saturated", command)))
+        formula = parts[0][1]
+        if list(gains.values()) != [1.0]:
+            formula = saturated(formulas.define(total(gain * part for gain, part in parts), "mixed", name))
+        formulas.define(formula, "command", name)
         if name in layout.curve_of:
-            formulas |= _steady_thrust(name, layout.curve_of[name], names, Name(layout.health[name]))
+            _add_steady_thrust(formulas, name, layout.curve_of[name], Name(layout.health[name]))
     for fin in layout.fins:
-        angle = Name(fin.coefficient("angle_max")) * names("command", fin.name)
-        formulas[names("angle", fin.name).identifier] = angle
+        formulas.define(Name(fin.coefficient("angle_max")) * names("command", fin.name), "angle", fin.name)
     return formulas
 
 
 def curve_formulas(curve: Curve) -> Formulas:
     """Return formulas from the command u_one of a thruster to its steady thrust, which is the last."""
-    names = Names(curve.coefficient(key) for key in curve.keys)
-    command = {names("command", "one").identifier: saturated(Name("u_one"))}
-    battery = _battery(names) if "V_0" in curve.keys or len(curve.tables) > 1 else {}
-    return {**battery, **command, **_steady_thrust("one", curve, names, of(1.0))}
+    formulas = Formulas(Names(curve.coefficient(key) for key in curve.keys))
+    if "V_0" in curve.keys or len(curve.tables) > 1:
+        _add_battery(formulas)
+    formulas.define(saturated(Name("u_one")), "command", "one")
+    _add_steady_thrust(formulas, "one", curve, of(1.0))
+    return formulas
 
 
 def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
@@ -73,8 +67,8 @@ def steady_name(thruster: str, curve: Curve, names: Names) -> Name:
     return names("steady", thruster) if curve.has_lag else Name(f"F_{thruster}")
 
 
-def _battery(names: Names) -> Formulas:
-    return {names("battery").identifier: where(_VOLTAGE < 0.0, 0.0, _VOLTAGE)}
+def _add_battery(formulas: Formulas) -> None:
+    formulas.define(where(_VOLTAGE < 0.0, 0.0, _VOLTAGE), "battery")
 
 
 def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
@@ -88,23 +82,24 @@ def _fraction(command: Name, pulse: tuple[float, float, float]) -> Expression:
     return where(equal(command, 0.0), 0.0, (command - neutral) / span)
 
 
-def _steady_thrust(name: str, curve: Curve, names: Names, health: Expression) -> Formulas:
-    """Return formulas from the command of a thruster to its steady thrust, which is the last of them.
+def _add_steady_thrust(formulas: Formulas, name: str, curve: Curve, health: Expression) -> None:
+    """Add formulas from the command of a thruster to its steady thrust, which is the last of them.
 
     The health multiplies the whole force, with what it loses by the speed of advance.
     """
-    command, share = names("command", name), 1.0 / curve.n_thrusters
+    command, share = formulas.names("command", name), 1.0 / curve.n_thrusters
     if curve.has_rotors:
-        return _steady_speed(name, curve, names, health)
-    formulas, force = (_from_tables if curve.tables else _from_coefficients)(name, curve, names, health)
-    if "V_0" in curve.keys:
-        force = force * _by_voltage(curve, names)
-    if "d" in curve.keys:
-        loss = product(health, by_direction(command, curve, "d"), call("abs", command), share)
-        formulas[names("loss", name).identifier] = loss
-    if curve.tables:
-        force = product(force, share)
-    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(force)}
+        force = _from_speed(formulas, name, curve, health)
+    else:
+        force = (_from_tables if curve.tables else _from_coefficients)(formulas, name, curve, health)
+        if "V_0" in curve.keys:
+            force = force * _by_voltage(curve, formulas.names)
+        if "d" in curve.keys:
+            loss = product(health, by_direction(command, curve, "d"), call("abs", command), share)
+            formulas.define(loss, "loss", name)
+        if curve.tables:
+            force = product(force, share)
+    formulas[steady_name(name, curve, formulas.names).identifier] = with_positive_zero(force)
 
 
 def _by_voltage(curve: Curve, names: Names) -> Expression:
@@ -116,33 +111,39 @@ def by_direction(command: Name, curve: Curve, key: str) -> Expression:
     return directed(command, Name(curve.coefficient(key)), Name(curve.coefficient(key + REVERSE)))
 
 
-def _from_tables(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
-    """Return formulas of F = h k_t F_table(c), with F_table interpolated linearly in the voltage."""
-    battery, (first, *_) = names("battery"), curve.tables
-    forces = [call(table.function, names("command", name)) for table in curve.tables]
+def _from_tables(formulas: Formulas, name: str, curve: Curve, health: Expression) -> Expression:
+    """Return the formula of F = h k_t F_table(c), with F_table interpolated linearly in the voltage."""
+    battery, (first, *_) = formulas.names("battery"), curve.tables
+    forces = [call(table.function, formulas.names("command", name)) for table in curve.tables]
     force: Expression = forces[-1]
     for (table, low), (following, high) in reversed([*pairwise(zip(curve.tables, forces, strict=True))]):
         share = (battery - table.voltage) / (following.voltage - table.voltage)
         force = where(battery < following.voltage, low + share * (high - low), force)
     if len(forces) > 1:
         force = where(battery < first.voltage, forces[0], force)
-    measured = names("table", name)
-    return {measured.identifier: force}, health * Name(curve.coefficient("k_t")) * measured
+    return health * Name(curve.coefficient("k_t")) * formulas.define(force, "table", name)
 
 
-def _from_coefficients(name: str, curve: Curve, names: Names, health: Expression) -> tuple[Formulas, Expression]:
-    """Return the formulas of the force h (a_t m^2 + b_t m), and the formula of the force with its sign.
+def _from_coefficients(formulas: Formulas, name: str, curve: Curve, health: Expression) -> Expression:
+    """Return the formula of the force h (a_t m^2 + b_t m), with its sign, where m is as in `_beyond`."""
+    command = formulas.names("command", name)
+    beyond = _beyond(formulas, name, curve)
+    a_t, b_t = (by_direction(command, curve, key) for key in ("a_t", "b_t"))
+    size = formulas.define(product(health, a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters), "magnitude", name)
+    return _outside_dead_band(command, beyond, size, curve)
 
-    m is the part of the command beyond the dead band.
-    """
-    command, beyond, size = (names(kind, name) for kind in ("command", "beyond", "magnitude"))
-    a_t, b_t, c_0 = (by_direction(command, curve, key) for key in ("a_t", "b_t", "c_0"))
-    has_dead_band = "c_0" in curve.keys
-    force = directed(command, size, -size)
-    return {
-        beyond.identifier: call("abs", command) - c_0 if has_dead_band else call("abs", command),
-        size.identifier: product(health, a_t * beyond + b_t, beyond, 1.0 / curve.n_thrusters),
-    }, beyond_dead_band(beyond, c_0, force) if has_dead_band else force
+
+def _beyond(formulas: Formulas, name: str, curve: Curve) -> Name:
+    """Add and return the size of the part of a command that is beyond the dead band, which is negative within it."""
+    command = formulas.names("command", name)
+    size: Expression = call("abs", command)
+    return formulas.define(size - by_direction(command, curve, "c_0") if "c_0" in curve.keys else size, "beyond", name)
+
+
+def _outside_dead_band(command: Name, beyond: Name, size: Name, curve: Curve) -> Expression:
+    """Return a size with the sign of the command, or 0 within the dead band."""
+    signed = directed(command, size, -size)
+    return beyond_dead_band(beyond, by_direction(command, curve, "c_0"), signed) if "c_0" in curve.keys else signed
 
 
 # ---- Rotors whose speed lags -----------------------------------------------------------------------------------------
@@ -151,21 +152,19 @@ _FAINT = 8.0 * 2.0**-52
 """A speed below this share of the steady one is a rounding error, and has no direction."""
 
 
-def _steady_speed(name: str, curve: Curve, names: Names, health: Expression) -> Formulas:
-    """Return formulas from the command of a thruster to the steady speed of its rotor, and to its steady thrust.
+def _from_speed(formulas: Formulas, name: str, curve: Curve, health: Expression) -> Expression:
+    """Return the formula of the steady thrust of a thruster from the steady speed of its rotor.
 
     The speed is the part of the command beyond the dead band, with its sign.
     """
-    command, beyond, speed = (names(kind, name) for kind in ("command", "beyond", "speed"))
-    formulas: Formulas = {speed.identifier: command}
+    command: Expression = formulas.names("command", name)
     if "c_0" in curve.keys:
-        c_0 = by_direction(command, curve, "c_0")
-        steady = beyond_dead_band(beyond, c_0, directed(command, beyond, -beyond))
-        formulas = {beyond.identifier: call("abs", command) - c_0, speed.identifier: steady}
+        beyond = _beyond(formulas, name, curve)
+        command = _outside_dead_band(formulas.names("command", name), beyond, beyond, curve)
+    speed = formulas.define(command, "speed", name)
     if "V_0" in curve.keys:
-        formulas[names("by_voltage", name).identifier] = _by_voltage(curve, names)
-    thrust = _of_rotor(name, curve, names, health, _per_speed(speed, speed, curve), speed)
-    return formulas | {steady_name(name, curve, names).identifier: with_positive_zero(thrust)}
+        formulas.define(_by_voltage(curve, formulas.names), "by_voltage", name)
+    return _of_rotor(name, curve, formulas.names, health, _per_speed(speed, speed, curve), speed)
 
 
 def _per_speed(n: Name, direction: Name, curve: Curve, times: float = 1.0) -> Expression:
@@ -179,30 +178,30 @@ def _of_rotor(name: str, curve: Curve, names: Names, *factors: Expression) -> Ex
     return product(*factors, *by_voltage, 1.0 / curve.n_thrusters)
 
 
-def rotor_formulas(name: str, curve: Curve, names: Names, health: Name) -> Formulas:
-    """Return formulas of the thrust F = h (a_t |n| + b_t) n of a thruster, and of the loss h d |n| by its advance.
+def add_rotor(formulas: Formulas, name: str, curve: Curve, health: Name) -> None:
+    """Add formulas of the thrust F = h (a_t |n| + b_t) n of a thruster, and of the loss h d |n| by its advance.
 
     The speed n of the rotor follows n_c. With the arrived fraction p, it is n + (n_c - n) p. Until the rotor reverses,
     the thrust then changes by `rise` p + `bend` p^2, and the loss by `loss_rise` p.
     """
-    n, n_c, heads = Name(curve.lagging(name)), names("speed", name), names("heads", name)
+    names = formulas.names
+    n, n_c = Name(curve.lagging(name)), names("speed", name)
+    heads = formulas.define(where(call("abs", n) > _FAINT * call("abs", n_c), n, n_c), "heads", name)
     change, share = n_c - n, 1.0 / curve.n_thrusters
 
     def signed(key: str) -> Expression:
         """Return a coefficient with the sign of the direction in which the rotor turns next."""
         return directed(heads, Name(curve.coefficient(key)), -Name(curve.coefficient(key + REVERSE)))
 
-    formulas: Formulas = {
-        heads.identifier: where(call("abs", n) > _FAINT * call("abs", n_c), n, n_c),
-        f"F_{name}": with_positive_zero(_of_rotor(name, curve, names, health, _per_speed(n, heads, curve), n)),
-        names("rise", name).identifier: _of_rotor(name, curve, names, health, _per_speed(n, heads, curve, 2.0), change),
-        names("bend", name).identifier: _of_rotor(name, curve, names, health, signed("a_t"), change, change),
-    }
+    def of_rotor(*factors: Expression) -> Expression:
+        return _of_rotor(name, curve, names, health, *factors)
+
+    formulas[f"F_{name}"] = with_positive_zero(of_rotor(_per_speed(n, heads, curve), n))
+    formulas.define(of_rotor(_per_speed(n, heads, curve, 2.0), change), "rise", name)
+    formulas.define(of_rotor(signed("a_t"), change, change), "bend", name)
     if "d" in curve.keys:
-        loss = product(health, by_direction(heads, curve, "d"), call("abs", n), share)
-        formulas[names("loss", name).identifier] = loss
-        formulas[names("loss_rise", name).identifier] = product(health, signed("d"), change, share)
-    return formulas
+        formulas.define(product(health, by_direction(heads, curve, "d"), call("abs", n), share), "loss", name)
+        formulas.define(product(health, signed("d"), change, share), "loss_rise", name)
 
 
 def until_reversal(name: str, curve: Curve, names: Names) -> Expression:
