@@ -50,7 +50,7 @@ class EquationSource:
         equation = self.equation
         later = [*equation.forces.values(), *equation.outputs.values()]
         later += [formula for both in equation.lagging.values() for formula in both]
-        later += [formula for own in equation.reversals.values() for formula in own]
+        later += [formula for lag in equation.lags for formula in lag.reversals]
         used = frozenset(self.layout.calculated).union(*(formula.names for formula in later))
         lasting = [name for name in equation.thrust if name in used]
         return [*equation.directed, *lasting, *equation.lagging, *equation.forces]
@@ -80,16 +80,9 @@ class EquationSource:
         first = {name: starts.get(name, ZERO) for name in states}
         return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
 
-    def lagging_curves(self) -> list[tuple[str, Mapping[str, str]]]:
-        """Return each curve with lag, and what lags of its thrusters, each with the steady one."""
-        lagging = [curve.name for curve in self.layout.curves if curve.has_lag]
-        return [*zip(lagging, self.equation.lags.values(), strict=True)]
-
-    def reversals(self) -> dict[str, list[str]]:
-        """Return x for each rotor, which reverses after T log(1 + x), by the curves whose rotors lag."""
-        rotors = [curve.name for curve in self.layout.curves if curve.has_rotors]
-        of_curves = zip(rotors, self.equation.reversals.values(), strict=True)
-        return {curve: [to_c(x, self._in_c.__getitem__) for x in own] for curve, own in of_curves}
+    def in_c(self, formula: Expression) -> str:
+        """Write a formula in C."""
+        return to_c(formula, self._in_c.__getitem__)
 
     def coasting(self) -> list[str]:
         """Return the integrals whose rates are constant while all velocities are steady.

@@ -77,7 +77,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
         constant.append((entry(3, 3),))
     loads = [force.sign * product(*force.coefficient) for force in forces if force.factors in constant]
     formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
-    steady = {force: Name(name) for own in equation.lags.values() for force, name in own.items()}
+    steady = {force: Name(name) for lag in equation.lags for force, name in lag.steady.items()}
     return {key: replaced(formula, {**steady, **equation.forces}) for key, formula in formulas.items()}
 
 

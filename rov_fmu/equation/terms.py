@@ -33,7 +33,7 @@ from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
-from .thrust import add_rotor, steady_name, thrust_formulas, until_reversal
+from .thrust import Lag, add_rotor, lags_of, steady_name, thrust_formulas
 
 
 @dataclass(frozen=True)
@@ -88,15 +88,7 @@ class Equation:
     starts: Mapping[str, Expression]
     """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
     formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
-    lags: Mapping[str, Mapping[str, str]]
-    """For the arrived fraction of each lag: the forces, or the speeds of rotors, each with the steady one that it
-    approaches.
-
-    The arrived fraction p rises from 0 towards 1 during a piece of a step. Each force is then F + (steady - F) p, and
-    so is each speed. A thrust that follows from a speed is quadratic in p until the rotor reverses."""
-    reversals: Mapping[str, tuple[Expression, ...]] = field(default_factory=dict)
-    """For the arrived fraction of each lag of speeds: x for each rotor, which reverses after T log(1 + x)."""
-
+    lags: tuple[Lag, ...]
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas, and for
     what they need."""
@@ -122,12 +114,17 @@ class Equation:
         """For each force or speed that lags: the formulas of its rate, and of its value after a piece of a step."""
         return {
             force: (
-                self.rows[arrived][0].coefficient * (Name(steady) - Name(force)),
-                Name(force) + (Name(steady) - Name(force)) * Name(arrived),
+                lag.rate * (Name(steady) - Name(force)),
+                Name(force) + (Name(steady) - Name(force)) * Name(lag.arrived),
             )
-            for arrived, forces in self.lags.items()
-            for force, steady in forces.items()
+            for lag in self.lags
+            for force, steady in lag.steady.items()
         }
+
+    @property
+    def has_rotors(self) -> bool:
+        """True when the speeds of rotors lag, which may reverse."""
+        return any(lag.reversals for lag in self.lags)
 
     @cached_property
     def states_in_rate(self) -> dict[str, frozenset[str]]:
@@ -214,7 +211,7 @@ class Equation:
 
     def _is_lag(self, term: Term) -> bool:
         """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
-        return not self.lags.keys().isdisjoint(term.factors)
+        return any(lag.arrived in term.factors for lag in self.lags)
 
     @cached_property
     def monitored(self) -> tuple[str, ...]:
@@ -242,7 +239,9 @@ def equation_of(layout: Layout) -> Equation:
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
-    rows |= table.lags() | attitude | table.pose()
+    for lag in table.lags:
+        rows[lag.arrived] = Term(lag.rate), Term(-lag.rate, (lag.arrived,))
+    rows |= attitude | table.pose()
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if "cos_psi" in rows:
@@ -255,8 +254,7 @@ def equation_of(layout: Layout) -> Equation:
         table.forces,
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
-        _lags(layout, table.names),
-        _reversals(layout, table.names),
+        table.lags,
         outputs=angles | _outside(layout, table.names),
         ends=quaternion,
         tables=_tables(layout),
@@ -273,34 +271,6 @@ def _tables(layout: Layout) -> dict[str, ThrustTable]:
     return tables
 
 
-def _lags(layout: Layout, names: Names) -> dict[str, dict[str, str]]:
-    """Return for the progress of each lag the forces or speeds that lag, each with the steady one."""
-    return {
-        names("arrived", curve.name).identifier: {
-            curve.lagging(t.name): _steady(t.name, curve, names).identifier
-            for t in layout.thrusters
-            if t.curve == curve.name
-        }
-        for curve in layout.curves
-        if curve.has_lag
-    }
-
-
-def _steady(thruster: str, curve: Curve, names: Names) -> Name:
-    return names("speed", thruster) if curve.has_rotors else steady_name(thruster, curve, names)
-
-
-def _reversals(layout: Layout, names: Names) -> dict[str, tuple[Expression, ...]]:
-    """Return for the progress of each lag of speeds the times at which the rotors reverse."""
-    return {
-        names("arrived", curve.name).identifier: tuple(
-            until_reversal(t.name, curve, names) for t in layout.thrusters if t.curve == curve.name
-        )
-        for curve in layout.curves
-        if curve.has_rotors
-    }
-
-
 # ---- Parts of the equation -------------------------------------------------------------------------------------------
 
 
@@ -311,7 +281,8 @@ class _Table:
         self.layout, self.names = layout, names
         self._mass = mass_matrix(layout, names)
         self._declared = [*forces_of(layout, names)]
-        self.parameters = _parameters(layout, self._mass)
+        self.lags = lags_of(layout, names)
+        self.parameters = _parameters(layout, self._mass, self.lags)
         self.directed: dict[str, Directed] = {}
         self.forces = Formulas(names)
         for name, curve in layout.curve_of.items():
@@ -366,8 +337,8 @@ class _Table:
         def of_rotor(kind: str) -> Callable[..., Expression]:
             return lambda thruster, *_: self.names(kind, thruster)
 
-        for curve in (curve for curve in self.layout.curves if curve.has_lag):
-            arrived = self.names("arrived", curve.name).identifier
+        for lag in self.lags:
+            curve, arrived = lag.curve, lag.arrived
             powers = {"arriving": change_of}
             if curve.has_rotors:
                 powers = {"arriving": of_rotor("rise"), "arriving_squared": of_rotor("bend")}
@@ -403,14 +374,6 @@ class _Table:
             self.directed[direction.identifier] = Directed(first.velocity, ONE, -ONE)
             coefficient = direction * self._named(ahead, *own)
         return Term(coefficient, first.factors, first.effect)
-
-    def lags(self) -> dict[str, tuple[Term, ...]]:
-        """Return the rows of the arrived fractions, p' = (1 - p) / T."""
-        lags: Rows = {}
-        for curve in (curve for curve in self.layout.curves if curve.has_lag):
-            arrived, rate = self.names("arrived", curve.name).identifier, self.names("rate", curve.name)
-            lags[arrived] = (Term(rate), Term(-rate, (arrived,)))
-        return lags
 
     def pose(self) -> dict[str, tuple[Term, ...]]:
         """Return the rows of the pose, which follows from the velocities and a steady current.
@@ -482,14 +445,13 @@ _OF_CENTRE = {
 sign and a coordinate."""
 
 
-def _parameters(layout: Layout, mass: MassMatrix) -> Formulas:
+def _parameters(layout: Layout, mass: MassMatrix, lags: Iterable[Lag]) -> Formulas:
     """Return formulas for the inverse of the mass matrix (18), the arm (4), the lags' rates, and restoring."""
     formulas = mass.parameters()
     if layout.has_arm:
         formulas.define(Name("R") * call("sin", Name("gamma")), "arm")
-    for curve in layout.curves:
-        if curve.has_lag:
-            formulas.define(1.0 / Name(curve.coefficient("T")), "rate", curve.name)
+    for lag in lags:
+        formulas[lag.rate.identifier] = 1.0 / Name(lag.curve.coefficient("T"))
     if layout.restoring:
         formulas.define(Name("W") - Name("B"), "net_weight")
         for axis in "xyz":

@@ -1,5 +1,7 @@
 """The formulas from the commands to the steady thrust of the thrusters and the angles of the fins."""
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from itertools import pairwise
 from math import inf
 
@@ -204,7 +206,43 @@ def add_rotor(formulas: Formulas, name: str, curve: Curve, health: Name) -> None
         formulas.define(product(health, signed("d"), change, share), "loss_rise", name)
 
 
-def until_reversal(name: str, curve: Curve, names: Names) -> Expression:
-    """Return x, if the rotor reverses when log(1 + x) of the time constants have passed; infinite if it does not."""
+@dataclass(frozen=True)
+class Lag:
+    """The lag of the thrusters with one curve, whose forces F, or speeds of rotors n, follow the steady ones.
+
+    The arrived fraction p rises from 0 towards 1 during a piece of a step, p' = (1 - p) / T. Each force is then
+    F + (steady - F) p, and so is each speed. A thrust that follows from a speed is quadratic in p until the rotor
+    reverses.
+    """
+
+    curve: Curve
+    arrived: str
+    """The identifier of the arrived fraction, which is a state of the table of terms."""
+    rate: Name
+    """The rate 1/T."""
+    steady: Mapping[str, str]
+    """The forces, or the speeds of rotors, each with the steady one that it approaches."""
+    reversals: tuple[Expression, ...]
+    """x for each rotor, which reverses when log(1 + x) of the time constants have passed; infinite if it does not."""
+
+
+def lags_of(layout: Layout, names: Names) -> tuple[Lag, ...]:
+    """Return the lags of a vehicle, one for each curve with a time constant."""
+
+    def lag(curve: Curve) -> Lag:
+        own = [t.name for t in layout.thrusters if t.curve == curve.name]
+        steady = {name: names("speed", name) if curve.has_rotors else steady_name(name, curve, names) for name in own}
+        return Lag(
+            curve,
+            names("arrived", curve.name).identifier,
+            names("rate", curve.name),
+            {curve.lagging(name): one.identifier for name, one in steady.items()},
+            tuple(_until_reversal(name, curve, names) for name in own) if curve.has_rotors else (),
+        )
+
+    return tuple(map(lag, (curve for curve in layout.curves if curve.has_lag)))
+
+
+def _until_reversal(name: str, curve: Curve, names: Names) -> Expression:
     n, n_c, heads = Name(curve.lagging(name)), names("speed", name), names("heads", name)
     return where(heads * n_c < 0.0, -(n / n_c), inf)

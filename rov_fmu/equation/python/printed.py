@@ -149,7 +149,7 @@ def mass(v):
 def accelerations(_numbers):
     \"\"\"Return the function from the time since `_numbers`, the velocities through the water, and the third row of the
     rotation matrix to the accelerations, which are None along axes that the vehicle lacks.\"\"\"
-{_coefficients(rates.values(), equation, [*states, *equation.lags])}
+{_coefficients(rates.values(), equation, [*states, *(lag.arrived for lag in equation.lags)])}
     def rates(_time, {", ".join(states)}):
 {_arrived(equation, " " * 8)}        return [
 {accelerations}        ]
@@ -208,8 +208,8 @@ def _quaternion_rates(layout: Layout, states: list[str]) -> dict[str, Expression
 
 def _coefficients(formulas: Iterable[Expression], equation: Equation, states: list[str]) -> str:
     """Print assignments of the numbers that formulas use besides the states."""
-    lags = [equation.rows[progress][0].coefficient for progress in equation.lags]
-    used = dict.fromkeys(name for x in [*formulas, *lags] for name in sorted(x.names) if name not in states)
+    rates = (lag.rate for lag in equation.lags)
+    used = dict.fromkeys(name for x in [*formulas, *rates] for name in sorted(x.names) if name not in states)
     return "".join(f'    {name} = _numbers["{name}"]\n' for name in used)
 
 
@@ -220,8 +220,7 @@ def _states(equation: Equation, states: list[str], indent: str) -> str:
 
 def _arrived(equation: Equation, indent: str) -> str:
     """Print assignments of the arrived fractions of the lags."""
-    rates = {progress: written(equation.rows[progress][0].coefficient, PYTHON) for progress in equation.lags}
-    return "".join(f"{indent}{progress} = -expm1(-{rate} * _time)\n" for progress, rate in rates.items())
+    return "".join(f"{indent}{lag.arrived} = -expm1(-{lag.rate.identifier} * _time)\n" for lag in equation.lags)
 
 
 def _lagging_text(equation: Equation) -> str:
@@ -240,19 +239,17 @@ def until_reversal(v):
 
 def _lagging(equation: Equation) -> Iterable[str]:
     """Print the entries of a dictionary of the forces that lag."""
-    for progress, forces in equation.lags.items():
-        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value)
-        for force, steady in forces.items():
+    for lag in equation.lags:
+        for force, steady in lag.steady.items():
             before, after = _value(Name(force)), _value(Name(steady))
-            yield f'"{force}": {before} - ({after} - {before}) * expm1(-{rate} * _time)'
+            yield f'"{force}": {before} - ({after} - {before}) * expm1(-{_value(lag.rate)} * _time)'
 
 
 def _reversals(equation: Equation) -> Iterable[str]:
     """Print the time until each rotor reverses, each after a comma."""
-    for progress, rotors in equation.reversals.items():
-        rate = written(equation.rows[progress][0].coefficient, PYTHON, _value)
-        for x in rotors:
-            yield f", log1p({written(x, PYTHON, _value)}) / {rate}"
+    for lag in equation.lags:
+        for x in lag.reversals:
+            yield f", log1p({written(x, PYTHON, _value)}) / {_value(lag.rate)}"
 
 
 def _tables(equation: Equation) -> str:
