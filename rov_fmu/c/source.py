@@ -42,10 +42,10 @@ class EquationSource:
         equation = self.equation
         in_c = {name: f"at[REF_{name}]" for name in self.variables}
         in_c |= {name: f"n->{name}" for name in equation.parameters}
-        in_c |= {name: f"q->{name}" for name in self.held_names()}
+        in_c |= {name: f"q->{name}" for name in self.piece_names()}
         return in_c | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
 
-    def held_names(self) -> list[str]:
+    def piece_names(self) -> list[str]:
         """Return the names of the numbers that are constant during a piece of a step."""
         equation = self.equation
         later = [*equation.forces.values(), *equation.outputs.values()]
@@ -66,8 +66,8 @@ class EquationSource:
 
     def thrust(self) -> list[str]:
         """Return statements that compute the steady thrust."""
-        held = {name: f"q->{name}" for name in self.held_names()}
-        return _statements(_needed(self.equation.thrust, map(Name, held)), held, self._in_c)
+        of_piece = {name: f"q->{name}" for name in self.piece_names()}
+        return _statements(_needed(self.equation.thrust, map(Name, of_piece)), of_piece, self._in_c)
 
     def forces(self) -> list[str]:
         """Return statements that compute the torques and accelerations that are constant while the inputs are held."""

@@ -166,8 +166,7 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
         return
     x, y, z = (entry(3, n) for n in (1, 2, 3))
     arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
-    for vehicle_axis in layout.axes:
-        v = vehicle_axis.axis.velocity
+    for v in layout.by_velocity:
         if v in "uvw":
             yield Force(RESTORING, v, 1, (names("net_weight"),), ((x, y, z)["uvw".index(v)],))
             continue
@@ -184,31 +183,31 @@ def advance(
     The thrust is F - d |c| v_a, and the speed of advance v_a is linear in the velocities. `loss_of` gives another
     factor of v_a in place of d |c|, by the name of a thruster.
     """
-    for vehicle_axis in layout.axes:
-        for other in layout.axes:
+    for axis in layout.bare_axes:
+        for other in layout.bare_axes:
             parts = []
             for t in layout.thrusters:
-                effect, own = t.effect(vehicle_axis.axis) * t.effect(other.axis), layout.curve_of[t.name]
+                effect, own = t.effect(axis) * t.effect(other), layout.curve_of[t.name]
                 if "d" in own.keys and curve in (None, own) and abs(effect) > FAINT:
                     of_thruster = loss_of(t.name) if loss_of else names("loss", t.name)
-                    loss = _with_arm(t, vehicle_axis.axis, of_thruster, names)
-                    parts.append(effect * _with_arm(t, other.axis, loss, names))
+                    loss = _with_arm(t, axis, of_thruster, names)
+                    parts.append(effect * _with_arm(t, other, loss, names))
             if parts:
-                lost = Name(vehicle_axis.axis.coefficient("alpha")), total(parts)
-                yield Force(ADVANCE, vehicle_axis.axis.velocity, -1, lost, (other.axis.velocity,))
+                lost = Name(axis.coefficient("alpha")), total(parts)
+                yield Force(ADVANCE, axis.velocity, -1, lost, (other.velocity,))
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield the lift of the fins, lift |u|u δ, and their drag, which is proportional to |u|u δ²."""
     ahead = (1.0, 0.0, 0.0)
-    for vehicle_axis in layout.axes:
+    for axis in layout.bare_axes:
         parts = []
         for fin in layout.fins:
             angle = names("angle", fin.name)
-            parts.append((fin.effect(vehicle_axis.axis), Name(fin.coefficient("lift")) * angle))
+            parts.append((fin.effect(axis), Name(fin.coefficient("lift")) * angle))
             if fin.has_drag:
-                effect = effect_along(vehicle_axis.axis, ahead, fin.place)
+                effect = effect_along(axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(effect * lift for effect, lift in parts if abs(effect) > FAINT)
         if acting.names:
-            yield Force(STEERING, vehicle_axis.axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)
+            yield Force(STEERING, axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)

@@ -95,8 +95,8 @@ class Layout:
     def with_keys(self, has: Callable[[Part, str], bool]) -> "Layout":
         """Return the layout whose curves and axes have just the coefficients for which `has(part, key)` is true."""
 
-        def keys(part: Part, kinds: Iterable[str]) -> tuple[str, ...]:
-            return tuple(key for key in kinds if has(part, key))
+        def keys(part: Part, allowed: Iterable[str]) -> tuple[str, ...]:
+            return tuple(key for key in allowed if has(part, key))
 
         return replace(
             self,
@@ -125,6 +125,11 @@ class Layout:
         return self.with_keys(lambda part, key: key in part.keys or part.name_of(key) in wanted)
 
     # -- lookup --
+
+    @cached_property
+    def bare_axes(self) -> tuple[Axis, ...]:
+        """The axes without the keys of their coefficients."""
+        return tuple(vehicle_axis.axis for vehicle_axis in self.axes)
 
     @cached_property
     def by_name(self) -> dict[str, VehicleAxis]:
@@ -180,10 +185,10 @@ class Layout:
     def gains(self) -> dict[str, dict[str, float]]:
         """For each thruster and each fin, the gains of the inputs that drive it."""
         if not self.mix:
-            return {driven.name: {f"u_{driven.name}": 1.0} for driven in self.actuators}
+            return {one.name: {f"u_{one.name}": 1.0} for one in self.actuators}
         return {
-            driven.name: {f"u_{name}": gains[driven.name] for name, gains in self.mix.items() if gains.get(driven.name)}
-            for driven in self.actuators
+            one.name: {f"u_{name}": gains[one.name] for name, gains in self.mix.items() if gains.get(one.name)}
+            for one in self.actuators
         }
 
     def thrusters_along(self, axis: Axis) -> list[Thruster]:
@@ -219,7 +224,7 @@ class Layout:
     @cached_property
     def coefficient_tables(self) -> tuple[CoefficientTable, ...]:
         """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
-        inertias = {vehicle_axis.axis.inertia for vehicle_axis in self.axes}
+        inertias = {axis.inertia for axis in self.bare_axes}
         of_vehicle = (
             ("body", [key for key in BODY if key in inertias], BODY),
             ("body", self.restoring, RESTORING),
@@ -227,10 +232,13 @@ class Layout:
             ("commands", COMMANDS if self.has_dead_time else (), COMMANDS),
         )
         return (
-            *(CoefficientTable((table,), {key: key for key in keys}, kinds, {}) for table, keys, kinds in of_vehicle),
+            *(
+                CoefficientTable((table,), {key: key for key in keys}, declared, {})
+                for table, keys, declared in of_vehicle
+            ),
             *map(table_of_curve, self.curves),
             *map(table_of_fin, self.fins),
-            *(table_of_axis(vehicle_axis, kinds) for kinds in (AXIS, TUNING) for vehicle_axis in self.axes),
+            *(table_of_axis(vehicle_axis, declared) for declared in (AXIS, TUNING) for vehicle_axis in self.axes),
             *map(table_of_thruster, self.thrusters),
         )
 
@@ -250,9 +258,7 @@ class Layout:
         }
         declared |= {cross_name(*row): cross_declaration(*row) for row in self.cross}
         if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
-            for axis in (
-                vehicle_axis.axis for vehicle_axis in self.axes if self.has_attitude or vehicle_axis.axis is not HEAVE
-            ):
+            for axis in (axis for axis in self.bare_axes if self.has_attitude or axis is not HEAVE):
                 beta = axis.coefficient("beta")
                 description = declared[beta].description.removesuffix(AT_ZERO)
                 declared[beta] = replace(declared[beta], description=description, minimum=LEAST_BETA)
@@ -261,7 +267,7 @@ class Layout:
     @cached_property
     def tuning(self) -> tuple[str, ...]:
         """The names of the tuning factors α and β. They are tunable in the FMU, as the mass and the ballast are."""
-        return tuple(vehicle_axis.axis.coefficient(key) for vehicle_axis in self.axes for key in TUNING)
+        return tuple(axis.coefficient(key) for axis in self.bare_axes for key in TUNING)
 
     @cached_property
     def health(self) -> dict[str, str]:
@@ -283,7 +289,7 @@ class Layout:
         words = {
             name: f"Command u_{name} of thruster{'s' if len(gains) > 1 else ''} {listed(gains)}"
             for name, gains in self.mix.items()
-        } or {driven.name: command_words(driven) for driven in self.actuators}
+        } or {one.name: command_words(one) for one in self.actuators}
         return {f"u_{name}": command_declaration(text, self.pulse) for name, text in words.items()}
 
     def command_of(self, fraction: float) -> float:
@@ -315,7 +321,7 @@ class Layout:
     def inputs(self) -> dict[str, Declaration]:
         """The inputs: commands, loads from outside, current, voltage."""
         inputs = dict(self.commands)
-        inputs |= {vehicle_axis.axis.external: load_declaration(vehicle_axis.axis) for vehicle_axis in self.axes}
+        inputs |= {axis.external: load_declaration(axis) for axis in self.bare_axes}
         if self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE)):
             inputs |= CURRENT | (CURRENT_DOWN if self.has_attitude else {})
         if self.voltage is not None:
@@ -343,7 +349,7 @@ class Layout:
     @cached_property
     def velocities(self) -> dict[str, Declaration]:
         """The velocities through the water, which are the first states."""
-        return {vehicle_axis.axis.velocity: velocity_declaration(vehicle_axis.axis) for vehicle_axis in self.axes}
+        return {axis.velocity: velocity_declaration(axis) for axis in self.bare_axes}
 
     @cached_property
     def pose(self) -> dict[str, Declaration]:

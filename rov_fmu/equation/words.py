@@ -40,9 +40,11 @@ def table_of_curve(curve: Curve) -> CoefficientTable:
     return CoefficientTable(("curves", curve.name), names, CURVE, words)
 
 
-def table_of_axis(vehicle_axis: VehicleAxis, kinds: Mapping[str, Declaration]) -> CoefficientTable:
-    names = {key: vehicle_axis.coefficient(key) for key in kinds if kinds is TUNING or key in vehicle_axis.keys}
-    return CoefficientTable(("axes", vehicle_axis.axis.name), names, kinds, axis_words(vehicle_axis.axis))
+def table_of_axis(vehicle_axis: VehicleAxis, declarations: Mapping[str, Declaration]) -> CoefficientTable:
+    names = {
+        key: vehicle_axis.coefficient(key) for key in declarations if declarations is TUNING or key in vehicle_axis.keys
+    }
+    return CoefficientTable(("axes", vehicle_axis.axis.name), names, declarations, axis_words(vehicle_axis.axis))
 
 
 def table_of_fin(fin: Fin) -> CoefficientTable:
@@ -55,10 +57,10 @@ def table_of_thruster(thruster: Thruster) -> CoefficientTable:
     return CoefficientTable(("thruster", thruster.name), names, THRUSTER, {"thruster": _words(thruster)})
 
 
-def _words(driven: Actuator) -> str:
+def _words(actuator: Actuator) -> str:
     """Return what a thruster or a fin is called."""
-    kind = "fin" if isinstance(driven, Fin) else "thruster"
-    return driven.description or f"{kind} {driven.name}"
+    kind = "fin" if isinstance(actuator, Fin) else "thruster"
+    return actuator.description or f"{kind} {actuator.name}"
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:
@@ -71,8 +73,8 @@ def _pushes(direction: tuple[float, float, float]) -> str:
     return listed(words)
 
 
-def command_words(driven: Actuator) -> str:
-    return f"Command u_{driven.name}: {_words(driven)}, positive {_pushes(driven.direction.value)}"
+def command_words(actuator: Actuator) -> str:
+    return f"Command u_{actuator.name}: {_words(actuator)}, positive {_pushes(actuator.direction.value)}"
 
 
 def thrust_declaration(thruster: Thruster, curve: Curve) -> Declaration:

@@ -179,7 +179,7 @@ def _steps(vehicle: Vehicle) -> Iterator[_Experiment]:
     """
     is_tuned = any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
     percent = round(100.0 * min(1.0, vehicle.command_range[1]), 6)
-    for axis in (part.axis for part in vehicle.layout.axes if vehicle.layout.signs(part.axis)):
+    for axis in filter(vehicle.layout.signs, vehicle.layout.bare_axes):
         for name, model in {"tuned": vehicle, "untuned": vehicle.untuned}.items() if is_tuned else [("", vehicle)]:
             yield _step(model, axis, percent, name)
 

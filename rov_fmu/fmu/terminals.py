@@ -35,14 +35,14 @@ def terminals(layout: Layout) -> list[Terminal]:
     All calculated variables except the Euler angles and `outside` are in the terminal `thrust`.
     """
     battery = ("voltage",) if layout.voltage is not None else ()
-    loads = tuple(own.axis.external for own in layout.axes)
+    loads = tuple(axis.external for axis in layout.bare_axes)
     current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
     thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles | layout.outside)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
-    driven = "thrusters and fins" if layout.fins else "thrusters"
+    actuators = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
     groups = [
-        Terminal("thrusters", "input", "bus", f"Commands to the {driven}, {commands}", tuple(layout.commands)),
+        Terminal("thrusters", "input", "bus", f"Commands to the {actuators}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),

@@ -112,7 +112,7 @@ class Variable:
 def _derivatives(layout: Layout) -> dict[str, Declaration]:
     """Return the unit and the description of the derivative of every state."""
     derivatives: dict[str, Declaration] = {}
-    for axis in (own.axis for own in layout.axes):
+    for axis in layout.bare_axes:
         derivatives[axis.velocity] = Declaration(f"{axis.unit}2", f"{axis.name.capitalize()} acceleration")
     if layout.has_attitude:
         for name, direction in (("x", "northward"), ("y", "eastward"), ("z", "downward")):

@@ -89,8 +89,8 @@ class Subject:
     @cached_property
     def experiment(self) -> Experiment | None:
         """The experiment with the most inputs that are held between steps, or None."""
-        held = [x for x in self.experiments if x.stimuli and _pieces(x)]
-        return max(held, key=lambda x: (len(x.stimuli or ()), len(x.references or ())), default=None)
+        in_pieces = [x for x in self.experiments if x.stimuli and _pieces(x)]
+        return max(in_pieces, key=lambda x: (len(x.stimuli or ()), len(x.references or ())), default=None)
 
     @property
     def allowed(self) -> float:
@@ -156,10 +156,10 @@ def _pieces(experiment: Experiment) -> tuple[tuple[float, Mapping[str, float]], 
     _, *names = experiment.stimuli
     rows = [(time, dict(zip(names, row, strict=True))) for time, *row in zip(*experiment.stimuli.values(), strict=True)]
     pieces = []
-    for (before, held), (after, then) in pairwise([*rows, (experiment.stop, rows[-1][1])]):
+    for (before, now), (after, then) in pairwise([*rows, (experiment.stop, rows[-1][1])]):
         end = min(after, experiment.stop)
         if end > max(before, experiment.start):
-            if held != then:
+            if now != then:
                 return ()
-            pieces.append((end, held))
+            pieces.append((end, now))
     return tuple(pieces)

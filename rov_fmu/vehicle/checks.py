@@ -151,10 +151,10 @@ def _check_gains(inputs: Mapping[str, Mapping[str, float]], names: Sequence[str]
     """Check that each input drives thrusters that exist; if all do, check that each thruster has an input."""
     mistakes = []
     for name, gains in inputs.items():
-        for driven in gains:
-            if driven not in names:
-                reason = f"there is no such thruster{only(driven, names, join_names(names))}"
-                mistakes.append(key_line(f"inputs.{name}.{driven}", reason))
+        for actuator in gains:
+            if actuator not in names:
+                reason = f"there is no such thruster{only(actuator, names, join_names(names))}"
+                mistakes.append(key_line(f"inputs.{name}.{actuator}", reason))
         if not any(gains.values()):
             mistakes.append(key_line(f"inputs.{name}", "drives no thruster: give one a gain other than 0"))
     yield from mistakes
@@ -239,8 +239,8 @@ def _check_fins(parts: File, layout: Layout) -> Iterator[str]:
             yield key_line(
                 f"fin.{fin.name}", "its force depends on the velocity in surge, which the vehicle does not have"
             )
-        elif not any(fin.effect(vehicle_axis.axis) for vehicle_axis in layout.axes):
-            axes = join_names([vehicle_axis.axis.name for vehicle_axis in layout.axes])
+        elif not any(map(fin.effect, layout.bare_axes)):
+            axes = join_names(layout.by_name)
             yield key_line(f"fin.{fin.name}", f"its lift acts on no axis of the vehicle, which are {axes}")
     names = {thruster.name for thruster in parts.thruster}
     for fin in layout.fins:
@@ -298,11 +298,11 @@ def no_thrust(curve: Curve, values: Mapping[str, float], place: str) -> Iterator
 
 
 def _check_needed_keys(
-    name: str, table: Strict, kinds: Mapping[str, Declaration], needed: Mapping[str, Axis]
+    name: str, table: Strict, declarations: Mapping[str, Declaration], needed: Mapping[str, Axis]
 ) -> Iterator[str]:
     """Check that a table has the coefficients that are needed, each by an axis, and no others."""
-    quantities = given_quantities(table, kinds)
-    for key in kinds:
+    quantities = given_quantities(table, declarations)
+    for key in declarations:
         if key in needed and key not in quantities:
             yield key_line(f"{name}.{key}", f"this key is missing, and the vehicle has {needed[key].name}")
         elif key in quantities and key not in needed:

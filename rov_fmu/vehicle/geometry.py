@@ -63,10 +63,9 @@ def check_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[str]:
     Roll and pitch need no thruster, because weight and buoyancy right the vehicle, unless they are in `driven`. An axis
     without thrusters may have fins.
     """
-    axes = [vehicle_axis.axis for vehicle_axis in layout.axes]
     for thruster in layout.thrusters:
-        if not any(thruster in layout.thrusters_along(axis) for axis in axes):
-            reason = f"acts on no axis of the vehicle, which are {join_names([axis.name for axis in axes])}"
+        if not any(thruster in layout.thrusters_along(axis) for axis in layout.bare_axes):
+            reason = f"acts on no axis of the vehicle, which are {join_names(layout.by_name)}"
             yield key_line(f"thruster.{thruster.name}", reason)
     for axis, reason in undriven_axes(layout, driven):
         yield key_line(f"axes.{axis.name}", reason)
@@ -79,7 +78,7 @@ def undriven_axes(layout: Layout, driven: Collection[str] = ()) -> Iterator[tupl
     """
     if not layout.actuators:
         return
-    axes = sorted((vehicle_axis.axis for vehicle_axis in layout.axes), key=lambda axis: axis is SWAY)
+    axes = sorted(layout.bare_axes, key=lambda axis: axis is SWAY)
     independent: list[tuple[str, list[float]]] = []  # axes, with orthonormal rows of the thrusters' effects
     for axis in (axis for axis in axes if axis not in _RIGHTED or axis.name in driven):
         if not layout.thrusters_along(axis) and any(fin.effect(axis) for fin in layout.fins):
@@ -115,7 +114,7 @@ def _undriven(axis: Axis) -> str:
 
 def check_inputs(layout: Layout) -> Iterator[str]:
     """Check that each input drives an axis; if all do, check that each axis has an input."""
-    driven = {axis: layout.signs(axis) for axis in (one.axis for one in layout.axes) if layout.thrusters_along(axis)}
+    driven = {axis: layout.signs(axis) for axis in layout.bare_axes if layout.thrusters_along(axis)}
     steering = {name for fin in layout.fins for name in layout.gains[fin.name]}
     used = steering.union(*driven.values())
     idle = [name for name in layout.mix if f"u_{name}" not in used]

@@ -78,15 +78,15 @@ def _coefficients(
     return table_of(f"_{name}", base, fields, words, told)
 
 
-def given_quantities(table: Strict, kinds: Mapping[str, Declaration]) -> dict[str, Quantity]:
+def given_quantities(table: Strict, declarations: Mapping[str, Declaration]) -> dict[str, Quantity]:
     """Return the coefficients that a table of the file gives, by key."""
-    return {key: q for key in kinds if (q := getattr(table, key)) is not None}
+    return {key: q for key in declarations if (q := getattr(table, key)) is not None}
 
 
-def _coefficient_keys(table: Strict, kinds: Mapping[str, Declaration]) -> tuple[str, ...]:
+def _coefficient_keys(table: Strict, declarations: Mapping[str, Declaration]) -> tuple[str, ...]:
     """Return the keys of the coefficients that the vehicle has: those that are required, and those that are given."""
-    quantities = given_quantities(table, kinds)
-    return tuple(key for key, kind in kinds.items() if key in quantities or kind.needed)
+    quantities = given_quantities(table, declarations)
+    return tuple(key for key, kind in declarations.items() if key in quantities or kind.needed)
 
 
 # ---- Body, arm, curves, axes -----------------------------------------------------------------------------------------
@@ -566,10 +566,12 @@ def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -
     places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",))]
     places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
     places += [(AXIS, ("axes", name)) for name in AXES]
-    for kinds, place in places:
+    for declarations, place in places:
         table = _table_at(data, place)
         if place[0] in complete and isinstance(table, dict):
-            yield from (_missing(table, *place, key) for key, kind in kinds.items() if kind.needed and key not in table)
+            yield from (
+                _missing(table, *place, key) for key, kind in declarations.items() if kind.needed and key not in table
+            )
 
 
 def _table_at(data: Any, place: tuple[int | str, ...]) -> Any:

@@ -100,15 +100,15 @@ class Uncertainty:
     def _hold_at_bounds(self, free: Array) -> Array:
         """Return n x p normal scores, with those beyond a bound held there and the others conditioned on these."""
         low, high = self._scores_of_bounds()
-        edges, scores, held = np.clip(free, low, high), free.copy(), np.zeros(free.shape, bool)
-        while (beyond := ((scores < low) | (scores > high)) & ~held).any():
-            held |= beyond
-            for pattern in np.unique(held[beyond.any(axis=1)], axis=0):
-                rows = (held == pattern).all(axis=1)
-                within_held = self.correlation[np.ix_(pattern, pattern)]
-                regression = np.linalg.pinv(within_held, hermitian=True) @ self.correlation[pattern]
+        edges, scores, fixed = np.clip(free, low, high), free.copy(), np.zeros(free.shape, bool)
+        while (beyond := ((scores < low) | (scores > high)) & ~fixed).any():
+            fixed |= beyond
+            for pattern in np.unique(fixed[beyond.any(axis=1)], axis=0):
+                rows = (fixed == pattern).all(axis=1)
+                within_fixed = self.correlation[np.ix_(pattern, pattern)]
+                regression = np.linalg.pinv(within_fixed, hermitian=True) @ self.correlation[pattern]
                 scores[rows] = free[rows] + _product((edges - free)[rows][:, pattern], regression)
-        return np.where(held, edges, scores)
+        return np.where(fixed, edges, scores)
 
     def _scores_of_bounds(self) -> tuple[Array, Array]:
         """Return the normal scores of the lower and of the upper bounds."""

@@ -1,7 +1,7 @@
 """The class Vehicle, and reading and checking vehicle files (TOML)."""
 
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import cache, cached_property, lru_cache
 from itertools import chain
@@ -62,8 +62,7 @@ class _Formulas:
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
         self.alone = {
-            vehicle_axis.axis.name: compiled(alone_formulas(layout, vehicle_axis.axis.velocity), equation.measured)
-            for vehicle_axis in layout.axes
+            axis.name: compiled(alone_formulas(layout, axis.velocity), equation.measured) for axis in layout.bare_axes
         }
 
 
@@ -267,12 +266,12 @@ class Vehicle:
     def unidentified(self) -> list[Axis]:
         """The axes that the verdicts call *not identified*, so that no number of their motion is told."""
         words = self.provenance.words if self.provenance else {}
-        return [form.axis for form in self.layout.axes if words.get(form.axis.name) == "not identified"]
+        return [axis for axis in self.layout.bare_axes if words.get(axis.name) == "not identified"]
 
     @property
     def shown_axis(self) -> Axis:
         """The axis of examples: the first one that is identified, or without any the first one."""
-        axes = [form.axis for form in self.layout.axes]
+        axes = self.layout.bare_axes
         return next((axis for axis in axes if axis not in self.unidentified), axes[0])
 
     def picture(self, name: str) -> Path | None:
@@ -395,14 +394,12 @@ class Vehicle:
 
     def alone(self, axis: Axis, inputs: Values) -> AxisAlone:
         """Return the motion of an axis alone, (18), under held inputs, once the thrust is steady."""
-        return AxisAlone.of(self._formulas.alone[axis.name]({**self._steady(inputs), **self.parameters}))
+        return self.motions(inputs, (axis,))[0]
 
-    def motions(self, inputs: Values) -> tuple[AxisAlone, ...]:
-        """Return the motion of each axis alone under held inputs, once the thrust is steady."""
+    def motions(self, inputs: Values, axes: Sequence[Axis] = ()) -> tuple[AxisAlone, ...]:
+        """Return the motion of each axis alone under held inputs, once the thrust is steady; or only of some axes."""
         values = {**self._steady(inputs), **self.parameters}
-        return tuple(
-            AxisAlone.of(self._formulas.alone[vehicle_axis.axis.name](values)) for vehicle_axis in self.layout.axes
-        )
+        return tuple(AxisAlone.of(self._formulas.alone[axis.name](values)) for axis in axes or self.layout.bare_axes)
 
     def held_inputs(self, axis: Axis, command: float) -> dict[str, float]:
         """Return all inputs: an axis driven at a fraction of the full command, the other inputs as usual."""
@@ -422,7 +419,7 @@ class Vehicle:
         Symmetric thrusters cancel along the other axes, unless their thrust in reverse is weaker.
         """
         F = self.commanded(self.held_inputs(axis, command))
-        for other in (form.axis for form in self.layout.axes if form.axis is not axis):
+        for other in (other for other in self.layout.bare_axes if other is not axis):
             pushes = [self.effect(t, other) * F[t.name] for t in self.layout.thrusters_along(other)]
             if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
                 yield other, sum(pushes)

@@ -116,11 +116,11 @@ def _curve(curve: Curve) -> dict[str, Any]:
     }
 
 
-def _vectors(driven: Actuator) -> dict[str, Any]:
+def _vectors(actuator: Actuator) -> dict[str, Any]:
     """Return the tables of the direction and the position of a thruster or a fin."""
-    at = driven.position
+    at = actuator.position
     position = at and {"value": at.value, "unit": "m", "source": at.source}
-    return {"direction": driven.direction._asdict(), "position": position}
+    return {"direction": actuator.direction._asdict(), "position": position}
 
 
 def _table_at(tables: Any, path: Iterable[str]) -> Any:

@@ -58,7 +58,7 @@ class Motion:
         self.time = 0.0
         """The time since the start of the step, or since a rotor reversed."""
         self.direction = dict.fromkeys(model.MONITORED, 1.0)
-        self.hold()
+        self.find_numbers()
         starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
         self.y: State = [starts[name] for name in model.STATES]
         self.size = [0.0] * len(self.y)
@@ -66,17 +66,17 @@ class Motion:
         self.heading = self.turned(self.y, values.get("psi", 0.0))
         self.begin()
 
-    def hold(self) -> None:
+    def find_numbers(self) -> None:
         """Compute all numbers that are constant until the next reversal."""
-        self.held = self.model.numbers({**self.values, **self.direction})
-        self.of_model = self.model.motion(self.held)
-        self.until: float = self.model.until_reversal(self.held)
+        self.numbers = self.model.numbers({**self.values, **self.direction})
+        self.of_model = self.model.motion(self.numbers)
+        self.until: float = self.model.until_reversal(self.numbers)
 
     def reverse_rotor(self) -> None:
         """Let the time begin anew where a rotor reverses."""
-        self.values |= self.model.lagging(self.held, self.time)
+        self.values |= self.model.lagging(self.numbers, self.time)
         self.time = 0.0
-        self.hold()
+        self.find_numbers()
 
     def rates(self, after: float, y: State) -> State:
         """Return the rates of the states some seconds after the start of the substep."""
@@ -90,14 +90,14 @@ class Motion:
         unless the rate is a rounding error.
         """
         self.size = [max(size, abs(x)) for size, x in zip(self.size, self.y, strict=True)]
-        self.terms: State = self.model.sizes(self.held, self.time, self.y)
+        self.terms: State = self.model.sizes(self.numbers, self.time, self.y)
         self.rate = self.rates(0.0, self.y)
         before = dict(self.direction)
         for name, i in self.model.MONITORED.items():
             leads = self.y[i] or (0.0 if self.is_rounding(i, self.rate[i]) else self.rate[i])
             self.direction[name] = copysign(1.0, leads) if leads else before[name]
         if self.direction != before:
-            self.hold()
+            self.find_numbers()
             self.begin()  # the rates of other velocities may have changed
 
     def is_rounding(self, i: int, rate: float) -> bool:
@@ -189,7 +189,7 @@ class Motion:
                     continue
                 if self.is_rounding(i, self.rate[i]):
                     self.direction[name] = -sign
-                    self.hold()
+                    self.find_numbers()
                     self.rate = self.rates(0.0, self.y)
                 return 0.5 * h, None
         return found
@@ -217,7 +217,7 @@ class Motion:
         y = self.named(self.y)
         found = {name: x for name, x in y.items() if name in self.values}
         found |= {name: self.values[name] + y[name] for name in self.model.OFFSETS if name in self.values}
-        found |= self.model.lagging(self.held, self.time)
+        found |= self.model.lagging(self.numbers, self.time)
         if self.model.QUATERNION:
             e, a, b, c = (y[name] for name in self.model.QUATERNION)
             length = (e * e + a * a + b * b + c * c) ** 0.5
