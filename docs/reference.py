@@ -182,6 +182,11 @@ def filled(page: str) -> str:
     )
 
 
+def elements(drawing: str) -> list[tuple[str, str]]:
+    """The elements and texts of a drawing, which do not depend on the version of Matplotlib as its numbers do."""
+    return re.findall(r"<(\w+)|>([^<>]+)<", drawing)
+
+
 def drawings() -> dict[Path, str]:
     """The drawings of the vehicles, those of the FMU's diagram, by their paths."""
     return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one) for name, one in DRAWN.items()}
@@ -322,4 +327,5 @@ if __name__ == "__main__":
     for path in PAGES:
         path.write_text(filled(path.read_text(encoding="utf-8")), encoding="utf-8")
     for path, drawing in drawings().items():
-        path.write_text(drawing, encoding="utf-8")
+        if not path.exists() or elements(path.read_text(encoding="utf-8")) != elements(drawing):
+            path.write_text(drawing, encoding="utf-8")

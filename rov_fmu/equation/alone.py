@@ -82,12 +82,10 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
 
 
 def _drag(forces: Iterable[Force], gain: Expression) -> dict[str, Expression]:
-    """Return the formulas of the drag by the keys of POWERS, ahead and in reverse. Raises ValueError."""
+    """Return the formulas of the drag by the keys of POWERS, ahead and in reverse."""
     parts: dict[str, list[Expression]] = {key + end: [] for end in ("", REVERSE) for key in POWERS.values()}
     for force in forces:
         power = len(force.factors)
-        if power not in POWERS:
-            raise ValueError(f"{force.effect.words}: there is no closed form of V_ss and Tau yet")
         ahead, astern = (force.along(gain, reverse=reverse) for reverse in (False, True))
         parts[POWERS[power]].append(-ahead)
         parts[POWERS[power] + REVERSE].append(astern if power % 2 == 0 else -astern)

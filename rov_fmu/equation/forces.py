@@ -65,6 +65,11 @@ class Force:
     turns: bool = False
     """True when the force has the other sign for a negative velocity."""
 
+    def __post_init__(self) -> None:
+        """Raise ValueError for a force that the equation cannot have."""
+        if len(self.factors) > 2:
+            raise ValueError(f"{self.effect.words}: at most two states may multiply a coefficient (terms.py)")
+
     @property
     def formula(self) -> Expression:
         """The force as a formula, for both directions of the velocity."""
