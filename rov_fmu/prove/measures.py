@@ -1,6 +1,7 @@
 """What is measured of an FMU, one function for each claim. A function returns the evidence."""
 
 import hashlib
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
@@ -134,7 +135,7 @@ def repeatability(subject: Subject) -> Evidence:
     if subject.obstacle:
         return does_not_apply(subject.obstacle)
     plan = subject.plan
-    counts: dict[str, int] = {}
+    counts: Counter[bytes] = Counter()
     first = None
     largest = 0.0
     for _ in range(_PROCESSES):
@@ -142,8 +143,7 @@ def repeatability(subject: Subject) -> Evidence:
             for _ in range(_RUNS // _PROCESSES):
                 values = child.call("run", plan, _STEPS_OF_RUN)
                 first = values if first is None else first
-                digest = hashlib.sha256(values.tobytes()).hexdigest()
-                counts[digest] = counts.get(digest, 0) + 1
+                counts[hashlib.sha256(values.tobytes()).digest()] += 1
                 largest = max(largest, _deviation(subject, values, first))
     assert first is not None
     same = next(iter(counts.values()))

@@ -16,7 +16,7 @@ from rov_fmu.io.csv_table import Series
 from rov_fmu.io.messages import FileError, ProofError, brief, one_line
 from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.experiments import Experiment
-from rov_fmu.prove.runs import MESSAGE, Runs, keep_message
+from rov_fmu.prove.runs import Runs, forget_message, keep_message, last_message
 from rov_fmu.prove.subject import Subject, opened
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
@@ -113,13 +113,12 @@ class _Experiments(Runs):
             return [_failed(experiment, "has no expected results, so nothing is compared")]
         times, *expected = map(np.array, experiment.references.values())
         names = [*experiment.references][1:]
-        MESSAGE[0] = ""
+        forget_message()
         try:
             result = self._result(experiment, interface, names)
         except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-            message = f"; the FMU: {MESSAGE[0]}" if MESSAGE[0] else ""
             what = str(error).replace(self._folder + os.sep, "").rstrip(".")  # the cause follows the library's path
-            return [_failed(experiment, brief(what + message, 240))]
+            return [_failed(experiment, brief(what + last_message(), 240))]
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         findings = []
         for name, values in zip(names, expected, strict=True):

@@ -5,6 +5,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
+from threading import local
 from time import perf_counter
 from typing import Any
 
@@ -14,7 +15,7 @@ import numpy.typing as npt
 from rov_fmu.io.messages import brief
 
 Array = npt.NDArray[np.float64]
-_WARNING = 1
+WARNING = 1
 """The status `warning` in every version of FMI; more serious ones are greater."""
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 """The name of each status, in every version of FMI."""
@@ -22,8 +23,8 @@ REAL = ("Real", "Float64", "Float32")
 _WHOLE = ("Integer", "Boolean", "Enumeration", *(f"{u}Int{size}" for u in ("", "U") for size in (8, 16, 32, 64)))
 NUMBERS = (*REAL, *_WHOLE)
 """The types of variables that are numbers, in FMI 2.0 and 3.0."""
-MESSAGE = [""]
-"""The FMU's last warning. It is global, because FMPy passes all messages to the latest logger."""
+_MESSAGES = local()
+"""The FMU's last warning in each thread. It is global, because FMPy passes all messages to the latest logger."""
 
 
 @dataclass(frozen=True)
@@ -132,14 +133,14 @@ class Runs:
         """
         before = now = self._read(fmu, names)
         status, words = self._answer(call)
-        if status <= _WARNING:
+        if status <= WARNING:
             return Answer(1, 0, 0, words)
 
         def read() -> None:
             nonlocal now
             now = self._read(fmu, names)
 
-        unreadable = self._answer(read)[0] > _WARNING
+        unreadable = self._answer(read)[0] > WARNING
         return Answer(1, 1, int(unreadable or np.array_equal(now, before, equal_nan=True)), words)
 
     @staticmethod
@@ -147,15 +148,15 @@ class Runs:
         """Return the status of a call, and the status in words with the FMU's message."""
         from fmpy.fmi1 import FMICallException
 
-        MESSAGE[0], status = "", 0
+        forget_message()
+        status = 0
         try:
             call()
         except FMICallException as error:
             status = int(error.status)
         except RunError as error:
             return 2, str(error)
-        word = _STATUS[status] if status < len(_STATUS) else f"status {status}"
-        return status, brief(f"{word}: {MESSAGE[0]}" if MESSAGE[0] and status > _WARNING else word, 200)
+        return status, brief(status_word(status) + (last_message(": ") if status > WARNING else ""), 200)
 
     @contextmanager
     def _instance(self, plan: Plan, *, initialized: bool = True, logging: bool = False) -> Iterator[Any]:
@@ -163,7 +164,7 @@ class Runs:
         from fmpy.fmi1 import FMICallException
         from fmpy.simulation import apply_start_values, instantiate_fmu
 
-        MESSAGE[0] = ""
+        forget_message()
         fmu = None
         try:
             fmu = instantiate_fmu(
@@ -179,7 +180,7 @@ class Runs:
                 fmu.exitInitializationMode()
             yield fmu
         except Exception as error:  # FMPy raises that itself
-            message = f"; the FMU: {MESSAGE[0]}" if isinstance(error, FMICallException) and MESSAGE[0] else ""
+            message = last_message() if isinstance(error, FMICallException) else ""
             raise RunError(brief(f"{str(error).replace(self._folder, '').rstrip('.')}{message}", 240)) from error
         finally:
             if fmu is not None and fmu.component is not None:
@@ -211,8 +212,24 @@ class Runs:
             raise RunError(f"the FMU ended the run at {returned[3]:.6g} s")
 
 
+def status_word(status: int) -> str:
+    """Return the name of a status."""
+    return _STATUS[status] if status < len(_STATUS) else f"status {status}"
+
+
 def keep_message(*arguments: Any) -> None:
     """Keep a warning. The last three arguments of a logger are the same in every version of FMI."""
     status, _, text = arguments[-3:]
-    if status >= _WARNING:
-        MESSAGE[0] = (text or b"").decode(errors="replace")
+    if status >= WARNING:
+        _MESSAGES.last = (text or b"").decode(errors="replace")
+
+
+def forget_message() -> None:
+    """Forget the last warning, before a call that may give one."""
+    _MESSAGES.last = ""
+
+
+def last_message(before: str = "; the FMU: ") -> str:
+    """Return the last warning as the end of a message, or an empty text."""
+    text = getattr(_MESSAGES, "last", "")
+    return f"{before}{text}" if text else ""

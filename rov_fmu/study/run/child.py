@@ -11,8 +11,9 @@ import numpy.typing as npt
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
 from rov_fmu.prove.description import DISK, MEMORY
+from rov_fmu.prove.runs import RunError
 from rov_fmu.study.plan.figures import Figures
-from rov_fmu.study.run.simulator import Job, LoadError, RunError, Simulator
+from rov_fmu.study.run.simulator import Job, LoadError, Simulator
 
 Array = npt.NDArray[np.float64]
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"

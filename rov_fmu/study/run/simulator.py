@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock, local
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -16,17 +16,11 @@ from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
 from rov_fmu.io.messages import brief
+from rov_fmu.prove.runs import WARNING, RunError, forget_message, keep_message, last_message, status_word
 from rov_fmu.study.plan.model import TYPES, Model, Variable
 from rov_fmu.study.plan.plan import Plan
 
 Array = npt.NDArray[np.float64]
-_WARNING = 1
-_STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
-"""The name of each status, in every version of FMI."""
-
-
-class RunError(Exception):
-    """The FMU did not do a run; the text is the reason in one line."""
 
 
 class LoadError(Exception):
@@ -132,12 +126,12 @@ class Simulator:
         do_step, times, step = self._functions["DoStep"], self._times, self._job.plan.step
         for n in range(len(times) - 1):
             for put, references, count, address in self._changes.get(n, ()):
-                if (status := put(component, references, count, address)) > _WARNING:
+                if (status := put(component, references, count, address)) > WARNING:
                     _check(status, "setting the inputs", times[n])
-            if (status := do_step(component, times[n], step, True)) > _WARNING:
+            if (status := do_step(component, times[n], step, True)) > WARNING:
                 _check(status, "the step", times[n])
             for get, references, count, address, row in reads:
-                if (status := get(component, references, count, address + (n + 1) * row)) > _WARNING:
+                if (status := get(component, references, count, address + (n + 1) * row)) > WARNING:
                     _check(status, "reading", times[n + 1])
 
     def _initialize(self) -> None:
@@ -180,19 +174,15 @@ class Simulator:
         return groups
 
     def _instantiate(self) -> Any:
-        _MESSAGES.last = ""
+        forget_message()
         try:
             with _loading():
                 return instantiate_fmu(
-                    self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=_keep
+                    self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep_message
                 )
         except Exception as error:  # FMPy raises that itself
             what = str(error).replace(self._folder + os.sep, "").rstrip(".")
-            raise LoadError(brief(f"{what}{self._message()}", 240)) from error
-
-    def _message(self) -> str:
-        """Return the FMU's last warning, or an empty text."""
-        return f"; the FMU: {_MESSAGES.last}" if getattr(_MESSAGES, "last", "") else ""
+            raise LoadError(brief(f"{what}{last_message()}", 240)) from error
 
     def _with_message(self, values: Sequence[float]) -> str:
         """Repeat a failed run with logging on, and return the reason with the FMU's last warning."""
@@ -201,7 +191,7 @@ class Simulator:
         try:
             self._run(values)
         except _FailedError as failed:
-            return f"{failed}{self._message()}"
+            return f"{failed}{last_message()}"
         finally:
             self._logs = False
         return ""
@@ -221,25 +211,13 @@ def _loading() -> Iterator[None]:
             os.chdir(here)
 
 
-_MESSAGES = local()
-"""The FMU's last warning in each thread. It is global because FMPy passes all messages to the latest logger."""
-
-
-def _keep(*arguments: Any) -> None:
-    """Keep a warning. The last three arguments of a logger are the same in every version of FMI."""
-    status, _, text = arguments[-3:]
-    if status >= _WARNING:
-        _MESSAGES.last = (text or b"").decode(errors="replace")
-
-
 class _FailedError(Exception):
     """A call of the FMU failed."""
 
 
 def _check(status: int, what: str, time: float | None = None) -> None:
-    if status > _WARNING:
-        word = _STATUS[status] if status < len(_STATUS) else f"status {status}"
-        raise _FailedError(f"{what}{'' if time is None else f' at {time:.6g} s'}: {word}")
+    if status > WARNING:
+        raise _FailedError(f"{what}{'' if time is None else f' at {time:.6g} s'}: {status_word(status)}")
 
 
 def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
