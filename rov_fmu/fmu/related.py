@@ -3,9 +3,8 @@
 The layered standard FMI-LS-REF lists these files with their roles in its manifest.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from math import exp
 from pathlib import Path
 
 from rov_fmu.fmu.archive import FOLDER, META_DATA
@@ -13,7 +12,7 @@ from rov_fmu.io.paths import name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.description import TABLES
-from rov_fmu.vehicle.uncertainty import NORMAL, Uncertainty, is_factor
+from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 from rov_fmu.vehicle.writer import vehicle_text
 
@@ -121,16 +120,6 @@ def ends_of_intervals(vehicle: Vehicle) -> Iterator[tuple[str, str, Mapping[str,
     known = vehicle.uncertainty
     for n, name in enumerate(known.names):
         for end, score in (("low", -NORMAL), ("high", NORMAL)):
-            values = _moved(known, [score * float(r) for r in known.correlation[n]])
+            moved = zip(known.names, known.at(score * known.correlation[n]), known.correlation[n], strict=True)
+            values = {other: float(format(x, _DIGITS)) for other, x, r in moved if r}
             yield f"{name}_{end}", f"{name} at the {end} end of its 95 % interval", values
-
-
-def _moved(known: Uncertainty, scores: Sequence[float]) -> dict[str, float]:
-    """Return the coefficients that differ from those of the vehicle by some standard errors each."""
-    coefficients = {}
-    for n, (name, score) in enumerate(zip(known.names, scores, strict=True)):
-        value, shift, (low, high) = float(known.values[n]), score * float(known.errors[n]), known.bounds[n]
-        moved = value * exp(shift / value) if is_factor(name) and value > 0.0 else value + shift
-        if score:
-            coefficients[name] = float(format(min(max(moved, float(low)), float(high)), _DIGITS))
-    return coefficients

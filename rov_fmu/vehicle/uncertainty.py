@@ -56,11 +56,20 @@ class Uncertainty:
         eigenvalues, V = np.linalg.eigh(self.correlation)
         root = (V * np.sqrt(np.maximum(eigenvalues, 0.0))) @ V.T  # symmetric, so it does not depend on the choice of V
         root /= np.linalg.norm(root, axis=1, keepdims=True)
-        scores = self._hold_at_bounds(_product(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)), root.T))
-        deviations = self.errors * scores
-        drawn = np.where(self._is_factor, self._scaled(deviations), self.values + deviations)
-        low, high = self.bounds.T
-        return np.asarray(np.clip(drawn, low, high))
+        return self.at(self._hold_at_bounds(_product(ndtri(np.clip(uniform, _EDGE, 1.0 - _EDGE)), root.T)))
+
+    def at(self, scores: Array) -> Array:
+        """Return the coefficients that differ from the values by some standard errors each, within the bounds.
+
+        - `scores`: p numbers, or a row of them for each vehicle.
+
+            known = rov_fmu.load("videoray_refit").uncertainty
+            known.at(2.0 * known.correlation[0])  # the first one by two standard errors, and what follows from it
+        """
+        deviations, (low, high) = self.errors * scores, self.bounds.T
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            scaled = self.values * np.exp(deviations / self.values)
+        return np.asarray(np.clip(np.where(self._is_factor, scaled, self.values + deviations), low, high))
 
     @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
@@ -91,11 +100,6 @@ class Uncertainty:
     def _is_factor(self) -> NDArray[np.bool_]:
         """A mask of the coefficients that are a factor, α or β, with a positive value."""
         return np.array([is_factor(name) for name in self.names], bool) & (self.values > 0.0)
-
-    def _scaled(self, deviations: Array) -> Array:
-        """Return the values multiplied by factors whose logarithms have the given deviations."""
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            return np.asarray(self.values * np.exp(deviations / self.values))
 
     def _hold_at_bounds(self, free: Array) -> Array:
         """Return n x p normal scores, with those beyond a bound held there and the others conditioned on these."""
