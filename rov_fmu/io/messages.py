@@ -57,14 +57,7 @@ class FileError(_LinesError, ValueError):
     """A file that cannot be used. Each reason is a line with the file, the place, the value and what is allowed."""
 
 
-class _OneLineError(Exception):
-    """An exception whose message is one line."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(one_line(reason))
-
-
-class InputError(_OneLineError, ValueError):
+class InputError(_LinesError, ValueError):
     """An argument that cannot be used. The message is a line with its name, its value and what is allowed."""
 
 
@@ -78,7 +71,7 @@ class ProofError(_LinesError):
     """An FMU that does not keep what it claims, such as the results that it contains. Each reason is a line."""
 
 
-class StudyError(_OneLineError):
+class StudyError(_LinesError):
     """A study that cannot continue. Its finished runs are kept."""
 
 
