@@ -94,8 +94,7 @@ def _axis() -> Table:
     rows: Table = []
     for key, kind in (AXIS | TUNING).items():
         units = dict.fromkeys(kind.filled(**axis_words(axis)).unit for axis in (SURGE, ROLL))
-        bounds = f"{number(kind.minimum, 6)}\xa0…\xa0{number(kind.maximum, 6)}"
-        value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units), bounds])
+        value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units)])
         _add(rows, key, value, kind.filled(**words).description)
     return [_KEYS, *rows]
 
@@ -274,14 +273,15 @@ def _terminals() -> Table:
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
-    """A row a key; keys of one quantity share a row."""
+    """A row a key; keys of one quantity share a row. The schema has the range of a quantity, as has an error message."""
     rows: Table = []
     for key, entry in table["properties"].items():
         found = _resolved(entry, schema)
         of_value = found.get("properties", {}).get("value")
         unit = found["properties"].get("unit", {}).get("const", "") if of_value else ""
         needed = "needed" if key in table.get("required", ()) else ""
-        value = ", ".join(filter(None, (needed, unit, _allowed(of_value or found))))
+        allowed = "" if unit and "minimum" in of_value else _allowed(of_value or found)
+        value = ", ".join(filter(None, (needed, unit, allowed)))
         _add(rows, key, value, _words(found))
     return [_KEYS, *rows]
 
