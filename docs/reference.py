@@ -273,7 +273,7 @@ def _terminals() -> Table:
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
-    """A row a key; keys of one quantity share a row. The schema has the range of a quantity, as has an error message."""
+    """A row a key; keys of one quantity share a row. The schema has the range of a quantity."""
     rows: Table = []
     for key, entry in table["properties"].items():
         found = _resolved(entry, schema)
