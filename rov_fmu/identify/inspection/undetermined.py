@@ -40,7 +40,8 @@ _REASONS = {
 def undetermined(logs: Sequence[Log], description: Description, measured: Collection[str]) -> Iterator[str]:
     """Yield a sentence for everything that logs cannot determine about the vehicle that a rov.toml describes.
 
-    The forces of the `measured` thrust curves are in tables. Nothing is fitted: it follows from what is measured, and from how the thrusters are commanded.
+    The forces of the `measured` thrust curves are in tables. Nothing is fitted: it follows from what is measured, and
+    from how the thrusters are commanded.
     """
     layout = description.logged
     driven: dict[Log, list[Axis]] = {}
