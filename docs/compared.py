@@ -79,10 +79,6 @@ def tables() -> dict[str, Table]:
     }
 
 
-def _table(*columns: str) -> Table:
-    return [columns, ("---",) * len(columns)]
-
-
 # ---- VideoRay --------------------------------------------------------------------------------------------------------
 
 
@@ -92,7 +88,7 @@ def _furthest(deviations: Iterable[float | None]) -> str:
 
 
 def _printed(vehicle: Vehicle) -> Table:
-    found = _table("", "V_ss, α = β = 1", "Tau, α = β = 1", "V_ss, scaled", "Tau, scaled")
+    found: Table = [("", "V_ss, α = β = 1", "Tau, α = β = 1", "V_ss, scaled", "Tau, scaled")]
     for t in load_tables(vehicle):
         models: list[Callable[[Response], float | None]] = [lambda r: r.V_ss.from_printed, lambda r: r.Tau.from_printed]
         cells = [_furthest(of(row.non_linear) for row in t.rows) for of in models]
@@ -102,7 +98,7 @@ def _printed(vehicle: Vehicle) -> Table:
 
 
 def _measured(paper: Vehicle, refit: Vehicle) -> Table:
-    found = _table("", "V_ss, the paper's", "V_ss, refit", "Tau, the paper's", "Tau, refit")
+    found: Table = [("", "V_ss, the paper's", "V_ss, refit", "Tau, the paper's", "Tau, refit")]
     quantities: list[Callable[[Response], Decimal | None]] = [lambda r: r.V_ss.measured, lambda r: r.Tau.measured]
     for t in load_tables(paper):
         cells = [
@@ -143,7 +139,7 @@ def _t200(vehicle: Vehicle) -> Table:
         "shipped": np.array([vehicle.curve_force(curve, float(x)) for x in c]),
         "one symmetric quadratic": (a * abs(c) + b) * c,
     }
-    found = _table("", "RMS forward", "RMS in reverse", "furthest", "at 99 % forward")
+    found: Table = [("", "RMS forward", "RMS in reverse", "furthest", "at 99 % forward")]
     for name, model in models.items():
         off = model - thrust
         sides = [float(np.sqrt(np.mean(off[side] ** 2))) for side in (c > 0.0, c < 0.0)]
@@ -156,7 +152,7 @@ def _t200(vehicle: Vehicle) -> Table:
 
 
 def _sticks(layout: Layout) -> Table:
-    found = _table("stick", *(f"`u_{thruster.name}`" for thruster in layout.thrusters))
+    found: Table = [("stick", *(f"`u_{thruster.name}`" for thruster in layout.thrusters))]
     for axis in AXES.values():
         signs = layout.signs(axis)
         if axis in (ROLL, PITCH):  # ArduSub rolls and pitches with the vertical thrusters alone
@@ -167,7 +163,7 @@ def _sticks(layout: Layout) -> Table:
 
 
 def _top_speeds(six: Vehicle, eight: Vehicle) -> Table:
-    found = _table("full command", six.name, eight.name)
+    found: Table = [("full command", six.name, eight.name)]
     for axis in (form.axis for form in six.layout.axes):
         for command, way in ((1.0, axis.positive), (-1.0, axis.negative)):
             speeds = [abs(v.response(axis, command)[0]) for v in (six, eight)]
@@ -192,7 +188,7 @@ AHEAD = (0.1, 0.2, 0.3, 0.5, 1.0)
 
 def _tilting(eight: Vehicle) -> Table:
     """How far vehicles without control tilt under thrust ahead."""
-    found = _table("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))
+    found: Table = [("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))]
     cases = {
         "Heavy": eight,
         "Heavy, buoyancy 5 cm above": eight.with_(z_B=-0.05),

@@ -53,11 +53,11 @@ def tables() -> dict[str, Table]:
     named |= {
         name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
     }
-    categories: Table = [("category", "what"), ("---",) * 2]
+    categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
-    found["verdict"] = [("", "*usable*", "*do not use*"), ("---",) * 3, *(rule.row for rule in RULES)]
+    found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
         "varied": Varied,
@@ -67,20 +67,20 @@ def tables() -> dict[str, Table]:
     }
     found |= {name: _plan_table(of) for name, of in plans.items()}
     found |= {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
-    as_thruster = {row[0] for row in found["thruster"][2:]}
+    as_thruster = {row[0] for row in found["thruster"][1:]}
     return found | {"fin": [row for row in found["fin"] if row[0] not in as_thruster]}
 
 
 def _priors() -> Table:
     """Return the deviations of the priors of an identification, with their keys in rov.toml."""
     rows = ((f"`{key}`", f"{prior.deviation:g}", prior.words, prior.reason) for key, prior in PRIORS.items())
-    return [("key", "deviation", "of", "reason"), ("---",) * 4, *rows]
+    return [("key", "deviation", "of", "reason"), *rows]
 
 
 def _frames() -> Table:
     """Return the frames of ArduSub, with the vehicles that ship and fit them."""
     shipped = {name: fitting_frames(load_vehicle(path).layout) for name, path in SHIPPED.items()}
-    rows: Table = [("`FRAME_CONFIG`", "frame", "motors", "vehicles that ship"), ("---",) * 4]
+    rows: Table = [("`FRAME_CONFIG`", "frame", "motors", "vehicles that ship")]
     for config, (frame, motors) in enumerate(FRAMES.items()):
         own = ", ".join(f"`{name}`" for name, frames in shipped.items() if frame in frames)
         rows.append((str(config), f"`{frame}`", str(len(motors)), own))
@@ -94,10 +94,9 @@ def _axis() -> Table:
     rows: Table = []
     for key, kind in (AXIS | TUNING).items():
         units = dict.fromkeys(kind.filled(**axis_words(axis)).unit for axis in (SURGE, ROLL))
-        bounds = f"{number(kind.minimum, 6)}\xa0…\xa0{number(kind.maximum, 6)}"
-        value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units), bounds])
+        value = ", ".join([*(["needed"] if kind.needed else []), " or ".join(units)])
         _add(rows, key, value, kind.filled(**words).description)
-    return [_KEYS, ("---",) * 3, *rows]
+    return [_KEYS, *rows]
 
 
 def _add(rows: Table, key: str, value: str, words: str) -> None:
@@ -123,7 +122,7 @@ def _add(rows: Table, key: str, value: str, words: str) -> None:
 
 def _columns() -> Table:
     """Return the columns of measurements that a CSV log may have."""
-    rows: Table = [("column", "also, with a unit", "units"), ("---",) * 3]
+    rows: Table = [("column", "also, with a unit", "units")]
     for name, quantity in catalogue.QUANTITIES.items():
         also, units = (", ".join(f"`{word}`" for word in words) for words in (quantity.also, quantity.units))
         rows.append((f"`{name}`", also, units))
@@ -141,7 +140,7 @@ def _messages() -> Table:
         field = f".{message.fields[0]}" if message.gives in catalogue.QUANTITIES else ""
         found.setdefault(words.get(message.gives, message.gives), {})[f"`{_plain(message.kind)}{field}`"] = None
     rows = ((name, ", ".join(messages)) for name, messages in found.items())
-    return [("measured", "messages, preferred ones first"), ("---",) * 2, *rows]
+    return [("measured", "messages, preferred ones first"), *rows]
 
 
 def _plain(pattern: str) -> str:
@@ -152,8 +151,9 @@ def _plain(pattern: str) -> str:
 
 
 def markdown(table: Table) -> str:
-    """As a page has it."""
-    return "\n".join(f"| {' | '.join(row)} |" for row in table)
+    """As a page has it: the first row has the headings."""
+    heads, *rows = (f"| {' | '.join(row)} |" for row in table)
+    return "\n".join([heads, f"|{'---|' * len(table[0])}", *rows])
 
 
 def filled(page: str) -> str:
@@ -205,22 +205,29 @@ def _command_reference() -> str:
         with click.Context(command, root, name) as context:
             usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
         rows.append((f"`{usage}`", escape(command.get_short_help_str(limit=1000), quote=False)))
-    return markdown([("command", "what it does"), ("---",) * 2, *rows])
+    return markdown([("command", "what it does"), *rows])
 
 
 def _interface() -> str:
-    """The public functions and classes with the first sentence of each, by the headings of the site's page."""
+    """The public functions with the first sentence of each, by the headings of the site's page.
+
+    Classes without members that the page names are only types of arguments and results, and have no row.
+    """
     page = Path(__file__).with_name("api-in-full.rst").read_text(encoding="utf-8")
     found: list[str] = []
     rows: Table = []
     for heading, directives in re.findall(r"^([^\n]+)\n-+\n\n(.*?)(?=\n\n|\Z)", page, re.MULTILINE | re.DOTALL):
-        rows = [("name", "what it is"), ("---",) * 2]
+        rows, types = [("name", "what it is")], list[str]()
         for kind, path, members in re.findall(r"auto(\w+):: (\S+)(?:\n +:members: (.*))?", directives):
             module, _, name = path.rpartition(".")
             value = getattr(import_module(module), name)
+            if kind == "class" and not members:
+                types.append(f"`{name}`")
+                continue
             rows.append(_described(path, value) if kind != "data" else (f"`{path}`", _said_of_data(module, name)))
             rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
-        found.append(f"## {heading}\n\n{markdown(rows)}")
+        also = f"\n\nTypes: {', '.join(types)}." if types else ""
+        found.append(f"## {heading}\n\n{markdown(rows)}{also}")
     return "\n\n".join(found)
 
 
@@ -267,20 +274,21 @@ def _terminals() -> Table:
         )
         for terminal in terminals(load_vehicle(VIDEORAY).layout)
     ]
-    return [("terminal", "of", "matching", "what", "members in the VideoRay"), ("---",) * 5, *rows]
+    return [("terminal", "of", "matching", "what", "members in the VideoRay"), *rows]
 
 
 def _table(table: dict[str, Any], schema: dict[str, Any]) -> Table:
-    """A row a key; keys of one quantity share a row."""
+    """A row a key; keys of one quantity share a row. The schema has the range of a quantity."""
     rows: Table = []
     for key, entry in table["properties"].items():
         found = _resolved(entry, schema)
         of_value = found.get("properties", {}).get("value")
         unit = found["properties"].get("unit", {}).get("const", "") if of_value else ""
         needed = "needed" if key in table.get("required", ()) else ""
-        value = ", ".join(filter(None, (needed, unit, _allowed(of_value or found))))
+        allowed = "" if unit and "minimum" in of_value else _allowed(of_value or found)
+        value = ", ".join(filter(None, (needed, unit, allowed)))
         _add(rows, key, value, _words(found))
-    return [_KEYS, ("---",) * 3, *rows]
+    return [_KEYS, *rows]
 
 
 def _plan_table(of: type[Strict]) -> Table:
@@ -293,7 +301,7 @@ def _plan_table(of: type[Strict]) -> Table:
         parts.append(f"`{{ {keys} }}`" if keys else _allowed(found))
         parts += [f"default `{field.default}`"] if field.default not in (None, {}) and not field.is_required() else []
         rows.append((f"`{key}`", ", ".join(parts), _words(found)))
-    return [_KEYS, ("---",) * 3, *rows]
+    return [_KEYS, *rows]
 
 
 def _resolved(entry: dict[str, Any], schema: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,7 @@
 """Draw the top of a page: `python -m docs.screenshot otter.html docs/report.webp`.
 
 The pictures at the head of the tutorials are made so, from the pages that their commands write: `report.webp` from
-`otter.html`, `report_dive.webp` from `harbour.html`, and `study.webp` from `wall/study.html`, 980 pixels high.
+`otter.html`, and, 980 pixels high, `report_dive.webp` from `harbour.html` and `study.webp` from `wall/study.html`.
 Headless Chromium, driven by Playwright (`pip install -e ".[interop]"`), opens the page.
 """
 

@@ -454,10 +454,21 @@ const MOVES = ["surge", "sway", "heave"];
 const ROOM = 0.25; // of the largest command, which a move leaves to a turn
 
 /**
+ * Returns the command of a move about which a pair of thrusters turns, one with a turn more and one with a turn less.
+ *
+ * Their force is the same as without the turn, if thrust is quadratic in the command.
+ * @param {number} move @param {number} turn
+ */
+function turningAbout(move, turn) {
+  if (2 * turn ** 2 < move ** 2) return Math.sign(move) * Math.sqrt(move ** 2 - turn ** 2); // both push along the move
+  return (move * Math.abs(move)) / (2 * Math.abs(turn) || 1);
+}
+
+/**
  * Returns the commands for demands along axes. Each axis drives its commands by their shares.
  *
- * A turn is a difference about the commands of the moves, whose sum it leaves: the difference shrinks where a command
- * would become larger than `most`. Saturation of one side would change the sum, and with it the speed.
+ * A turn is a difference about the commands of the moves, whose force it leaves: the difference shrinks where a command
+ * would become larger than `most`. Saturation of one side would change the force, and with it the speed.
  * @param {Vehicle} vehicle @param {Map<string, number>} demands @param {number} most @returns {Record<string, number>}
  */
 function commandsOf({ commands, axes }, demands, most = 1) {
@@ -475,7 +486,8 @@ function commandsOf({ commands, axes }, demands, most = 1) {
     1,
     ...turns.map((turn, n) => (turn ? (most - reduced[n] * Math.sign(turn)) / Math.abs(turn) : 1)),
   );
-  return Object.fromEntries(commands.map((command, n) => [command, within(reduced[n] + part * turns[n], most)]));
+  const given = reduced.map((move, n) => turningAbout(move, part * turns[n]) + part * turns[n]);
+  return Object.fromEntries(commands.map((command, n) => [command, within(given[n], most)]));
 }
 
 /** Returns true for a command that is larger than those for which the model was identified. @param {Vehicle} vehicle @param {number} command */

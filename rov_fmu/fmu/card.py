@@ -36,7 +36,8 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     ]
     if made:
         data.append(f"Identified from {vehicle.measured_from} by {made.tool}: {made.method}.")
-        data += [f"{name}: {made.hash} {digest}" for name, digest in made.inputs.items()]
+        if made.inputs:
+            data.append(f"The vehicle file has the {made.hash} of {listed(made.inputs)}.")
         trust = [*made.verdicts, *(f"Unseen data: {error}." for error in made.errors)]
         trust += [f"Open: {warning}." for warning in made.warnings] or ["There are no warnings."]
         holds += [f"Tested: {quantity}." for quantity in made.tested]

@@ -96,9 +96,9 @@ def sentence(text: str) -> str:
 
 
 def readable(text: str) -> str:
-    """Return a sentence with minus signs, spaces before percent signs, µs for us, and ° for deg."""
+    """Return a sentence with minus signs, spaces that hold lines together before %, µs for us, and ° for deg."""
     text = re.sub(r"(?<=[\s(])-(?=\d)", "−", text)
-    text = re.sub(r"(?<=\d)%(?=[\s,.;)]|$)", " %", text)
+    text = re.sub(r"(?<=\d)%(?=[\s,.;)]|$)", "\xa0%", text)
     return re.sub(r"(?<=\d )us\b", "µs", re.sub(r"(?<=\d )deg\b", "°", text))
 
 

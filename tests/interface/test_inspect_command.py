@@ -494,6 +494,22 @@ def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: 
     assert "momentary" not in told
 
 
+def test_a_log_of_one_axis_commands_it_alone_and_measured_forces_are_not_assumed(
+    tmp_path: Path, inspect: Inspect
+) -> None:
+    """Both rear thrusters drive surge and yaw, and a log of surge has one command for both."""
+    time, command = 0.1 * np.arange(400.0), np.linspace(-100.0, 100.0, 11)
+    (tmp_path / "rov.toml").write_text('base = "videoray"\n[vehicle]\nname = "A"\nidentifier = "a"\n')
+    for curve in ("rear", "top"):
+        table(tmp_path / f"thrust_{curve}.csv", "command [%],force [N]", command, 0.2 * command)
+    table(tmp_path / "log_surge.csv", "time [s],command [1],velocity [m/s]", time, 0.5 * np.sin(time), np.sin(time))
+    told = inspect(option="")[0].partition("What no fit can learn from these logs:\n")[2].partition("\n\n")[0]
+    assert "speeds beyond the strongest commands, 50% in surge, are extrapolated" in told
+    assert not re.search("alone|assumed thrust", told)
+    (tmp_path / "thrust_top.csv").unlink()
+    assert "unless thrust_top.csv has measured ones" in inspect(option="")[0]
+
+
 def test_the_page_of_logs_has_a_picture_of_each(tmp_path: Path) -> None:
     one_file(tmp_path)
     (tmp_path / "bad.csv").write_text("time [s],depth [m]\n", encoding="utf-8")

@@ -59,6 +59,7 @@ class Visit:
     """A page in a browser, with its console messages and the addresses that it requested."""
 
     def __init__(self, browser: "Browser", *, width: int = 1280, height: int = 900, scheme: Any = "light") -> None:
+        self.scheme = scheme
         self.page: Page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)
         self.page.set_default_timeout(_LONG)
         self.messages: list[str] = []

@@ -4,11 +4,13 @@ import re
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
 from lxml import html
 
 from rov_fmu.fmu.variables import Variable
 from rov_fmu.report.templates import number, pretty_unit
 from tests.report.conftest import Visit
+from tests.report.fly.boxes import problems
 
 _LONG_WORDS = """() => {
   const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
@@ -35,6 +37,26 @@ def check_breaks_long_words(page: str, path: Path, visit: Callable[..., Visit]) 
         seen.goto(path.as_uri())
         assert seen.evaluate(_LONG_WORDS) > 2
         assert seen.evaluate("document.documentElement.scrollWidth") == width
+
+
+def check_fits_and_is_accessible(seen: Visit, path: Path, wait_for: str = "body") -> None:
+    """Check a page folded and unfolded: nothing overlaps or is cut, axe finds nothing, and it asks for nothing.
+
+    It has the colours of the visit's scheme, and nothing moves by itself for people who do not want that.
+    """
+    axe = pytest.importorskip("axe_playwright_python.sync_playwright").Axe()
+    seen.page.emulate_media(reduced_motion="reduce")
+    seen.page.goto(path.as_uri())
+    seen.page.wait_for_selector(wait_for)
+    for action in ("", UNFOLD):
+        seen.page.evaluate(action)
+        assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+        assert problems(seen.page) == [], "nothing overlaps or is cut"
+        assert axe.run(seen.page).response["violations"] == []
+    assert seen.page.evaluate("document.getAnimations().length") == 0
+    lightness = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]
+    assert (int(lightness) > 128) == (seen.scheme == "light")
+    assert (seen.messages, seen.requests) == ([], [path.as_uri()])
 
 
 def text_of(page: str) -> str:

@@ -28,7 +28,7 @@ def test_the_card_of_an_identified_vehicle_has_its_data_ranges_verdicts_and_erro
     found = card(replace(vehicle, provenance=made, limits=("It leaks.",)))
     assert [*found] == ["What it is", "From which data", "Where it holds", "How far to trust it", "What it leaves out"]
     assert found["What it is"] == ["Tadpole, version 1. A small ROV that exists only in tests."]
-    assert found["From which data"][-1] == "log_1.csv: SHA-256 " + "1" * 64
+    assert found["From which data"][-1] == "The vehicle file has the SHA-256 of log_1.csv."
     assert found["Where it holds"][0] == "Commands of 20% to 70%; beyond them the thrust curves extrapolate."
     assert "Tested: depth: -1.0 to 1.0 m." in found["Where it holds"]
     trust = found["How far to trust it"]

@@ -216,9 +216,6 @@ def test_everything_that_was_found_has_its_row(page: str) -> None:
     given = {row[0]: row for row in table if len(row) == 5}
     assert given["m_rov"][2:] == [number(vehicle["m_rov"], 5), "kg", vehicle.sources["m_rov"]]
     assert "a_d_u" not in given, "it is among what was identified"
-    assert vehicle.provenance
-    for name, digest in vehicle.provenance.inputs.items():
-        assert f"{name}: SHA3-256 {digest}" in text_of(page)
 
 
 # ---- Without plots ---------------------------------------------------------------------------------------------------
@@ -322,7 +319,7 @@ def test_the_printout_has_the_words_of_the_report_and_answers_the_owners_questio
     assert places == sorted(places)
     shown = unfolded(page).casefold()
     for sentence_ in (STOPPING, *made.warnings, *next_tests(example()), *example().axes[2].verdict.reasons):
-        assert readable(sentence_).casefold() in shown
+        assert " ".join(readable(sentence_).split()).casefold() in shown
 
 
 def driven_by(names: Sequence[str]) -> Identification:

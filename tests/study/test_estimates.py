@@ -194,7 +194,8 @@ def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
     assert items == [f"{sentence(warning)}." for warning in warnings]
     assert lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
     varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
-    assert varied["b_d_u"] == "estimate: value 5, error 0.3; correlated with a_d_u"
+    assert varied["b_d_u"] == "estimate: value 5, error 0.3"
+    assert "Correlated, and therefore drawn together: a_d_u, b_d_u." in " ".join(page.text_content().split())
     assert varied["m_rov"] == "normal: mean 6.572, sd 0.05"
     index = results.sensitivity("mixed").loc["a_d_u, b_d_u"]
     cells = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='a_d_u, b_d_u']/td")

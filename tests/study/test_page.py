@@ -23,7 +23,9 @@ from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indic
 from rov_fmu.study.results.results import statistics
 from tests.commands import without_progress
 from tests.folders import beside
-from tests.report.pages import check_is_whole
+from tests.report.conftest import Visit
+from tests.report.fly.boxes import SCHEMES, WIDTHS
+from tests.report.pages import check_fits_and_is_accessible, check_is_whole
 from tests.report.plots.test_identification import bands, bars, lines
 
 
@@ -119,6 +121,15 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
     assert "offset = 2.0 + 0*b does not vary: it is 2 in all" in " ".join(page.text_content().split())
     assert study_page(results) == text, "the page is the same for the same results"
     pd.testing.assert_frame_equal(results.sensitivity("end", seed=1), results.sensitivity("end"))
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("scheme", SCHEMES)
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_page_asks_for_nothing_fits_and_is_accessible(
+    done: Path, width: int, scheme: str, visit: Callable[..., Visit]
+) -> None:
+    check_fits_and_is_accessible(visit(width=width, scheme=scheme), done / "study.html")
 
 
 def test_a_grid_of_one_or_two_variables_has_lines(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:

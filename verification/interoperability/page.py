@@ -26,8 +26,8 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
     read_table(page)
     text = page.read_text(encoding="utf-8")
     heads, *rows = matrix(outcomes)
-    lines = [f"| {' | '.join(line)} |" for line in (heads, ["---"] * len(heads), *rows)]
-    content = "\n".join(["", *lines, "", f"Run on {date.today()}.", "", ""])
+    head, *lines = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
+    content = "\n".join(["", head, f"|{'---|' * len(heads)}", *lines, "", f"Run on {date.today()}.", "", ""])
     write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()), force=True)
 
 

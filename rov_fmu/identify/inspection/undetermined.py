@@ -1,6 +1,6 @@
 """What recordings cannot determine, and why, told before any fit."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from rov_fmu.identify.likelihood.records import driven_axes
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Commands, Log
@@ -36,10 +37,11 @@ _REASONS = {
 """Why a log that measures the motion along an axis tells nothing about it, by the kind of the finding."""
 
 
-def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]:
+def undetermined(logs: Sequence[Log], description: Description, measured: Collection[str]) -> Iterator[str]:
     """Yield a sentence for everything that logs cannot determine about the vehicle that a rov.toml describes.
 
-    Nothing is fitted: it follows from what is measured, and from how the thrusters are commanded.
+    The forces of the `measured` thrust curves are in tables. Nothing is fitted: it follows from what is measured, and
+    from how the thrusters are commanded.
     """
     layout = description.logged
     driven: dict[Log, list[Axis]] = {}
@@ -68,7 +70,8 @@ def undetermined(logs: Sequence[Log], description: Description) -> Iterator[str]
         if weak:
             yield f"speeds beyond the strongest commands, {listed(weak)}, are extrapolated"
         yield from (words for log in logs if (words := _momentary(log)))
-        if curves := [c.name for c in layout.curves if c.coefficient("a_t") not in description.known]:
+        known = {c.name for c in layout.curves if c.coefficient("a_t") in description.known}
+        if curves := [c.name for c in layout.curves if c.name not in known.union(measured)]:
             yield (
                 "forces are relative to an assumed thrust, and so are loads, drag, masses and β, unless "
                 f"thrust_{curves[0]}.csv has measured ones"
@@ -101,7 +104,7 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
     for commands in logs:
         values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
         own = _push(layout, axis, values)
-        pushed = {other: np.abs(_push(layout, other, values)) for other in others}
+        pushed = {other: np.abs(_push(layout, other, values)) for other in others if COMMAND not in values}
         most = np.max([*pushed.values()], axis=0) if pushed else np.zeros(len(own))
         is_used = np.abs(own) > _LEAST_PUSH
         alone += commands.interval * float(np.sum(is_used & (most < _ASIDE * np.abs(own))))
@@ -118,8 +121,8 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
 def _push(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
     """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
     rows = len(next(iter(values.values())))
-    if "command" in values:
-        return values["command"]
+    if COMMAND in values:  # of a log of this axis alone
+        return values[COMMAND]
     effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
     total = sum(abs(effect) for _, effect in effects)
     pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]

@@ -79,6 +79,7 @@ def study_page(results: Results) -> str:
         bands=[_band(results, name) for name in outputs],
         warnings=results.warnings,
         script=inline_script("plots.js"),
+        correlated=[group for group in results.groups if len(group) > 1],
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
         failures=reasons[:_REASONS],
         more_failures=len(reasons[_REASONS:]),
@@ -158,12 +159,10 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
     some = [f"{key} {number(value, 4)}".strip() for key, value in pairs]
     if len(some) > _NUMBERS:
         some[_NUMBERS:] = ["…"]
-    others = [other for group in results.groups if name in group for other in group if other != name]
     values = column.to_numpy(float)
     return {
         "name": name,
         "planned": f"{kind}: {', '.join(some)}",
-        "others": others,
         "least": float(values.min()),
         "median": statistics(values, [0.5])[0][0],
         "greatest": float(values.max()),
