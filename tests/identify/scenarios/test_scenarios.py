@@ -14,7 +14,7 @@ from tests.report.results import without_findings
 
 BY_DEFAULT = {"load of 0.1 N in heave": 1}
 """The quick scenarios of the default tests, and the number of their seeds."""
-OFTEN = ("clean", "delay and lag", "gaps while turning", "tilt with roll and pitch")
+OFTEN = ("gaps while turning", "tilt with roll and pitch")
 """The scenarios that the long tests run with 2 seeds. All of them are run with more seeds once a week."""
 WEEKLY = {
     **dict.fromkeys(SCENARIOS, 200),
