@@ -261,15 +261,3 @@ def test_plots_have_all_runs_their_quantiles_and_the_intervals_of_indices() -> N
         "four even values of the other"
     )
     assert ax.get_xlabel() == "a (N·m)"
-
-
-def test_another_page_of_this_name_is_not_overwritten(
-    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own = tmp_path / "study.html"
-    own.write_text("<p>My studies</p>")
-    assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    reason = "the file there is not as rov-fmu wrote it: it may have been made or changed by hand; --force replaces it"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: cannot be written: {reason}\n"
-    assert [*tmp_path.iterdir()] == [own]
-    assert own.read_text() == "<p>My studies</p>"

@@ -10,7 +10,6 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identified_vehicle import identified_vehicle, written
-from rov_fmu.identify.likelihood.file_fit import MOST_RISE
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -33,11 +32,12 @@ def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehi
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
-    """`written` compares J of the numbers of the file with that of the fit, and a fit from elsewhere is not better."""
+    """J rises by 2 at most. `written` compares J of the numbers of the file with that of the fit, and a fit from
+    elsewhere is not better."""
     fit, vehicle, _ = drawn(tmp_path, 0.05, 0.02, seed)
     file, parameters = fit.file, fit.file.posterior.table.parameters
     assert file.posterior.absent
-    assert file.minimum.value - fit.best.value <= MOST_RISE
+    assert file.minimum.value - fit.best.value <= 2.0
     for n in file.posterior.absent:
         assert file.minimum.z[n] == parameters[n].null, parameters[n]
     assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
