@@ -2,10 +2,10 @@
 
 The mutants are those of cosmic-ray (Python) and universalmutator (C), which `pip install "rov-fmu[mutation]"` installs.
 
-`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist. `--kept` applies them
-to the code of today and runs the quickest of their tests first. It writes each verdict at once, so that it can be ended
-and called again. `--results` writes the verdicts of a later state to another file, and lists those that are killed no
-longer.
+`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist, and then the defects
+that once passed all tests. `--kept` applies them to the code of today and runs the quickest of their tests first. It
+writes each verdict at once, so that it can be ended and called again. `--results` writes the verdicts of a later state
+to another file, and lists those that are killed no longer.
 
 Two parts of the product are not mutated: the scripts of the page, because the tests that would notice need a browser,
 and the engine's and the page's frames around the C of the step, which no FMU contains.
