@@ -174,7 +174,6 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
         "turning",
         "fmi3SetFloat64",
         "RK4",
-        "Model Exchange",
         "memory of each",
         "A study by two workers",
         "kept",
