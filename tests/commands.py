@@ -98,7 +98,7 @@ print(json.dumps(ends))
 def run_elsewhere(
     commands: Sequence[Sequence[str]], folder: Path, prefix: Sequence[str] = (), **how: Any
 ) -> list[tuple[int, str]]:
-    """Run command lines in another process, whose temporary files are in a folder. Return their exit codes and errors."""
+    """Run command lines in another process with its temporary files in a folder. Return their exit codes and errors."""
     result = subprocess.run(
         [*prefix, sys.executable, "-c", _DRIVER, json.dumps(commands)],
         cwd=ROOT,
