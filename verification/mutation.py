@@ -65,7 +65,8 @@ TESTS = {
     "rov_fmu/equation/[cl]a*.py": "equation/table frozen/test_known_results.py docs/test_docs.py equation/test_rov.py "
     "vehicle equation",
     "rov_fmu/equation/dependencies.py": "frozen/test_known_results.py fmu/test_dependencies.py",
-    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation fmu/calls/test_derivatives.py",
+    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation "
+    "fmu/calls/test_derivatives.py",
     "rov_fmu/equation/[pt]*.py": "equation/test_rov.py equation fmu/results/test_outside.py fmu/test_python_flavour.py",
     "rov_fmu/equation/*": "equation/test_rov.py equation/test_step.py equation/test_symmetries.py equation "
     "fmu/test_python_flavour.py",

@@ -1,5 +1,4 @@
-"""The derivative of an expression, of any operation, is its slope. What expressions compute, and how they are written in
-C, the tests of the vehicles compare with 50 digits."""
+"""The derivative of an expression is its slope, whatever its operations. Other tests compare values with 50 digits."""
 
 import pytest
 
