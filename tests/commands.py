@@ -5,9 +5,10 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote, split
 from typing import Any
 
 from rov_fmu.cli import main
@@ -25,7 +26,6 @@ BARE = ROOT / "verification" / "fuzzing" / "bare.toml"
 """A vehicle that builds quickly, with one axis and one thruster."""
 ALONE = re.sub(r"^(data|pictures) = .*\n", "", VIDEORAY.read_text(encoding="utf-8"), flags=re.M)
 """The VideoRay's vehicle file without references to the folders of its data and pictures."""
-_TUNE = ["tune", str(VIDEORAY), "--axis", "heave", "--command", "0.3", "--v-ss", "0.2"]
 
 
 @dataclass(frozen=True)
@@ -34,37 +34,46 @@ class Command:
 
     name: str
     """The name of the file that it writes."""
-    arguments: Callable[[Path], Sequence[str]]
-    """A function that returns the arguments for the path of that file."""
+    line: str
+    """The command line, in which {f} is the folder of that file, and {fmu} an FMU."""
+
+    def arguments(self, target: Path, *more: str, fmu: str = "") -> list[str]:
+        """Return the words of the command line for the path of that file, and further words."""
+        places = {f"{{f}}/{self.name}": str(target), "{f}": str(target.parent), "{fmu}": fmu}
+        words = split(self.line)
+        for name, place in places.items():
+            words = [word.replace(name, place) for word in words]
+        return [*words, *more]
 
     def run(self, target: Path) -> int:
-        """Run the command in this process, and return its exit code."""
-        return main(list(self.arguments(target)))
+        """Run the command in this process, which may replace any file, and return its exit code."""
+        return main(self.arguments(target, "--force"))
 
 
-COMMANDS = {
-    "the FMU": Command("rov.fmu", lambda path: ["build", str(BARE), "--platform", "host", "--force", "-o", str(path)]),
-    "its OSP description": Command(
-        "bare_OspModelDescription.xml",
-        lambda path: [
-            "build",
-            str(BARE),
-            "--platform",
-            "host",
-            "--osp",
-            "--force",
-            "-o",
-            str(path.with_name("rov.fmu")),
-        ],
-    ),
-    "the page that flies": Command("fly.html", lambda path: ["fly", str(BARE), "--force", "-o", str(path)]),
-    "the model for Gazebo": Command(
-        "bare.sdf", lambda path: ["export", str(BARE), "--to", "sdf", "--force", "-o", str(path)]
-    ),
-    "the vehicle": Command("rov.toml", lambda path: ["identify", str(FEW_TESTS), "--force", "-o", str(path)]),
-    "the report": Command("report.html", lambda path: ["identify", str(FEW_TESTS), "--force", "--report", str(path)]),
-    "the tuned vehicle": Command("tuned.toml", lambda path: [*_TUNE, "--force", "-o", str(path)]),
+_BARE, _FEW = quote(str(BARE)), quote(str(FEW_TESTS))
+_TUNE = f"tune {quote(str(VIDEORAY))} --axis heave --command 0.3 --v-ss 0.2"
+WRITING = {
+    ("build", "output"): Command("rov.fmu", f"build {_BARE} --platform host -o {{f}}/rov.fmu"),
+    ("build", "osp"): Command("bare_OspModelDescription.xml", f"build {_BARE} --platform host --osp -o {{f}}/rov.fmu"),
+    ("simulate", "output"): Command("run.csv", f"simulate {_BARE} -o {{f}}/run.csv"),
+    ("simulate", "plot"): Command("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
+    ("fly", "output"): Command("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
+    ("sitl", "log"): Command("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
+    ("sdf", "output"): Command("rov.sdf", f"sdf {_BARE} -o {{f}}/rov.sdf"),
+    ("export", "output"): Command("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
+    ("export", "folder"): Command("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
+    ("prove", "report"): Command("proof.html", "prove {fmu} --report {f}/proof.html"),
+    ("study", "output"): Command("study.html", "study {f}/plan.toml -o {f}"),
+    ("study", "run"): Command("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
+    ("identify", "output"): Command("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
+    ("identify", "report"): Command("report.html", f"identify {_FEW} --report {{f}}/report.html"),
+    ("identify", "mcap"): Command("logs.mcap", f"identify {_FEW} --mcap {{f}}/logs.mcap"),
+    ("inspect", "report"): Command("page.html", f"inspect {_FEW} --report {{f}}/page.html"),
+    ("tune", "output"): Command("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
 }
+"""What each option of a command writes. A study, an exported folder and the files beside an FMU name their files."""
+COMMANDS = {key: command for key, command in WRITING.items() if key[0] not in ("prove", "study") and key[1] != "folder"}
+"""Those that write one file into any folder, and read none there."""
 
 
 def without_progress(err: str) -> str:
@@ -87,12 +96,11 @@ print(json.dumps(ends))
 
 
 def run_elsewhere(
-    commands: Sequence[tuple[Command, Path]], folder: Path, prefix: Sequence[str] = (), **how: Any
+    commands: Sequence[Sequence[str]], folder: Path, prefix: Sequence[str] = (), **how: Any
 ) -> list[tuple[int, str]]:
-    """Run commands in another process with its temporary files in a folder. Return their exit codes and errors."""
-    arguments = json.dumps([list(command.arguments(target)) for command, target in commands])
+    """Run command lines in another process with its temporary files in a folder. Return their exit codes and errors."""
     result = subprocess.run(
-        [*prefix, sys.executable, "-c", _DRIVER, arguments],
+        [*prefix, sys.executable, "-c", _DRIVER, json.dumps(commands)],
         cwd=ROOT,
         env=os.environ | {"TMPDIR": str(folder)},
         capture_output=True,

@@ -2,10 +2,10 @@
 
 The mutants are those of cosmic-ray (Python) and universalmutator (C), which `pip install "rov-fmu[mutation]"` installs.
 
-`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist. `--kept` applies them
-to the code of today and runs the quickest of their tests first. It writes each verdict at once, so that it can be ended
-and called again. `--results` writes the verdicts of a later state to another file, and lists those that are killed no
-longer.
+`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist, and then the defects
+that once passed all tests. `--kept` applies them to the code of today and runs the quickest of their tests first. It
+writes each verdict at once, so that it can be ended and called again. `--results` writes the verdicts of a later state
+to another file, and lists those that are killed no longer.
 
 Two parts of the product are not mutated: the scripts of the page, because the tests that would notice need a browser,
 and the engine's and the page's frames around the C of the step, which no FMU contains.
@@ -62,9 +62,11 @@ TESTS = {
     "fmu_src/c/*": "fmu/calls/test_values.py fmu/calls/test_lifecycle.py fmu/calls/test_arguments.py fmu/calls "
     "fmu/results/test_ballast.py",
     "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py report/test_published.py",
-    "rov_fmu/equation/[cl]a*.py": "equation/table docs/test_docs.py equation/test_rov.py vehicle equation",
-    "rov_fmu/equation/dependencies.py": "equation/table/test_dependencies.py fmu/test_dependencies.py",
-    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation",
+    "rov_fmu/equation/[cl]a*.py": "equation/table frozen/test_known_results.py docs/test_docs.py equation/test_rov.py "
+    "vehicle equation",
+    "rov_fmu/equation/dependencies.py": "frozen/test_known_results.py fmu/test_dependencies.py",
+    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation "
+    "fmu/calls/test_derivatives.py",
     "rov_fmu/equation/[pt]*.py": "equation/test_rov.py equation fmu/results/test_outside.py fmu/test_python_flavour.py",
     "rov_fmu/equation/*": "equation/test_rov.py equation/test_step.py equation/test_symmetries.py equation "
     "fmu/test_python_flavour.py",
@@ -83,13 +85,13 @@ TESTS = {
     "rov_fmu/identify/beginning.py": "tank/test_description_mistakes.py tank/test_tank_tests.py tank identify",
     "rov_fmu/identify/findings.py": "identify/test_findings.py report/test_report.py report/test_console.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
-    "rov_fmu/fmu/card.py": "fmu/results/test_card.py report/test_card.py fmu",
+    "rov_fmu/fmu/card.py": "frozen/test_known_results.py fmu/results/test_card.py report/test_card.py fmu",
     "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
     "rov_fmu/prove/proof.py": "cli/test_prove.py prove",
     "rov_fmu/prove/check.py": "prove/test_archive.py fmu/results/test_evidence.py",
     "rov_fmu/prove/signature.py": "fmu/results/test_evidence.py",
     "rov_fmu/prove/*": "prove",
-    "rov_fmu/fmu/*": "fmu/test_declared_numbers.py fmu/test_osp.py fmu/test_terminals.py fmu",
+    "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_osp.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
@@ -116,7 +118,7 @@ TESTS = {
     "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_experiments.py study/test_plans.py "
     "cli/test_messages.py io",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
-    "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py fmu/test_declared_numbers.py",
+    "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py frozen/test_known_results.py",
     "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
     "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",

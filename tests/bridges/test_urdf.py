@@ -72,23 +72,6 @@ def test_the_plugin_has_the_numbers_of_the_model_for_gazebo(name: str) -> None:
     assert "xU" in numbers[0]
 
 
-NOTES = {
-    "everything": [
-        "beta: the added mass is that of the effective inertia, (m + m_a) / beta less the mass",
-        "the vehicle file has no roll, pitch: no added mass and no drag there",
-        "drag has the mean of both directions",
-    ],
-    "bluerov2_heavy": [],
-    "remus100": ["left out: terms between two axes"],
-}
-
-
-@pytest.mark.parametrize("name", NOTES)
-def test_the_notes_say_what_is_otherwise(name: str) -> None:
-    thrusters = "the tags have no thrusters: their curves, places, lags and alpha are left to the controller"
-    assert [*urdf_model(LOADED[name]).notes] == [thrusters, *NOTES[name]]
-
-
 def test_the_command_writes_it_by_the_name_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

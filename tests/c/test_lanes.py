@@ -70,10 +70,12 @@ def test_vehicles_in_lanes_move_like_each_of_them_alone(name: str) -> None:
     assert difference(rov, times, drawn(rng, rov, VEHICLES, len(times))) < SCALE
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("axes", SUBSETS)
+@pytest.mark.parametrize(
+    "axes",
+    [pytest.param(axes, marks=pytest.mark.weekly if n % 4 else pytest.mark.long) for n, axes in enumerate(SUBSETS, 1)],
+)
 def test_every_subset_of_axes_moves_in_lanes_as_alone(axes: str) -> None:
-    """63 subsets of 16 vehicles."""
+    """63 subsets of 16 vehicles. The engine of each is compiled."""
     rng = random.Random(axes)
     rov, times = random_body(rng, axes), rising(rng, 60)
     assert difference(rov, times, drawn(rng, rov, 16, len(times)), 16) < SCALE

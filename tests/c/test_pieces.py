@@ -24,6 +24,7 @@ from tests.vehicles import (
     SIX,
     SIX_AXES,
     THRUST_EFFECTS,
+    VIDEORAY,
     random_body,
     random_inputs,
     random_state,
@@ -146,3 +147,9 @@ def test_steps_in_python_may_be_cut_anywhere_and_are_those_of_the_engine(name: s
         present = {delayed_name(name): inputs[name] for name in rov.layout.commands}
         stepper = Stepper(rov, before | present, [*whole])
         assert stepper.step([*inputs.values()], 0.7) == pytest.approx([*whole.values()], rel=1e-12, abs=1e-12)
+
+
+def test_a_motion_that_cannot_be_computed_is_told() -> None:
+    stepper = Stepper(VIDEORAY, {"u": 1e200}, ["u"])
+    with pytest.raises(OverflowError, match="from 0 s on"):
+        stepper.step([0.0] * len(VIDEORAY.layout.commands), 1.0)

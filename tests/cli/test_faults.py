@@ -34,16 +34,18 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 @pytest.mark.parametrize(
     "moments", [pytest.param(3, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
 )
-@pytest.mark.parametrize("names", [["the FMU"], ["the vehicle", "the report"]])
+@pytest.mark.parametrize("keys", [[("build", "output")], [("identify", "output"), ("identify", "report")]])
 def test_a_killed_command_leaves_whole_files_and_the_next_one_is_right(
-    names: list[str], moments: int, tmp_path: Path
+    keys: list[tuple[str, str]], moments: int, tmp_path: Path
 ) -> None:
     """It is killed as it writes, and at moments of which most are near its end."""
-    commands = [COMMANDS[name] for name in names]
+    commands = [COMMANDS[key] for key in keys]
 
     def started(folder: Path) -> subprocess.Popen[str]:
         folder.mkdir(exist_ok=True)
-        words = dict.fromkeys(word for command in commands for word in command.arguments(folder / command.name))
+        words = dict.fromkeys(
+            word for command in commands for word in command.arguments(folder / command.name, "--force")
+        )
         return start([*words], stdout=subprocess.DEVNULL)
 
     def contents(folder: Path) -> list[bytes]:
@@ -110,12 +112,17 @@ def check_interrupted(action: str, folder: Path) -> None:
     assert (ran.returncode, without_progress(ran.stderr)) == (130, "rov-fmu: interrupted, no file is half-written\n")
 
 
-_SLOW = [pytest.param(name, marks=pytest.mark.long) for name in ("the vehicle", "the report")]
+_QUICK = (("tune", "output"), ("simulate", "plot"))
 
 
-@pytest.mark.parametrize("name", ["the tuned vehicle", *_SLOW])
-def test_an_interrupt_before_the_last_move_leaves_nothing(name: str, tmp_path: Path) -> None:
-    command = COMMANDS[name]
+@pytest.mark.parametrize(
+    "key",
+    [pytest.param(key, marks=() if key in _QUICK else pytest.mark.long) for key in COMMANDS if key[0] != "sitl"],
+    ids=" ".join,
+)
+def test_an_interrupt_before_the_last_move_leaves_nothing(key: tuple[str, str], tmp_path: Path) -> None:
+    """A flight without an autopilot writes no log."""
+    command = COMMANDS[key]
     target = tmp_path / "out" / command.name
     target.parent.mkdir()
     action = f"""
@@ -126,7 +133,7 @@ def interrupt(_):
 os.fsync = interrupt
 def action():
     from rov_fmu.cli import main
-    main({list(command.arguments(target))!r})
+    main({command.arguments(target, "--force")!r})
 """
     check_interrupted(action, tmp_path)
     assert not any(target.parent.iterdir())

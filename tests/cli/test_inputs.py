@@ -4,7 +4,6 @@ import os
 import shutil
 import zipfile
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.cli.test_targets import bound_by_permissions
-from tests.commands import TESTS, Command, run_elsewhere, without_progress
+from tests.commands import TESTS, run_elsewhere, without_progress
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSIX")
 
@@ -174,7 +173,7 @@ def test_what_may_not_be_read_is_one_line_that_names_it(
         folder = Path(shutil.copytree(copied, tmp_path / str(n)))
         locked.append(folder / name)
         locked[-1].chmod(mode)
-        commands.append((Command(name, partial(_words, case)), folder))
+        commands.append(_words(case, folder))
     ends = run_elsewhere(commands, tmp_path / "temporary", bound_by_permissions())
     for path, (code, err) in zip(locked, ends, strict=True):
         path.chmod(0o755)

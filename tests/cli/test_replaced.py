@@ -4,7 +4,6 @@ import shutil
 import zipfile
 from collections.abc import Sequence
 from pathlib import Path
-from shlex import quote, split
 
 import click
 import pytest
@@ -14,7 +13,7 @@ from rov_fmu.cli import _commands, main
 from rov_fmu.identify import identify as identification
 from rov_fmu.io.output import Output, WriteError, check_replaced, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, FEW_TESTS, without_progress
+from tests.commands import BARE, COMMANDS, WRITING, without_progress
 from tests.folders import small_folder
 
 Capsys = pytest.CaptureFixture[str]
@@ -133,35 +132,13 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
 
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
-_BARE, _FEW = quote(str(BARE)), quote(str(FEW_TESTS))
-_TUNE = f"tune {_BARE} --axis heave --command 0.3 --v-ss 0.2"
-# What each option writes, in the folder {f}. A study, an exported folder and the files beside an FMU name their files.
-WRITING = {
-    ("build", "output"): ("rov.fmu", f"build {_BARE} --platform host -o {{f}}/rov.fmu"),
-    ("build", "osp"): ("bare_OspModelDescription.xml", f"build {_BARE} --platform host --osp -o {{f}}/rov.fmu"),
-    ("simulate", "output"): ("run.csv", f"simulate {_BARE} -o {{f}}/run.csv"),
-    ("simulate", "plot"): ("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
-    ("fly", "output"): ("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
-    ("sitl", "log"): ("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
-    ("sdf", "output"): ("rov.sdf", f"sdf {_BARE} -o {{f}}/rov.sdf"),
-    ("export", "output"): ("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
-    ("export", "folder"): ("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
-    ("prove", "report"): ("proof.html", "prove {fmu} --report {f}/proof.html"),
-    ("study", "output"): ("study.html", "study {f}/plan.toml -o {f}"),
-    ("study", "run"): ("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
-    ("identify", "output"): ("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
-    ("identify", "report"): ("report.html", f"identify {_FEW} --report {{f}}/report.html"),
-    ("identify", "mcap"): ("logs.mcap", f"identify {_FEW} --mcap {{f}}/logs.mcap"),
-    ("inspect", "report"): ("page.html", f"inspect {_FEW} --report {{f}}/page.html"),
-    ("tune", "output"): ("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
-}
 READING = {
     *{("build", "sign"), ("simulate", "commands"), ("fly", "recording"), ("fly", "identified")},
     *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("tune", "points")},
     *{("identify", "tests"), ("inspect", "tests")},
 }
 """The arguments and options that name a file to read."""
-AGAIN = [key for key in WRITING if key[0] in ("simulate", "fly", "sdf", "export", "tune")]
+AGAIN = [key for key in COMMANDS if key[0] in ("simulate", "fly", "sdf", "export", "tune")]
 """What is quick enough to be written several times."""
 
 
@@ -182,15 +159,16 @@ def test_every_file_that_a_command_writes_is_known_here() -> None:
 def test_no_command_replaces_the_work_of_others(
     key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
-    name, command = WRITING[key]
+    command = WRITING[key]
     (tmp_path / "plan.toml").write_text(f'vehicle = "{BARE.name}"\nstop_time = 1.0\n', encoding="utf-8")
     shutil.copy(BARE, tmp_path)
-    (tmp_path / name).write_bytes(b"my work")
+    target = tmp_path / command.name
+    target.write_bytes(b"my work")
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
-    assert main([word.format(f=tmp_path, fmu=videoray_fmu) for word in split(command)]) == 2
+    assert main(command.arguments(target, fmu=str(videoray_fmu))) == 2
     out, err = capsys.readouterr()
     assert (out, without_progress(err).count("\n")) == ("", 1)
-    assert str(tmp_path / name) in err
+    assert str(target) in err
     assert "--force" in err
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
@@ -199,10 +177,10 @@ def test_no_command_replaces_the_work_of_others(
 def test_a_command_replaces_its_own_file_until_somebody_changes_it(
     key: tuple[str, str], tmp_path: Path, capsys: Capsys
 ) -> None:
-    name, command = WRITING[key]
-    words = [word.format(f=tmp_path) for word in split(command)]
+    target = tmp_path / COMMANDS[key].name
+    words = COMMANDS[key].arguments(target)
     assert [main(words), main(words)] == [0, 0]
-    with (tmp_path / name).open("ab") as file:
+    with target.open("ab") as file:
         file.write(b"\n")
     assert main(words) == 2
     assert "wrote it" in capsys.readouterr().err

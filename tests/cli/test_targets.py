@@ -45,7 +45,7 @@ IMPOSSIBLE: dict[str, tuple[Callable[[Path], object], str]] = {
 }
 
 
-_CASES = {f"{name}-{case}": (command, case) for name, command in COMMANDS.items() for case in IMPOSSIBLE}
+_CASES = {f"{' '.join(key)}-{case}": (of, case) for key, of in COMMANDS.items() for case in IMPOSSIBLE}
 
 
 @_posix
@@ -92,7 +92,9 @@ def test_what_is_read_only_stays(file_mode: int, folder_mode: int, reason: str, 
         (target / name).chmod(file_mode)
     target.chmod(folder_mode)
     for code, printed in run_elsewhere(
-        [(command, target / command.name) for command in COMMANDS.values()], temporary, bound_by_permissions()
+        [command.arguments(target / command.name, "--force") for command in COMMANDS.values()],
+        temporary,
+        bound_by_permissions(),
     ):
         assert code == 2
         (line,) = without_progress(printed).splitlines()
@@ -106,14 +108,14 @@ def test_what_is_read_only_stays(file_mode: int, folder_mode: int, reason: str, 
 
 
 @pytest.mark.parametrize(
-    ("first", "second"),
-    [("the FMU", "its OSP description"), pytest.param("the vehicle", "the report", marks=pytest.mark.long)],
+    ("command", "options"),
+    [("build", ("output", "osp")), pytest.param("identify", ("output", "report"), marks=pytest.mark.long)],
 )
 def test_two_files_are_written_both_or_neither(
-    first: str, second: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
+    command: str, options: tuple[str, str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:
-    commands = [COMMANDS[first], COMMANDS[second]]
-    words = [*dict.fromkeys(word for command in commands for word in command.arguments(tmp_path / command.name))]
+    commands = [COMMANDS[command, option] for option in options]
+    words = [*dict.fromkeys(word for one in commands for word in one.arguments(tmp_path / one.name, "--force"))]
     old = tmp_path / commands[1].name
     old.write_bytes(OLD)
     calls = 0
@@ -132,7 +134,7 @@ def test_two_files_are_written_both_or_neither(
     assert old.read_bytes() == OLD
     with without_page():
         assert main(words) == 0
-    assert {*tmp_path.iterdir()} == {tmp_path / command.name for command in commands}
+    assert {*tmp_path.iterdir()} == {tmp_path / one.name for one in commands}
     assert old.read_bytes() != OLD
 
 
@@ -219,7 +221,7 @@ def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Pa
     if there:
         other.write_bytes(OLD)
     target.symlink_to(other)
-    assert COMMANDS["the tuned vehicle"].run(target) == 0
+    assert COMMANDS["tune", "output"].run(target) == 0
     assert not target.is_symlink()
     assert target.stat().st_size > 1000
     assert other.exists() == there
@@ -235,7 +237,7 @@ def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys:
             continue
         for target, code in ((folder / name, 0), (folder / "no" / name, 2), (folder, 2)):
             capsys.readouterr()
-            assert COMMANDS["the tuned vehicle"].run(target) == code
+            assert COMMANDS["tune", "output"].run(target) == code
         one_line(capsys)
         assert load_vehicle(folder / name)
     there = sorted(tmp_path.rglob("*"))
@@ -244,5 +246,5 @@ def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys:
     assert "not Unicode" in one_line(capsys)
     assert sorted(tmp_path.rglob("*")) == there
     with without_page():
-        assert COMMANDS["the FMU"].run(tmp_path / "Röv [bold] 4 [" / "] [bold] x.fmu") == 0
+        assert COMMANDS["build", "output"].run(tmp_path / "Röv [bold] 4 [" / "] [bold] x.fmu") == 0
     assert "Röv [bold] 4 [/] [bold] x.fmu" in capsys.readouterr().out.replace("\n", "")

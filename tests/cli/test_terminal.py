@@ -124,7 +124,7 @@ MORE = [
 ]
 
 
-@pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.long)])
+@pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.weekly)])
 @pytest.mark.parametrize("words", [*COMMANDS, *(pytest.param(one, marks=pytest.mark.long) for one in MORE)])
 def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(words: str, columns: int, folder: Path) -> None:
     arguments = words.split()

@@ -102,7 +102,7 @@ def full_wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return built("wheel", tmp_path_factory.mktemp("full wheel"), prebuilt=True)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_fmus_in_the_wheel_are_those_of_a_build(full_wheel: Path, tmp_path: Path) -> None:
     inside = {Path(name).name: content for name, content in _content(full_wheel).items() if name.endswith(".fmu")}
     assert {*inside} == {f"{name}.fmu" for name in SHIPPED}
@@ -112,7 +112,7 @@ def test_the_fmus_in_the_wheel_are_those_of_a_build(full_wheel: Path, tmp_path: 
         assert own.path.read_bytes() == inside[f"{name}.fmu"]
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_vehicles_that_ship_need_no_compiler(full_wheel: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pinned = [line.partition("==")[0] for line in CONSTRAINTS.read_text("utf-8").splitlines() if "==" in line]
     same = tmp_path / "same.txt"  # the versions that the wheel was built with here

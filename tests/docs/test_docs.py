@@ -153,6 +153,15 @@ def test_files_that_a_page_names_exist(page: str) -> None:
     assert not [path for path in named if not (ROOT / path).exists()]
 
 
+def test_every_module_of_tests_keeps_a_promise_that_the_page_has() -> None:
+    """It is named there, or its folder is, and begins with its promise."""
+    page = (ROOT / "docs" / "robustness.md").read_text(encoding="utf-8")
+    named = {ROOT / path for path in re.findall(r"`(tests/[\w./]+)`", page)}
+    modules = [*(ROOT / "tests").rglob("test_*.py")]
+    assert [module for module in modules if not named & {module, *module.parents}] == []
+    assert [module for module in modules if not module.read_text(encoding="utf-8").startswith('"""')] == []
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if page != CHANGELOG], ids=name)
 def test_commands_and_options_exist(page: Path) -> None:
     for words in commands(page):

@@ -77,11 +77,3 @@ def test_every_input_and_output_is_in_one_group(rov: Vehicle) -> None:
     }
     about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
     assert axes == {name: (LETTERS | along | about).get(name) for name in axes}
-
-
-def test_groups_are_named_after_what_they_hold() -> None:
-    names = [group.get("name") for group in groups_of(VEHICLES["lag without coupling"].layout)]
-    generic = "thruster_commands_1 thruster_commands_2"
-    forces = "external_force thrust_l thrust_r thrust_5 thrust_6 external_torque t200_torque"
-    motion = "current velocity yaw_rate position depth heading"
-    assert " ".join(names) == f"{generic} {forces} {motion}"

@@ -12,8 +12,11 @@ from tests.commands import ROOT
 from tests.conftest import Made
 from verification.fresh_environment import environment
 
-_SOME = ("--platform", "linux64", "--platform", "win64")
-_BUILDS = {"native": _SOME, "fmi3": ("--fmi", "3", *_SOME), "pythonfmu": ("--backend", "pythonfmu")}
+_BUILDS = {
+    "native": ("--platform", "linux64", "--platform", "win64"),
+    "fmi3": ("--fmi", "3", "--platform", "linux64"),
+    "pythonfmu": ("--backend", "pythonfmu"),
+}
 _OLDEST, _NEWEST = 10, 14  # Python 3, as pyproject.toml has it
 
 

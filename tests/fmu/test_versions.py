@@ -158,40 +158,6 @@ def test_the_description_follows_its_schema_and_the_rules_of_fmpy(kind: str, fmi
     assert validate_model_description(description, validate_variable_names=are_new, validate_model_structure=True) == []
 
 
-SAVED = {"canGetAndSetFMU{0}tate": "true", "canSerializeFMU{0}tate": "true", "providesDirectionalDerivative{1}": "true"}
-CAN = {
-    2: (
-        SAVED | {"canNotUseMemoryManagementFunctions": "true"},
-        {"canHandleVariableCommunicationStepSize": "true", "maxOutputDerivativeOrder": "1"},
-    ),
-    3: (
-        SAVED | {"providesAdjointDerivatives": "true"},
-        {
-            "canHandleVariableCommunicationStepSize": "true",
-            "maxOutputDerivativeOrder": "1",
-            "providesIntermediateUpdate": "true",
-            "mightReturnEarlyFromDoStep": "true",
-            "canReturnEarlyAfterIntermediateUpdate": "true",
-            "hasEventMode": "true",
-        },
-    ),
-}
-"""The capabilities of both interfaces, and further ones of Co-Simulation, by the version of FMI."""
-
-
-@pytest.mark.parametrize("fmi", [2, 3])
-def test_an_fmu_declares_its_capabilities(fmi: int) -> None:
-    """A capability that is missing is false."""
-    root = described(VEHICLES["VideoRay"], fmi)
-    assert root.get("fmiVersion") == f"{fmi}.0"
-    assert root.get("instantiationToken" if fmi == 3 else "guid") == "{1}"
-    both = {key.format(*(("s", "") if fmi == 2 else ("S", "s"))): value for key, value in CAN[fmi][0].items()}
-    for interface, more in {"ModelExchange": {}, "CoSimulation": CAN[fmi][1]}.items():
-        declared = {key: x for key, x in root.find(interface).attrib.items() if x != "false"}
-        assert declared == {"modelIdentifier": "an_rov"} | both | more
-    assert root.find("ScheduledExecution") is None
-
-
 def test_the_description_says_what_an_importer_must_do() -> None:
     rov, one = a_vehicle(ROVS["dead time"]), a_vehicle(ROVS["Heavy"])
     for of, interface, is_native, notes in (
@@ -209,18 +175,6 @@ def test_the_description_says_what_an_importer_must_do() -> None:
 
 KINDS = {"cs": (CO_SIMULATION, MODEL_EXCHANGE), "me": (MODEL_EXCHANGE, CO_SIMULATION)}
 """The kind of instance that an FMU offers, and the one that it refuses."""
-
-
-@pytest.mark.parametrize(
-    ("name", "names"),
-    [("X_ext", "Force"), ("V_N", "Velocity"), ("m_rov", "Mass"), ("I_r", "Moment of inertia"), ("alpha_u", "Number")],
-)
-def test_a_type_has_the_name_of_a_quantity(name: str, names: str, vehicle: Vehicle) -> None:
-    root = etree.fromstring(native_content(vehicle, fmi=3).files["modelDescription.xml"])
-    declared_types = {v.get("name"): v.get("declaredType") for v in root.find("ModelVariables")}
-    assert declared_types[name] == names
-    assert {declared_types[f"u_{one}"] for one in "lrt"} == {"Command"}
-    assert not [one for one in declared_types.values() if "," in one]
 
 
 @pytest.mark.parametrize(

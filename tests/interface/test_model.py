@@ -137,14 +137,6 @@ def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:
             np.testing.assert_allclose(lanes[name][n], values, rtol=1e-12, atol=1e-14)
 
 
-def test_a_simulation_goes_on_where_another_one_ended(videoray: VehicleModel, six: VehicleModel) -> None:
-    for vehicle, name in ((videoray, "u_l"), (six, "N_ext")):
-        whole = vehicle.simulate([0.0, 1.0, 2.0, 3.0], {name: [0.5, -0.2, 0.3, 0.0]})
-        first = vehicle.simulate([0.0, 1.0], {name: 0.5})
-        then = vehicle.simulate([1.0, 2.0, 3.0], {name: [-0.2, 0.3, 0.0]}, start=first.final)
-        assert all(np.array_equal(values[1:], then[name]) for name, values in whole.items())
-
-
 def test_it_goes_on_with_its_lag_and_with_the_commands_that_act_whatever_was_recorded() -> None:
     late = rov_fmu.load(THRUST_EFFECTS)
     whole = late.simulate([0.0, 1.0, 1.05], {"u_l": [0.5, 0.3, 0.0]}, record="u")

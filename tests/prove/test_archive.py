@@ -49,9 +49,9 @@ def flipped(content: bytes, place: int, bit: int) -> bytes:
 # ---- FMUs of ours ----------------------------------------------------------------------------------------------------
 
 
-@often("bits", 1, 8)
-def test_no_bit_of_an_archive_can_be_changed(bits: int, small: bytes, tmp_path: Path) -> None:
-    """Of each byte one bit, or all of them: headers, compressed bytes, the directory, and its end.
+@often("stride", 4, 1)
+def test_no_bit_of_an_archive_can_be_changed(stride: int, small: bytes, tmp_path: Path) -> None:
+    """Of some bytes one bit, or all bits of all: headers, compressed bytes, the directory, and its end.
 
     Of the meta-data a few bytes are enough, because test_evidence.py changes each of them.
     """
@@ -59,13 +59,13 @@ def test_no_bit_of_an_archive_can_be_changed(bits: int, small: bytes, tmp_path: 
     assert not is_refused(small, path)
     begin, end = small.index(b"<?xml"), small.index(b"ResourceMetaData>\n") + 16
     assert small[begin:end].count(b"rov-fmu.archive") == 1
-    for place in range(len(small)):
+    for place in range(0, len(small), stride):
         if not begin <= place < end or place % 50 == 0:
-            for bit in [place % 8] if bits == 1 else range(8):
+            for bit in range(8) if stride == 1 else [place // stride % 8]:
                 assert is_refused(flipped(small, place, bit), path), (place, bit)
 
 
-@often("count", 60, 2000)
+@often("count", 30, 2000)
 def test_no_bit_of_the_shipped_fmu_can_be_changed(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
     content, draws = videoray_fmu.read_bytes(), random.Random(count)
     assert not is_refused(content, tmp_path / "videoray.fmu")

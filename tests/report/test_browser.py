@@ -15,7 +15,7 @@ from rov_fmu.report.proof_page import proof_page
 from rov_fmu.report.report import report_page
 from tests.commands import ROOT
 from tests.report.conftest import Visit
-from tests.report.fly.boxes import SCHEMES, WIDTHS, problems
+from tests.report.fly.boxes import SCREENS, problems
 from tests.report.pages import check_fits_and_is_accessible
 from tests.report.results import example
 from tests.tank.readers.motion import DIVE
@@ -58,8 +58,7 @@ def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("width", "scheme"), SCREENS)
 @pytest.mark.parametrize("name", ["documentation", "report", "evidence", "inspection"])
 def test_a_page_asks_for_nothing_fits_and_is_accessible(
     name: str, width: int, scheme: str, visit: Callable[..., Visit], request: pytest.FixtureRequest
@@ -76,8 +75,7 @@ def test_a_page_asks_for_nothing_fits_and_is_accessible(
 
 @pytest.mark.long
 @pytest.mark.skipif(not (ROOT / "site").exists(), reason="CONTRIBUTING.md says how to build the site")
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("width", "scheme"), SCREENS)
 def test_nothing_overlaps_or_is_cut_on_the_site(width: int, scheme: str, visit: Callable[..., Visit]) -> None:
     page = visit(width=width, scheme=scheme).page
     found = {}

@@ -10,7 +10,6 @@ from time import sleep
 import pytest
 from rich.progress import Progress, TextColumn
 
-from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.io.messages import InputError, print_message
@@ -101,21 +100,6 @@ def test_numbers_and_words_are_written_for_readers() -> None:
     assert sentence("log_1.csv: it lacks") == "log_1.csv: it lacks"
     assert [*map(pretty_unit, ("N.m.s2/rad2", "1", "us", "deg/s"))] == ["N·m·s²/rad²", "1", "µs", "°/s"]
     assert [in_words("time to 63 %", "s"), in_words("force", "1")] == ["Time to 63 % (s)", "Force"]
-
-
-def test_the_tables_of_the_paper_stand_beside_what_is_computed(capsys: pytest.CaptureFixture[str]) -> None:
-    """The row of the largest deviation; the test of yaw at 70 % has no time constant."""
-    assert main(["tables", "videoray"]) == 0
-    out = [" ".join(line.split()) for line in capsys.readouterr().out.splitlines()]
-    assert (
-        out[0]
-        == "VideoRay Pro 4. Enevoldsen et al., Simplified Modelling and Identification of an Inspection ROV, 2018"
-    )
-    assert out[2] == "Table 6. Heave, alpha_w = 1.14, beta_w = 0.59; V_ss in m/s, Tau in s"
-    assert "20 % 1.76 2.0117 +14.3%* 3.08 3.2105 +4.2%* 2.87 +11.9%" in out
-    assert "70 % 0.14 0.1457 +4.0%* 1.10 1.1138 +1.3%* - -" in out
-    assert "70 % - 1.5910 - - 1.7068 - 1.47 +16.1%" in out
-    assert [out.count(part) for part in ("V_ss", "Tau")] == [3, 3]
 
 
 def test_a_tuning_is_printed_with_its_deviations_its_commands_and_the_lag(capsys: pytest.CaptureFixture[str]) -> None:

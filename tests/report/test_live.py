@@ -244,7 +244,7 @@ def test_an_exported_flight_can_be_flown_again_and_inspected(page: Any, tmp_path
     times = [line.split(",")[0] for line in file.read_text(encoding="utf-8").splitlines()[1:]]
     assert len(times) > 40
     assert all(re.fullmatch(r"\d+(\.\d{1,6})?", time) for time in times), times
-    drop(page, file.name, file.read_bytes())
+    drop(page, file)
     page.evaluate("live.pause(false); live.speed = 50")
     until(page, "live.paused && live.flight.replay && live.hasEnded()")
     assert max(deviations(page)) < 1e-12
@@ -288,16 +288,16 @@ def test_a_link_that_is_not_allowed_says_so_and_leaves_out_what_is_wrong(page: A
 # ---- Recordings ------------------------------------------------------------------------------------------------------
 
 
-def drop(page: Any, name: str, content: bytes) -> None:
+def drop(page: Any, file: Path) -> None:
     """Give a file to the page, as its button does."""
-    page.set_input_files("#live-recording", [{"name": name, "mimeType": "text/csv", "buffer": content}])
+    page.set_input_files("#live-recording", file)
 
 
 def dropped(page: Any, log: Path, text: str, encoding: str = "utf-8") -> Any:
     """Write a log, give it to the page, and return the recording that the page reads."""
     log.write_text(text, encoding=encoding)
     page.evaluate("live.flight.replay = null")
-    drop(page, log.name, log.read_bytes())
+    drop(page, log)
     until(page, "live.flight.replay !== null")
     return page.evaluate("live.flight.replay.recording")
 
@@ -489,11 +489,13 @@ BAD = {
 }
 
 
-def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(page: Any) -> None:
+def test_the_page_says_why_a_file_is_no_recording_and_the_model_flies_on(page: Any, tmp_path: Path) -> None:
     page.locator("input[name=u_l]").fill("0.5")
     for name, (content, expected) in BAD.items():
         page.evaluate("live.say('')")
-        drop(page, f"{name}.csv", content)
+        file = tmp_path / f"{name}.csv"
+        file.write_bytes(content)
+        drop(page, file)
         until(page, "document.getElementById('live-message').textContent !== ''")
         line = page.inner_text("#live-message")
         assert line.startswith(f"{name}.csv cannot be flown: "), line

@@ -52,7 +52,9 @@ def _page(folder: Path, picture: str) -> Path:
     text = VIDEORAY.read_text(encoding="utf-8")
     vehicle.write_text(re.sub("^data = .*$", "", text, flags=re.M), encoding="utf-8")
     page = folder / "index.html"
-    page.write_text(documentation_page(load_vehicle(vehicle)), encoding="utf-8")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
+        page.write_text(documentation_page(load_vehicle(vehicle)), encoding="utf-8")
     return page
 
 
@@ -75,8 +77,7 @@ def test_nothing_in_a_picture_runs_or_navigates(case: str, visit: Callable[..., 
     assert seen.problems() == []
 
 
-def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("rov_fmu.report.page.fmu_page.inline_svg", lambda *_: "")  # plots take most of the time
+def test_a_picture_stands_in_the_page_as_an_image_alone(tmp_path: Path) -> None:
     for case in ("onload", "script of HTML", "the end of the attribute"):
         folder, picture = tmp_path / case, HOSTILE[case]
         folder.mkdir()

@@ -24,7 +24,7 @@ from rov_fmu.study.results.results import statistics
 from tests.commands import without_progress
 from tests.folders import beside
 from tests.report.conftest import Visit
-from tests.report.fly.boxes import SCHEMES, WIDTHS
+from tests.report.fly.boxes import SCREENS
 from tests.report.pages import check_fits_and_is_accessible, check_is_whole
 from tests.report.plots.test_identification import bands, bars, lines
 
@@ -124,8 +124,7 @@ def test_the_page_has_bands_distributions_indices_and_failures(done: Path) -> No
 
 
 @pytest.mark.interop
-@pytest.mark.parametrize("scheme", SCHEMES)
-@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize(("width", "scheme"), SCREENS)
 def test_the_page_asks_for_nothing_fits_and_is_accessible(
     done: Path, width: int, scheme: str, visit: Callable[..., Visit]
 ) -> None:
@@ -272,15 +271,3 @@ def test_plots_have_all_runs_their_quantiles_and_the_intervals_of_indices() -> N
         "four even values of the other"
     )
     assert ax.get_xlabel() == "a (N·m)"
-
-
-def test_another_page_of_this_name_is_not_overwritten(
-    done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    own = tmp_path / "study.html"
-    own.write_text("<p>My studies</p>")
-    assert main(["study", str(done.parent / "plan.toml"), "-o", str(tmp_path)]) == 2
-    reason = "the file there is not as rov-fmu wrote it: it may have been made or changed by hand; --force replaces it"
-    assert capsys.readouterr().err == f"rov-fmu: {own}: cannot be written: {reason}\n"
-    assert [*tmp_path.iterdir()] == [own]
-    assert own.read_text() == "<p>My studies</p>"

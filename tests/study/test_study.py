@@ -294,7 +294,7 @@ def _begun(plan: Path, results: Path) -> "subprocess.Popen[str]":
 
 @posix
 @pytest.mark.long
-@pytest.mark.parametrize("number", ["SIGINT", "SIGKILL"])
+@pytest.mark.parametrize("number", [pytest.param("SIGINT", marks=pytest.mark.weekly), "SIGKILL"])
 def test_an_interrupted_or_killed_study_goes_on_where_it_was(
     number: str, foreign: Foreign, tmp_path: Path, slow: Results, scheduler: str
 ) -> None:

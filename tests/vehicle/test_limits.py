@@ -1,6 +1,5 @@
 """The limits of the checks of a vehicle: each is allowed itself, and what is just beyond it is not."""
 
-from decimal import Decimal
 from math import inf, nextafter
 from typing import Any
 
@@ -9,7 +8,6 @@ import pytest
 from rov_fmu.equation.catalogue import SURGE, SWAY, Declaration
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
-from rov_fmu.report.published import Cell
 from rov_fmu.vehicle.geometry import check_mass
 from rov_fmu.vehicle.quantity import derivative_hint, within
 from tests.vehicles import numbered
@@ -66,25 +64,3 @@ def test_an_entry_of_the_mass_matrix_is_less_than_the_mean_of_the_masses(m: floa
     else:
         assert f"must be within ±16 for a positive definite matrix, but it is {m}" in found[0]
     assert len(found) == (abs(m) >= 16.0)
-
-
-# ---- Tables ----
-
-
-@pytest.mark.parametrize(
-    ("printed", "computed", "rounds"),
-    [
-        ("0.25", 0.2549, True),
-        ("0.25", 0.2551, False),
-        ("0.25", 0.2451, True),
-        ("0.25", 0.2449, False),
-        ("3", 3.5, True),
-    ],
-)
-def test_a_computed_value_rounds_to_the_digits_that_are_printed(printed: str, computed: float, rounds: bool) -> None:
-    cell = Cell(Decimal(printed), computed, None)
-    assert cell.rounds_to_printed == rounds
-    assert cell.from_printed == pytest.approx(computed / float(printed) - 1.0)
-    assert cell.from_measured is None
-    assert Cell(None, computed, Decimal(0)).rounds_to_printed
-    assert Cell(None, computed, Decimal(0)).from_measured is None

@@ -164,7 +164,7 @@ def test_heyoka_solves_the_same_equations(vehicle: Vehicle, heavy: Vehicle, plai
     assert float(ratios[2]) == pytest.approx(np.median(measured.seconds[job] / measured.seconds[other]), rel=0.01)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 @in_plain_c
 def test_one_command_prints_it_all(tmp_path: Path) -> None:
     picture = tmp_path / "cost_error.svg"
@@ -174,7 +174,6 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
         "turning",
         "fmi3SetFloat64",
         "RK4",
-        "Model Exchange",
         "memory of each",
         "A study by two workers",
         "kept",

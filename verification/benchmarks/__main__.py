@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import click
-import fmpy
 from rich.console import Console
 
 from rov_fmu.build import build
@@ -22,7 +21,6 @@ from . import kalman, picture, runs, simulators, taylor
 from .page import Section, machine, print_sections
 from .plain_c import PlainC, measurable
 from .steps import Steps
-from .work import Work
 
 
 @dataclass(frozen=True)
@@ -34,7 +32,6 @@ class Effort:
     known: int = 64  # commands whose results are compared with 50 digits; with few, RK4 looks more exact than it is
     manoeuvres: int = 5  # repetitions of what Python steps
     runs: int = 100_000
-    runs_in_fmpy: int = 2000
     study_runs: tuple[int, ...] = (1000, 10_000, 100_000)
 
 
@@ -43,7 +40,7 @@ A cell's second number is the error at the end of a held command against 50 digi
 for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep includes fmi2SetReal, and fmi3DoStep
 fmi3SetFloat64.
 """
-_QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, runs_in_fmpy=100, study_runs=(100, 400))
+_QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, study_runs=(100, 400))
 _PROMISED = (0.8, 1.0)
 """The largest ratio of the cost of many vehicles to that of heyoka's best batches: VideoRay, BlueROV2 Heavy."""
 
@@ -95,17 +92,11 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
         for one in (rov, load_vehicle(SHIPPED["bluerov2"])):
             yield kalman.section(one, min(effort.repetitions, 5))
     with say("many instances and runs"):
-        native, unzipped = folder / "native.fmu", folder / "native"
-        build(rov, native, platforms=["host"])
-        fmpy.extract(str(native), str(unzipped))
-        variations, rates = runs.Variations(rov, effort.runs), {}
         if plain_c:
             yield runs.instances(plain_c, effort.repetitions)
-            rates["plain C"] = variations.in_c(plain_c, effort.repetitions)
-        rates["FMPy"] = variations.through_fmpy(unzipped, effort.runs_in_fmpy, effort.manoeuvres)
-        yield runs.variations(rates)
-        yield runs.simulate(unzipped, Work(rov, 1.0, round(runs.STOP), 1), effort.manoeuvres)
+            yield runs.variations(runs.Variations(rov, effort.runs).in_c(plain_c, effort.repetitions))
     with say("studies"):
+        native = build(rov, folder / "native.fmu", platforms=["host"]).path
         yield runs.studies(native, folder, effort.study_runs)
 
 

@@ -1,25 +1,22 @@
-"""Many instances, and many runs: in plain C, through FMPy, and as studies."""
+"""Many instances, and many runs: in plain C, and as studies."""
 
 import shutil
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-import fmpy
 import numpy as np
 import psutil
 
 from rov_fmu.fmu.variables import variables
 from rov_fmu.study.run.run_study import run_study
 from rov_fmu.vehicle.vehicle import Vehicle
-from verification.references.fmpy_slave import fmpy_slave
 
 from .page import Section, digits, duration, error
 from .plain_c import PlainC, Reals
-from .work import Work, flight
+from .work import Work
 
 INSTANCES = (1, 100, 10_000)
 _HOLD, _COMMANDS = 10.0, 10
@@ -58,9 +55,7 @@ class Variations:
         self.values *= [rov[name] for name in self.parameters]
         self.work = Work(rov, _HOLD, _COMMANDS, 1)
         declared = {variable.name: variable.value_reference for variable in variables(rov)}
-        self.references, self.inputs, self.outputs = (
-            [declared[name] for name in names] for names in (self.parameters, layout.commands, layout.state)
-        )
+        self.references = [declared[name] for name in self.parameters]
 
     def in_c(self, plain_c: PlainC, repetitions: int) -> Runs:
         """Measure the runs in C, a part of them in each repetition."""
@@ -68,26 +63,6 @@ class Variations:
         found = [plain_c.run_each(self.references, share, self.work.array) for share in shares]
         rates = [len(share) / seconds for share, (seconds, _) in zip(shares, found, strict=True)]
         return Runs(len(self.values), float(np.median(rates)), self._error(np.concatenate([ends for _, ends in found])))
-
-    def through_fmpy(self, fmu: Path, runs: int, repetitions: int) -> Runs:
-        """Measure the first runs through FMPy's functions, with an unzipped FMU."""
-        slave, seconds = fmpy_slave(fmu), []
-        for _ in range(repetitions):
-            ends = []
-            start = time.process_time()
-            for values in self.values[:runs].tolist():
-                slave.reset()
-                slave.setupExperiment(startTime=0.0)
-                slave.setReal(self.references, values)
-                slave.enterInitializationMode()
-                slave.exitInitializationMode()
-                for n, command in enumerate(self.work.array.tolist()):
-                    slave.setReal(self.inputs, command)
-                    slave.doStep(currentCommunicationPoint=n * _HOLD, communicationStepSize=_HOLD)
-                ends.append(slave.getReal(self.outputs))
-            seconds.append(time.process_time() - start)
-        slave.freeInstance()
-        return Runs(runs, runs / float(np.median(seconds)), self._error(np.array(ends)))
 
     def _error(self, ends: Reals) -> float:
         """Return the largest difference of the first runs from the step in Python.
@@ -104,58 +79,10 @@ class Variations:
         return float(np.abs(ends[:_CHECKED] - exact).max())
 
 
-def variations(runs: Mapping[str, Runs]) -> Section:
+def variations(runs: Runs) -> Section:
     """Return the cost of runs with varied parameters."""
-    return [
-        ["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error at the end"],
-        *(
-            [name, f"{found.count:,}", duration(1.0 / found.rate), digits(found.rate), error(found.error)]
-            for name, found in runs.items()
-        ),
-    ]
-
-
-# ---- One run in FMPy -------------------------------------------------------------------------------------------------
-
-STOP, INTERVAL = 100.0, 0.01
-_KINDS: dict[str, dict[str, Any]] = {
-    "Co-Simulation": {"fmi_type": "CoSimulation"},
-    "Model Exchange, CVode 1e-6": {"fmi_type": "ModelExchange", "solver": "CVode", "relative_tolerance": 1e-6},
-}
-
-
-def simulate(fmu: Path, manoeuvre: Work, repetitions: int) -> Section:
-    """Return the cost of simulate_fmu: commands that change every second, and the state recorded every 10 ms."""
-    end = flight(manoeuvre.rov, manoeuvre.sequence, manoeuvre.hold)[-1]
-    # FMPy needs two rows at each change.
-    rows = [((n + k) * manoeuvre.hold, *c.values()) for n, c in enumerate(manoeuvre.sequence) for k in (0, 1)]
-    signals = np.array(rows, dtype=[("time", float), *((name, float) for name in manoeuvre.rov.layout.inputs)])
-    description = fmpy.read_model_description(str(fmu))
-    seconds: dict[str, list[float]] = {name: [] for name in _KINDS}
-    errors = {}
-    for _ in range(repetitions):
-        for name, options in _KINDS.items():
-            start = time.process_time()
-            result = fmpy.simulate_fmu(
-                str(fmu),
-                stop_time=STOP,
-                output_interval=INTERVAL,
-                input=signals,
-                output=list(end),
-                validate=False,
-                model_description=description,
-                **options,
-            )
-            seconds[name].append(time.process_time() - start)
-            errors[name] = float(max(abs(result[n][-1] - value) for n, value in end.items()))
-    first = np.array(next(iter(seconds.values())))
-    return [
-        [f"simulate_fmu, {STOP:g} s at {1000 * INTERVAL:g} ms, turning", "all", "error at the end", "times the first"],
-        *(
-            [name, duration(float(np.median(costs))), error(errors[name]), digits(float(np.median(costs / first)))]
-            for name, costs in seconds.items()
-        ),
-    ]
+    cells = [f"{runs.count:,}", duration(1.0 / runs.rate), digits(runs.rate), error(runs.error)]
+    return [["Variations of α and β, 100 s, turning", "runs", "a run", "runs a second", "error"], ["plain C", *cells]]
 
 
 # ---- Studies ---------------------------------------------------------------------------------------------------------

@@ -1,16 +1,17 @@
-"""The vehicle file is a fit: J of its numbers, and intervals whatever the size of an effect."""
+"""The vehicle file is a fit: J of its numbers, and intervals whatever the size of an effect, wider with less data."""
 
+import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
-from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.given import Tests as Given
 from rov_fmu.identify.identified_vehicle import identified_vehicle, written
-from rov_fmu.identify.likelihood.file_fit import MOST_RISE
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -33,11 +34,12 @@ def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehi
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
-    """`written` compares J of the numbers of the file with that of the fit, and a fit from elsewhere is not better."""
-    fit, vehicle, _ = drawn(tmp_path, 0.05, 0.02, seed)
+    """J rises by 2 at most. `written` compares J of the numbers of the file with that of the fit, and a fit from
+    elsewhere is not better."""
+    fit, vehicle, _ = drawn(tmp_path, 0.01, 0.02, seed)
     file, parameters = fit.file, fit.file.posterior.table.parameters
     assert file.posterior.absent
-    assert file.minimum.value - fit.best.value <= MOST_RISE
+    assert file.minimum.value - fit.best.value <= 2.0
     for n in file.posterior.absent:
         assert file.minimum.z[n] == parameters[n].null, parameters[n]
     assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
@@ -60,3 +62,22 @@ def test_intervals_contain_the_truth_whatever_the_size_of_a_load(load: float, se
                 for number, (_, (low, high)) in ((V, answer.steady), (Tau, answer.rise)):
                     covered.append(low <= number <= high)
     assert sum(covered) >= binom.ppf(0.001, len(covered), 0.9), covered
+
+
+def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
+    fit: Fit, short: Given, tmp_path: Path
+) -> None:
+    """Of heave, half of the log is left."""
+    folder = Path(shutil.copytree(short.folder.path, tmp_path / "half"))
+    log = folder / "log_heave_a.csv"
+    log.write_text("\n".join(log.read_text(encoding="utf-8").splitlines()[:110]), encoding="utf-8")
+    half = load_tests(folder)
+    widths = []
+    for tests, one in ((short, fit), (half, fit_all(folder, *begin(half)))):
+        vehicle = identified_vehicle(tests, one)[0]
+        answers = (assess.answers(one.posteriors, axis, vehicle, strongest=0.3) for axis in (HEAVE, YAW))
+        ends = [[answer.steady[1] for answer in of if answer.command in (-0.3, 0.3, 0.5)] for of in answers]
+        widths.append(np.diff(ends)[..., 0])
+    ratios = widths[1] / widths[0]
+    assert ratios[0].min() > 1.2
+    assert ratios[1] == pytest.approx(1.0, abs=0.1)

@@ -11,10 +11,10 @@ import click
 import numpy as np
 
 from tests.identify.scenarios.catalogue import SCENARIOS
-from tests.identify.scenarios.judge import band_widths, broken, promises, ratios_to_gate, read_gate
+from tests.identify.scenarios.judge import band_widths, broken, promises
 from tests.identify.scenarios.outcome import outcome
 
-_ROW = "{:40} {:>9} {:>10} {:>6} {:>6} {:>6}"
+_ROW = "{:40} {:>9} {:>6} {:>6} {:>6}"
 
 
 @click.command(help=__doc__)
@@ -23,13 +23,13 @@ _ROW = "{:40} {:>9} {:>10} {:>6} {:>6} {:>6}"
 def main(names: tuple[str, ...], seeds: int) -> None:
     """Run the scenarios whose names contain one of the words; a whole name runs that scenario alone.
 
-    The widths of intervals and of bands are the largest ones over the axes and quantities.
+    The width of bands is the largest one over the axes and quantities.
     """
     chosen = [n for n in SCENARIOS if not names or any(w == n or (w not in SCENARIOS and w in n) for w in names)]
     if not chosen:
         raise click.UsageError(f"no such scenario, only: {', '.join(SCENARIOS)}")
-    gate, found = read_gate(), []
-    click.echo(_ROW.format("scenario", "covered", "times gate", "bands", "width", "CPU s"))
+    found = []
+    click.echo(_ROW.format("scenario", "covered", "bands", "width", "CPU s"))
     for name in chosen:
         scenario = SCENARIOS[name]
         with TemporaryDirectory() as folder:
@@ -38,13 +38,12 @@ def main(names: tuple[str, ...], seeds: int) -> None:
         bands = [band.coverage for o in outcomes for band in o.bands]
         cells = (
             f"{sum(covered)}/{len(covered)}",
-            f"{max(ratios_to_gate(name, outcomes, gate).values(), default=nan):.2f}",
             f"{float(np.mean(bands)) if bands else nan:.0%}",
             f"{max(band_widths(outcomes).values(), default=nan):.2f}",
             f"{float(np.mean([o.seconds for o in outcomes])):.1f}",
         )
         click.echo(_ROW.format(name, *cells))
-        found += [each.within(name) for each in promises(name, outcomes, scenario.expected, gate)]
+        found += [each.within(name) for each in promises(outcomes, scenario.expected)]
     failed = broken(found)
     click.echo("\n".join(["", *failed, f"{len(failed)} of {len(found)} promises are broken"]))
 

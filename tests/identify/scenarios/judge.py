@@ -5,11 +5,9 @@ Holm's correction, they fail by chance once in 1,000 cases. A promise that chanc
 where it is broken.
 """
 
-import csv
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from math import exp, log, sqrt
-from pathlib import Path
+from math import sqrt
 
 import numpy as np
 from scipy.stats import binomtest, norm
@@ -42,10 +40,6 @@ _LEAST_SPREAD = 0.03
 """The coverage of bands varies at least so much between seeds; a few equal ones do not show that it never does."""
 _BAND_WIDTH = 2.5
 """The widest bands, relative to what the actual errors imply."""
-
-Gate = Mapping[tuple[str, str, str], float]
-"""The widths of the gate's intervals by scenario, axis and quantity."""
-_WIDTHS = Path(__file__).with_name("gate.csv")
 
 
 @dataclass(frozen=True)
@@ -84,7 +78,7 @@ def broken(promises: Sequence[Promise], family: int = 0) -> list[str]:
     return failed
 
 
-def promises(name: str, outcomes: Sequence[Outcome], expected: Expected, gate: Gate) -> list[Promise]:
+def promises(outcomes: Sequence[Outcome], expected: Expected) -> list[Promise]:
     """Return all promises of a scenario, with what became of them."""
     answered = [o for o in outcomes if not o.error]
     found = [Promise(f"seed {n}: refused: {o.error}", 0.0) for n, o in enumerate(outcomes) if o.error]
@@ -94,7 +88,6 @@ def promises(name: str, outcomes: Sequence[Outcome], expected: Expected, gate: G
         found += _of_bias(answered)
         alarmed = sum(bool(o.unusable if expected.like_owners else o.alarms) for o in answered)
         found.append(at_most(f"{alarmed} of {len(answered)} runs raise an alarm", alarmed, len(answered), _FALSE_RUNS))
-        found += _of_widths(name, outcomes, expected, gate)
     found.append(_of_effects(answered, expected))
     found.append(_of_causes(answered, expected))
     if expected.unusable:
@@ -150,29 +143,6 @@ def _of_bias(outcomes: Sequence[Outcome]) -> Iterator[Promise]:
         beyond = abs(mean) - max(_BIAS, _BIAS_IN_ERRORS * error)
         p_value = 2.0 * float(norm.sf(beyond * sqrt(len(some)) / max(error, 1e-12))) if beyond > 0.0 else 1.0
         yield Promise(f"{name}: a bias of {mean:.1%} with a standard error of {error:.1%}", p_value)
-
-
-def read_gate() -> Gate:
-    """Return the mean widths of intervals of the identification before this one, over the seeds where they cover.
-
-    Axes whose intervals cover too seldom are left out, and V_ss too, which is never claimed to better than 1 %.
-    """
-    with _WIDTHS.open(encoding="utf-8") as file:
-        return {(row["scenario"], row["axis"], row["quantity"]): float(row["width"]) for row in csv.DictReader(file)}
-
-
-def ratios_to_gate(name: str, outcomes: Sequence[Outcome], gate: Gate) -> dict[str, float]:
-    """Return the mean width of the coefficients of each axis relative to the gate's, by the mean of logarithms."""
-    logs: dict[str, list[float]] = {}
-    for e in (e for o in outcomes for e in o.estimates if (name, e.axis, e.quantity) in gate and e.width > 0.0):
-        logs.setdefault(e.axis or "curves", []).append(log(e.width / gate[name, e.axis, e.quantity]))
-    return {axis: exp(float(np.mean(some))) for axis, some in logs.items()}
-
-
-def _of_widths(name: str, outcomes: Sequence[Outcome], expected: Expected, gate: Gate) -> Iterator[Promise]:
-    for axis, ratio in ratios_to_gate(name, outcomes, gate).items():
-        words = f"{axis}: intervals are {ratio:.2f} times as wide as the gate's"
-        yield Promise(words, float(ratio <= expected.wider_than_gate))
 
 
 # ---- Effects, causes and bands ---------------------------------------------------------------------------------------

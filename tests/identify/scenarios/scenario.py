@@ -45,9 +45,6 @@ class Expected:
     wider limits from both sides, and false effects by axis."""
     seconds: float = inf
     """The most processor time of an identification, s."""
-    wider_than_gate: float = 12.0
-    """The widest intervals, relative to those of the gate. The gate took the offset of the logger, the lag, a constant
-    load and the drag astern as 0 where it found none; now intervals contain those of the fit with all effects."""
 
 
 NOTHING_SPECIAL = Expected()

@@ -6,15 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identify.scenarios.judge import Gate, Promise, broken, promises
+from tests.identify.scenarios.judge import Promise, broken, promises
 from tests.identify.scenarios.outcome import Band, Estimate, Outcome
-from tests.identify.scenarios.scenario import NOTHING_SPECIAL, Expected
+from tests.identify.scenarios.scenario import Expected
 
 COMPLETE = Expected(("load of heave",))
 INCOMPLETE = replace(COMPLETE, causes=("voltage", "time"), complete=False)
 OWNER = replace(COMPLETE, like_owners=True)
 TRUTHS = {("surge", "a_d_u"): 20.0, ("surge", "beta_u"): 0.8, ("heave", "a_d_w"): 40.0, ("heave", "V_ss 30 %"): 0.2}
-NO_GATE: Gate = {}
 Misses = Callable[[int, str], bool]
 
 
@@ -40,10 +39,8 @@ def seeds(
     return found
 
 
-def wrong(
-    outcomes: Sequence[Outcome], expected: Expected = COMPLETE, gate: Gate = NO_GATE, family: int = 0
-) -> list[str]:
-    return broken(promises("a", outcomes, expected, gate), family)
+def wrong(outcomes: Sequence[Outcome], expected: Expected = COMPLETE, family: int = 0) -> list[str]:
+    return broken(promises(outcomes, expected), family)
 
 
 @pytest.mark.parametrize("n", [2, 20, 200])
@@ -135,11 +132,3 @@ def test_a_bias_fails() -> None:
     assert all("a bias of 4.0%" in words for words in found)
     assert wrong(seeds(2, offset=0.04)) == []
     assert wrong(seeds(2, offset=0.04, half=0.01))
-
-
-@pytest.mark.parametrize(("share", "axes"), [(0.999, []), (1.001, ["surge", "heave"])])
-def test_intervals_that_are_wider_than_those_of_the_gate_fail(share: float, axes: Sequence[str]) -> None:
-    widest = share * NOTHING_SPECIAL.wider_than_gate
-    gate = {("a", axis, name): 0.2 / widest * truth for (axis, name), truth in TRUTHS.items() if name[0] != "V"}
-    found = wrong(seeds(20, lambda *_: False), gate=gate)
-    assert found == [f"{axis}: intervals are {widest:.2f} times as wide as the gate's" for axis in axes]
