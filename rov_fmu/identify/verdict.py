@@ -19,6 +19,7 @@ from rov_fmu.identify.result import (
     Slip,
     Verdict,
     coverage_of,
+    half_width,
     relative_error,
     score_of,
 )
@@ -84,8 +85,7 @@ class Evidence:
     def half_width(self, *of: str) -> float:
         """Return the largest relative half-width of some answers within the tests; NaN without any."""
         within = [a for a in self.answers if not is_extrapolated(a.command, self.tested)] or self.answers
-        known = [getattr(a, key) for a in within for key in of]
-        return max((0.5 * (high - low) / abs(value) for value, (low, high) in known), default=nan)
+        return max((half_width(getattr(a, key)) for a in within for key in of), default=nan)
 
 
 @dataclass(frozen=True)
