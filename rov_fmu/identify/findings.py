@@ -424,8 +424,15 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     for d in identification.disturbances:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
         most = max((rms(force) for force in forces), default=inf)
-        if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
-            size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
+        if (
+            d.kind == "slow force"
+            and d.axis
+            and d.kept
+            and not d.cause
+            and d.share > MOST_UNKNOWN
+            and d.value > _ODD * most
+        ):
+            size, other = size_in_words(d.value, d.unit), size_in_words(most, d.unit)
             pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
     for file, forces_of in pushed.items():
         acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
@@ -653,13 +660,13 @@ _REMEDIES = {
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.size, d.unit), percent(d.share)
+    size, share = size_in_words(d.value, d.unit), percent(d.share)
     push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
     where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     kind, what = {
-        "gain": ("change of thrust", f"the thrust changes slowly by {percent(d.size)} (RMS)"),
-        "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
-        "force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
+        "slow gain": ("change of thrust", f"the thrust changes slowly by {percent(d.value)} (RMS)"),
+        "slow velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
+        "slow force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
     }[d.kind]
     if d.cause:
         kind = "explained disturbance"

@@ -196,30 +196,23 @@ class Structure:
     """What else its sentence needs."""
 
 
-@dataclass(frozen=True)
-class Disturbance:
-    """Something slow that the model does not explain: a force, a change of all thrust, or a velocity over ground."""
+@dataclass(frozen=True, kw_only=True)
+class Disturbance(Effect):
+    """An effect that is slow: a force, a change of all thrust, or a velocity over ground.
 
-    kind: Literal["force", "gain", "velocity"]
-    axis: Axis | None
-    """None for a change of all thrust."""
+    Its value is its RMS in the log where it is largest.
+    """
+
+    axis: Axis | None = None
+    """None for a change of all thrust, and for a horizontal velocity."""
     file: str
     """The log in which it is largest."""
-    size: float
-    """Its RMS in that log: N or N m, a fraction of the thrust, or m/s."""
-    unit: str
     share: float
-    """The size relative to the RMS of the thrust, or of the velocity, in that log."""
-    since: float | None
+    """The value relative to the RMS of the thrust, or of the velocity, in that log."""
+    since: float | None = None
     """When it first exceeds twice its own uncertainty, s after the start of the log."""
-    evidence: float
     cause: str = ""
     """The channel that explains it in words, such as `the voltage`; empty if none does."""
-
-    @property
-    def kept(self) -> bool:
-        """True if the evidence for it is strong, so that it is reported."""
-        return self.evidence > KEPT
 
 
 @dataclass(frozen=True, eq=False)

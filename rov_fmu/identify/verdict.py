@@ -129,9 +129,9 @@ def _largest(e: Evidence) -> dict[str, str]:
     largest = max(e.unknown, key=lambda d: d.share)
     is_turn = largest.axis is not None and largest.axis.is_rotation
     what = {
-        "gain": "The thrust changes for an unknown reason by {}",
-        "force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
-        "velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
+        "slow gain": "The thrust changes for an unknown reason by {}",
+        "slow force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
+        "slow velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
     }
     return {"what": what[largest.kind].format(percent(largest.share)), "file": largest.file}
 
