@@ -413,8 +413,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         judged = [p for p in result.predictions if p.is_judged]
         for p in judged:
             own = [other for other in judged if other.quantity == p.quantity]
-            is_odd = 2 * sum(other.error > other.unchanged for other in own) < len(own)
-            if p.error > p.unchanged and is_odd and (p.file, p.quantity) not in slipped:
+            is_odd = 2 * sum(other.is_worse for other in own) < len(own)
+            if p.is_worse and is_odd and (p.file, p.quantity) not in slipped:
                 error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
                 yield (
                     p.file,
@@ -559,7 +559,7 @@ def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     """
     if not result.predictions:
         yield Finding("nothing predicted", result.axis.name)
-    worse = [p for p in result.predictions if p.error > p.unchanged]
+    worse = [p for p in result.predictions if p.is_worse]
     warned = {(p.file, p.quantity) for p in worse if p.is_judged}
     for p in worse:
         if p.is_judged or (p.file, p.quantity) not in warned:

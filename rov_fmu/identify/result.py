@@ -118,6 +118,11 @@ class Prediction:
         return least_error(self.noise, self.unchanged)
 
     @property
+    def is_worse(self) -> bool:
+        """True if no change is a better prediction."""
+        return self.error > self.unchanged
+
+    @property
     def moves(self) -> bool:
         """True if the quantity changes by clearly more than the noise of its sensor."""
         return self.unchanged > _MOVING * self.noise
@@ -244,7 +249,7 @@ class Logging:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorNoise:
     """The noise of a sensor in all logs, SI units."""
 
     axis: Axis
@@ -413,7 +418,7 @@ class Identification:
     effects: tuple[Effect, ...]
     disturbances: tuple[Disturbance, ...]
     logging: tuple[Logging, ...]
-    sensors: tuple[Sensor, ...]
+    sensors: tuple[SensorNoise, ...]
     correlation: tuple[tuple[str, ...], Array]
     """The names and the correlations of all identified coefficients."""
     objective: float

@@ -66,7 +66,7 @@ class Evidence:
     @property
     def worse(self) -> list[Prediction]:
         """Those that a prediction of no change would be better than."""
-        return [p for p in self.moving if p.error > p.unchanged]
+        return [p for p in self.moving if p.is_worse]
 
     @property
     def unknown(self) -> list[Disturbance]:

@@ -24,7 +24,7 @@ from rov_fmu.identify.result import (
     NextTest,
     Point,
     Prediction,
-    Sensor,
+    SensorNoise,
     Verdict,
 )
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -168,8 +168,8 @@ def without_findings() -> Identification:
         ),
         logging=(Logging(FILES[0], 0.1, -0.08, (-0.09, -0.07), 0.1), Logging(FILES[1], 0.1, 0.0, (-0.02, 0.02), 0.1)),
         sensors=(
-            Sensor(HEAVE, "depth", "m", 0.01, 0.02, 1.5, 1200),
-            Sensor(YAW, "heading", "rad", pi / 180.0, 0.0, 0.0, 1200),
+            SensorNoise(HEAVE, "depth", "m", 0.01, 0.02, 1.5, 1200),
+            SensorNoise(YAW, "heading", "rad", pi / 180.0, 0.0, 0.0, 1200),
         ),
         correlation=(names, correlation),
         objective=-1234.5,

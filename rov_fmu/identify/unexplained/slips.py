@@ -66,7 +66,7 @@ _UNHEEDED = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class _Compared:
+class _Match:
     """A channel of a log beside the simulation of it by the vehicle of the priors."""
 
     file: str
@@ -84,7 +84,7 @@ class _Compared:
         return [] if 1.0 in likely else likely
 
 
-Scaling = frozenset[tuple[_Compared, float]]
+Scaling = frozenset[tuple[_Match, float]]
 """Channels with their scales."""
 
 
@@ -101,7 +101,7 @@ def slips(
     `errors` are the standard errors there, and `adopted` has the hypotheses about the structure that won. Where several
     explanations are about as good, each is told for its files.
     """
-    compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
+    compared = [one for n in range(len(objective.logs)) for one in _matches(objective, n, known.guessed)]
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
@@ -145,7 +145,7 @@ def _lightness(scaling: Scaling, axis: Axis, ratio: float, error: float) -> floa
     return max(-(ratio + log(scale)) / error, 0.0) ** 2
 
 
-def _drag(scaling: Scaling, compared: Sequence[_Compared], guessed: Sequence[str]) -> float:
+def _drag(scaling: Scaling, compared: Sequence[_Match], guessed: Sequence[str]) -> float:
     """Return how unlikely the drag of the axes is whose prior of the drag follows from the data.
 
     The drag is relative to the usual one as the simulated velocity, squared, to the measured one.
@@ -159,7 +159,7 @@ def _drag(scaling: Scaling, compared: Sequence[_Compared], guessed: Sequence[str
     return sum((2.0 * float(np.mean(some)) / _USUAL) ** 2 for some in ratios.values())
 
 
-def _customary(one: _Compared, compared: Sequence[_Compared], light: Collection[Axis]) -> Iterator[float]:
+def _customary(one: _Match, compared: Sequence[_Match], light: Collection[Axis]) -> Iterator[float]:
     """Yield the scales of knots and feet, where something speaks for them."""
     quantity = one.channel.quantity
     others = [other for other in compared if other.channel.quantity.axis is quantity.axis and 1.0 in other.ratios]
@@ -181,7 +181,7 @@ def _words(channel: Channel, scale: float) -> str:
     return f"is it {meaning}" if meaning else f"are its numbers {1.0 / scale:g} times too small for its unit"
 
 
-def _scalings(likely: Mapping[_Compared, Sequence[float]]) -> Iterator[Scaling]:
+def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
     """Yield all suspected channels with one scale, for each scale, and all of them with their most usual scales."""
     for scale in {scale for scales in likely.values() for scale in scales}:
         yield frozenset((one, scale) for one, scales in likely.items() if scale in scales)
@@ -213,7 +213,7 @@ def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
 # ---- Comparison with the vehicle of the priors -----------------------------------------------------------------------
 
 
-def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Compared]:
+def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Match]:
     """Yield all channels of a log that the filter reads, beside their simulation."""
     one, record = objective.logs[number], objective.records[number]
     try:
@@ -230,7 +230,7 @@ def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iter
             found[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
         most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in found.values())
         ratios = {k: ratio for k, (ratio, unexplained) in found.items() if ratio > 0.0 and unexplained < min(most)}
-        yield _Compared(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
+        yield _Match(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
 
 
 def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:
