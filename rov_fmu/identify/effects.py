@@ -14,7 +14,7 @@ from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
-from rov_fmu.identify.result import Effect, Logging, Sensor, Structure
+from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant
 
@@ -109,7 +109,7 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
         yield Logging(one.log.file, one.interval, offset, around(offset, posterior.errors[place]), width)
 
 
-def sensors_of(fit: Fit) -> Iterator[Sensor]:
+def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
     """Yield the noise and the outliers of each measured quantity over all logs."""
     z, table = fit.best.z, fit.posterior.table
     counts: dict[str, int] = {}
@@ -128,4 +128,4 @@ def sensors_of(fit: Fit) -> Iterator[Sensor]:
         coloured = white * table.get(z, "coloured noise", name)
         time = table.get(z, "correlation time", name)
         share = float(np.mean(outlying[name]))
-        yield Sensor(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name], share)
+        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name], share)

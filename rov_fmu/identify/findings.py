@@ -413,8 +413,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         judged = [p for p in result.predictions if p.is_judged]
         for p in judged:
             own = [other for other in judged if other.quantity == p.quantity]
-            is_odd = 2 * sum(other.error > other.unchanged for other in own) < len(own)
-            if p.error > p.unchanged and is_odd and (p.file, p.quantity) not in slipped:
+            is_odd = 2 * sum(other.is_worse for other in own) < len(own)
+            if p.is_worse and is_odd and (p.file, p.quantity) not in slipped:
                 error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
                 yield (
                     p.file,
@@ -424,8 +424,15 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     for d in identification.disturbances:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
         most = max((rms(force) for force in forces), default=inf)
-        if d.kind == "force" and d.axis and d.kept and not d.cause and d.share > MOST_UNKNOWN and d.size > _ODD * most:
-            size, other = size_in_words(d.size, d.unit), size_in_words(most, d.unit)
+        if (
+            d.kind == "slow force"
+            and d.axis
+            and d.kept
+            and not d.cause
+            and d.share > MOST_UNKNOWN
+            and d.value > _ODD * most
+        ):
+            size, other = size_in_words(d.value, d.unit), size_in_words(most, d.unit)
             pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
     for file, forces_of in pushed.items():
         acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
@@ -552,7 +559,7 @@ def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     """
     if not result.predictions:
         yield Finding("nothing predicted", result.axis.name)
-    worse = [p for p in result.predictions if p.error > p.unchanged]
+    worse = [p for p in result.predictions if p.is_worse]
     warned = {(p.file, p.quantity) for p in worse if p.is_judged}
     for p in worse:
         if p.is_judged or (p.file, p.quantity) not in warned:
@@ -653,13 +660,13 @@ _REMEDIES = {
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
     axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.size, d.unit), percent(d.share)
+    size, share = size_in_words(d.value, d.unit), percent(d.share)
     push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
     where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     kind, what = {
-        "gain": ("change of thrust", f"the thrust changes slowly by {percent(d.size)} (RMS)"),
-        "velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
-        "force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
+        "slow gain": ("change of thrust", f"the thrust changes slowly by {percent(d.value)} (RMS)"),
+        "slow velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
+        "slow force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
     }[d.kind]
     if d.cause:
         kind = "explained disturbance"

@@ -127,14 +127,14 @@ def _axis(
     own, tested = tuple(p for p in predicted if p.axis is axis), fit.tested(axis)
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
-    is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "gain" and d.kept)
+    is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "slow gain" and d.kept)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     if is_told and is_steady:
         answers = assess.answers(
             (*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least
         )
-    unknown = [d for d in slow if d.axis is axis or d.kind == "gain" or (d.axis is None and axis in (SURGE, SWAY))]
+    unknown = [d for d in slow if d.axis is axis or d.kind == "slow gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}

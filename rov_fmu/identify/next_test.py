@@ -1,6 +1,7 @@
 """The test that would tell most: add the information of a proposed test, and compare the intervals."""
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 from math import inf, isfinite
 
@@ -125,7 +126,9 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
         layout.at_rest,
         one.record.errors,
     )
-    proposed = _Proposed(objective, number, record)
+    proposed = copy(objective)
+    proposed.logs = [replace(other, record=record) if other is one else other for other in objective.logs]
+    proposed.records = [other.record for other in proposed.logs]
     free = proposed.run(z, number, begin=0.0)
     proposed.records[number] = replace(record, value=-free.innovations)
     run = proposed.run(z, number)
@@ -138,12 +141,3 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
     slopes = proposed.changes(inside, number, concerned, steps, run, begin=-1.0, span=inf)
     data = Data(run.innovations, run.variances, slopes, np.zeros_like(slopes), concerned, len(z))
     return data.information(slice(None))[1]
-
-
-class _Proposed(Objective):
-    """The objective with a log that is only proposed."""
-
-    def __init__(self, objective: Objective, number: int, record: Record) -> None:
-        self.__dict__.update(objective.__dict__)
-        self.logs = [replace(one, record=record) if n == number else one for n, one in enumerate(objective.logs)]
-        self.records = [record if n == number else other for n, other in enumerate(objective.records)]

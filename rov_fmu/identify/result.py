@@ -118,6 +118,11 @@ class Prediction:
         return least_error(self.noise, self.unchanged)
 
     @property
+    def is_worse(self) -> bool:
+        """True if no change is a better prediction."""
+        return self.error > self.unchanged
+
+    @property
     def moves(self) -> bool:
         """True if the quantity changes by clearly more than the noise of its sensor."""
         return self.unchanged > _MOVING * self.noise
@@ -196,30 +201,23 @@ class Structure:
     """What else its sentence needs."""
 
 
-@dataclass(frozen=True)
-class Disturbance:
-    """Something slow that the model does not explain: a force, a change of all thrust, or a velocity over ground."""
+@dataclass(frozen=True, kw_only=True)
+class Disturbance(Effect):
+    """An effect that is slow: a force, a change of all thrust, or a velocity over ground.
 
-    kind: Literal["force", "gain", "velocity"]
-    axis: Axis | None
-    """None for a change of all thrust."""
+    Its value is its RMS in the log where it is largest.
+    """
+
+    axis: Axis | None = None
+    """None for a change of all thrust, and for a horizontal velocity."""
     file: str
     """The log in which it is largest."""
-    size: float
-    """Its RMS in that log: N or N m, a fraction of the thrust, or m/s."""
-    unit: str
     share: float
-    """The size relative to the RMS of the thrust, or of the velocity, in that log."""
-    since: float | None
+    """The value relative to the RMS of the thrust, or of the velocity, in that log."""
+    since: float | None = None
     """When it first exceeds twice its own uncertainty, s after the start of the log."""
-    evidence: float
     cause: str = ""
     """The channel that explains it in words, such as `the voltage`; empty if none does."""
-
-    @property
-    def kept(self) -> bool:
-        """True if the evidence for it is strong, so that it is reported."""
-        return self.evidence > KEPT
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +249,7 @@ class Logging:
 
 
 @dataclass(frozen=True)
-class Sensor:
+class SensorNoise:
     """The noise of a sensor in all logs, SI units."""
 
     axis: Axis
@@ -420,7 +418,7 @@ class Identification:
     effects: tuple[Effect, ...]
     disturbances: tuple[Disturbance, ...]
     logging: tuple[Logging, ...]
-    sensors: tuple[Sensor, ...]
+    sensors: tuple[SensorNoise, ...]
     correlation: tuple[tuple[str, ...], Array]
     """The names and the correlations of all identified coefficients."""
     objective: float

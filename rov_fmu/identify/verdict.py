@@ -19,6 +19,7 @@ from rov_fmu.identify.result import (
     Slip,
     Verdict,
     coverage_of,
+    half_width,
     relative_error,
     score_of,
 )
@@ -65,7 +66,7 @@ class Evidence:
     @property
     def worse(self) -> list[Prediction]:
         """Those that a prediction of no change would be better than."""
-        return [p for p in self.moving if p.error > p.unchanged]
+        return [p for p in self.moving if p.is_worse]
 
     @property
     def unknown(self) -> list[Disturbance]:
@@ -84,8 +85,7 @@ class Evidence:
     def half_width(self, *of: str) -> float:
         """Return the largest relative half-width of some answers within the tests; NaN without any."""
         within = [a for a in self.answers if not is_extrapolated(a.command, self.tested)] or self.answers
-        known = [getattr(a, key) for a in within for key in of]
-        return max((0.5 * (high - low) / abs(value) for value, (low, high) in known), default=nan)
+        return max((half_width(getattr(a, key)) for a in within for key in of), default=nan)
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,9 @@ def _largest(e: Evidence) -> dict[str, str]:
     largest = max(e.unknown, key=lambda d: d.share)
     is_turn = largest.axis is not None and largest.axis.is_rotation
     what = {
-        "gain": "The thrust changes for an unknown reason by {}",
-        "force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
-        "velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
+        "slow gain": "The thrust changes for an unknown reason by {}",
+        "slow force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
+        "slow velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
     }
     return {"what": what[largest.kind].format(percent(largest.share)), "file": largest.file}
 

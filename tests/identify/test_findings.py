@@ -24,7 +24,6 @@ from rov_fmu.identify.findings import (
 )
 from rov_fmu.identify.result import (
     Coefficient,
-    Disturbance,
     Effect,
     Identification,
     Logging,
@@ -44,6 +43,7 @@ from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.folders import BLUEROV2
+from tests.report import results
 from tests.report.results import FILES, TIME, example, log, prediction, without_findings
 
 BLUEROV = load_vehicle(SHIPPED["bluerov2"])
@@ -68,10 +68,10 @@ def said(result: Identification, kind: str) -> list[str]:
     return [*sentences(f for f in findings_of(result) if f.kind == kind)]
 
 
-def disturbance(kind: Any = "force", **changes: Any) -> Identification:
-    axis = None if kind == "gain" else SURGE
-    size, unit = {"force": (2.1, "N"), "gain": (0.12, "1"), "velocity": (0.11, "m/s")}[kind]
-    found = Disturbance(kind, axis, "log_3.csv", size, unit, 0.16, 41.2, 20.0)
+def disturbance(kind: str = "slow force", **changes: Any) -> Identification:
+    axis = None if kind == "slow gain" else SURGE
+    size, unit = {"slow force": (2.1, "N"), "slow gain": (0.12, "1"), "slow velocity": (0.11, "m/s")}[kind]
+    found = results.disturbance(kind, axis, "log_3.csv", size, unit, 0.16, 41.2, 20.0)
     return quiet(disturbances=(replace(found, **changes),))
 
 
@@ -176,7 +176,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     (
         "unknown force",
-        disturbance(axis=YAW, size=0.21, unit="N.m"),
+        disturbance(axis=YAW, value=0.21, unit="N.m"),
         "yaw: an unknown slow torque of 0.21 N.m (RMS), 16% of the torque, acts in log_3.csv from 41 s on. Check",
         disturbance(evidence=5.0),
     ),
@@ -186,10 +186,15 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "the time constant of the thrusters of 0.60 s (0.50 to 0.70) is unusual. Something else may act in its place",
         quiet(effects=(replace(SLOW, beyond=2.4),)),
     ),
-    ("change of thrust", disturbance("gain", since=None), "the thrust changes slowly by 12% (RMS) in log_3", quiet()),
+    (
+        "change of thrust",
+        disturbance("slow gain", since=None),
+        "the thrust changes slowly by 12% (RMS) in log_3",
+        quiet(),
+    ),
     (
         "velocity over ground",
-        disturbance("velocity", axis=None, since=0.9),
+        disturbance("slow velocity", axis=None, since=0.9),
         "surge: an unknown slow velocity over ground of 0.11 m/s (RMS) acts in log_3.csv. Check for waves",
         None,
     ),
@@ -198,7 +203,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         disturbance(cause="the distance", since=1.1),
         "surge: a slow force of 2.1 N (RMS), 16% of the thrust, acts in log_3.csv from 1 s on. It follows the distance"
         ", as when a tether pulls",
-        disturbance("gain"),
+        disturbance("slow gain"),
     ),
     (
         "coupling left out",
@@ -391,7 +396,7 @@ def slow_forces(*sizes: float) -> dict[str, Any]:
     files = (*FILES, "log_3.csv")
     largest = files[sizes.index(max(sizes))]
     return {
-        "disturbances": (Disturbance("force", SURGE, largest, max(sizes), "N", 0.2, 9.0, 30.0),),
+        "disturbances": (results.disturbance("slow force", SURGE, largest, max(sizes), "N", 0.2, 9.0, 30.0),),
         "unknown_forces": tuple(
             UnknownForce(SURGE, file, TIME, np.full(len(TIME), size), np.ones(len(TIME)))
             for file, size in zip(files, sizes, strict=True)

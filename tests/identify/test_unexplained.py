@@ -124,19 +124,17 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> No
     thrust = np.array([VIDEORAY.force(SURGE, c) for c in COMMAND])
     share = np.mean(since)
     sizes = {
-        ("force", SURGE): (2.0 * share**0.5, np.sqrt(np.mean(thrust**2)), "N"),
-        ("gain", None): (np.expm1(1.1) * share**0.5, 1.0, "1"),
-        ("velocity", None): ((0.49 + 1.44 * share) ** 0.5, 0.8, "m/s"),
-        ("velocity", HEAVE): (0.0, 0.05, "m/s"),
-        ("force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
+        ("slow force", SURGE): (2.0 * share**0.5, np.sqrt(np.mean(thrust**2)), "N"),
+        ("slow gain", None): (np.expm1(1.1) * share**0.5, 1.0, "1"),
+        ("slow velocity", None): ((0.49 + 1.44 * share) ** 0.5, 0.8, "m/s"),
+        ("slow velocity", HEAVE): (0.0, 0.05, "m/s"),
+        ("slow force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
     }
     for key, (size, usual, unit) in sizes.items():
         one = found[key]
-        assert (one.size, one.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
+        assert (one.value, one.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
         assert (one.unit, one.since) == (unit, pytest.approx(30.0, abs=0.3) if size else None)
-        kind = {"force": "slow force", "gain": "slow gain", "velocity": "slow velocity"}[one.kind]
-        of = one.axis.name if one.axis else "horizontal" if one.kind == "velocity" else ""
-        place = objective.table.place(kind, of)
+        place = objective.table.place(one.kind, one.of)
         assert place is not None
         gone = np.where(np.arange(len(z)) == place, objective.low, z)
         explained = [

@@ -24,7 +24,7 @@ from rov_fmu.identify.result import (
     NextTest,
     Point,
     Prediction,
-    Sensor,
+    SensorNoise,
     Verdict,
 )
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -102,6 +102,15 @@ def log(file: str, *, full: float = 0.0) -> Log:
     return Log(file, Commands.of_rows(["t"], TIME, commands, Source("t")), channels)
 
 
+def disturbance(
+    kind: str, axis: Axis | None, file: str, size: float, unit: str, share: float, since: float | None, evidence: float
+) -> Disturbance:
+    """Return a slow process with a size that is known within a tenth."""
+    interval = 0.9 * size, 1.1 * size
+    of = axis.name if axis else ""
+    return Disturbance(kind, of, kind, size, interval, unit, evidence, axis=axis, file=file, share=share, since=since)
+
+
 @cache
 def without_findings() -> Identification:
     """Return the result before anything is told about it."""
@@ -154,13 +163,13 @@ def without_findings() -> Identification:
             Effect("load", "heave", "constant load", 0.01, (-0.5, 0.5), "N", -3.0),
         ),
         disturbances=(
-            Disturbance("force", HEAVE, FILES[1], 2.1, "N", 0.16, 41.0, 30.0),
-            Disturbance("gain", None, FILES[0], 0.01, "1", 0.01, None, 2.0),
+            disturbance("slow force", HEAVE, FILES[1], 2.1, "N", 0.16, 41.0, 30.0),
+            disturbance("slow gain", None, FILES[0], 0.01, "1", 0.01, None, 2.0),
         ),
         logging=(Logging(FILES[0], 0.1, -0.08, (-0.09, -0.07), 0.1), Logging(FILES[1], 0.1, 0.0, (-0.02, 0.02), 0.1)),
         sensors=(
-            Sensor(HEAVE, "depth", "m", 0.01, 0.02, 1.5, 1200),
-            Sensor(YAW, "heading", "rad", pi / 180.0, 0.0, 0.0, 1200),
+            SensorNoise(HEAVE, "depth", "m", 0.01, 0.02, 1.5, 1200),
+            SensorNoise(YAW, "heading", "rad", pi / 180.0, 0.0, 0.0, 1200),
         ),
         correlation=(names, correlation),
         objective=-1234.5,

@@ -11,7 +11,7 @@ from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import Posterior, around
 from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
@@ -21,7 +21,6 @@ _LITTLE = 0.05
 """A slow force is compared with at least this share of full thrust, and a slow velocity with as many m/s."""
 _STEPS = 8
 """The most derivatives of a fit without a slow process."""
-_KINDS = {"slow force": "force", "slow gain": "gain", "slow velocity": "velocity"}
 
 
 def followed(objective: Objective, z: Array) -> list[Run]:
@@ -34,9 +33,9 @@ def disturbances(
 ) -> Iterator[Disturbance]:
     """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
     for place, p in enumerate(objective.table.parameters):
-        if p.kind in _KINDS:
-            evidence = _evidence(objective, best, posterior, place)
-            found = [_disturbance(objective, n, best.z, p, runs, evidence) for n in range(len(runs))]
+        if p.kind in SLOW:
+            evidence, error = _evidence(objective, best, posterior, place), float(posterior.errors[place])
+            found = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
             present = [one for one in found if one]
             if present:
                 largest = max(present, key=lambda one: one.share)
@@ -75,9 +74,15 @@ def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: 
 
 
 def _disturbance(
-    objective: Objective, number: int, z: Array, parameter: Parameter, runs: Sequence[Run], evidence: float
+    objective: Objective,
+    number: int,
+    z: Array,
+    parameter: Parameter,
+    runs: Sequence[Run],
+    evidence: float,
+    error: float,
 ) -> Disturbance | None:
-    """Return a slow process in one log; None if the log does not have it."""
+    """Return a slow process in one log; None if the log does not have it. `error` is that of ln of its size."""
     one, run = objective.logs[number], runs[number]
     first = _place(objective, number, parameter)
     if first < 0:
@@ -105,13 +110,24 @@ def _disturbance(
         usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
     clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
     since = float(time[clear[0]] - time[0]) if len(clear) else None
-    kind = _KINDS[parameter.kind]
-    return Disturbance(kind, axis, one.log.file, size, unit, size / usual, since, evidence)  # type: ignore[arg-type]
+    return Disturbance(
+        parameter.kind,
+        parameter.of,
+        parameter.kind,
+        size,
+        around(size, size * error, positive=True),
+        unit,
+        evidence,
+        axis=axis,
+        file=one.log.file,
+        share=size / usual,
+        since=since,
+    )
 
 
 def _cause(objective: Objective, z: Array, parameter: Parameter, runs: Sequence[Run], slow: Disturbance) -> str:
     """Return what a slow process follows in all logs, in words. Nobody knows what a velocity over ground follows."""
-    if slow.kind == "velocity":
+    if slow.kind == "slow velocity":
         return ""
     places = [_place(objective, n, parameter) for n in range(len(runs))]
     return cause_of(objective, z, runs, places, SLOW[parameter.kind], slow.axis)

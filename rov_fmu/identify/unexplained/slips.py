@@ -1,6 +1,6 @@
-"""Mistakes of unit and sign in logs, as discrete hypotheses under the objective of the identification.
+"""Mistakes of unit and sign in logs, as scalings of channels under the objective of the identification.
 
-A hypothesis says that the values of some channels in the files are k times the true ones, such as 100 for centimetres
+A scaling says that the values of some channels in the files are k times the true ones, such as 100 for centimetres
 in a column of metres, or -1 for a depth that is positive upwards. Its evidence against the files as they stand is
 
     2 ln of the Bayes factor = J(files as they stand) - [ J(values / k) + 2 n ln |k| ]
@@ -12,7 +12,7 @@ Added mass is never negative, so an inertia below the vehicle's own is as unlike
 distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s. So is
 the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
-Only few hypotheses are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
+Only few scalings are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
 only a channel that would agree with this motion for another k, but not for 1, is suspected. The priors do not tell
 knots and feet from metres. These are suspected where the inertia is too small, or where two channels of an axis differ
 by such a factor. The scale of commands is checked where they are read.
@@ -66,7 +66,7 @@ _UNHEEDED = 1e6
 
 
 @dataclass(frozen=True, eq=False)
-class _Compared:
+class _Match:
     """A channel of a log beside the simulation of it by the vehicle of the priors."""
 
     file: str
@@ -84,7 +84,7 @@ class _Compared:
         return [] if 1.0 in likely else likely
 
 
-Hypothesis = frozenset[tuple[_Compared, float]]
+Scaling = frozenset[tuple[_Match, float]]
 """Channels with their scales."""
 
 
@@ -101,28 +101,28 @@ def slips(
     `errors` are the standard errors there, and `adopted` has the hypotheses about the structure that won. Where several
     explanations are about as good, each is told for its files.
     """
-    compared = [one for n in range(len(objective.logs)) for one in _compared(objective, n, known.guessed)]
+    compared = [one for n in range(len(objective.logs)) for one in _matches(objective, n, known.guessed)]
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
-    untried = {*_hypotheses(suspected)}
+    untried = {*_scalings(suspected)}
     if not untried:
         return ()
 
-    def least(hypothesis: Hypothesis, start: Array | None = None) -> float:
-        unlikely = sum(_lightness(hypothesis, *one) for one in inertias) + _drag(hypothesis, compared, known.guessed)
-        return _least(tests, adopted, hypothesis, start) + unlikely
+    def least(scaling: Scaling, start: Array | None = None) -> float:
+        unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
+        return _least(tests, adopted, scaling, start) + unlikely
 
-    as_it_is, J = least(frozenset(), best), dict[Hypothesis, float]()
+    as_it_is, J = least(frozenset(), best), dict[Scaling, float]()
     while untried:  # The best explanation may need fewer channels than it has.
         J |= {one: least(one) for one in untried}
         first = min(J, key=lambda one: J[one])
         untried = {first - {member} for member in first} - J.keys() - {frozenset()}
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
-    for hypothesis in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
-        for one, scale in hypothesis:
+    for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
+        for one, scale in scaling:
             words = told.setdefault((one.file, one.channel.quantity.name), {})
-            words.setdefault(_words(one.channel, scale), as_it_is - J[hypothesis])
+            words.setdefault(_words(one.channel, scale), as_it_is - J[scaling])
     return tuple(
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
@@ -139,18 +139,18 @@ def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -
             yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[place]), _WEIGHED)
 
 
-def _lightness(hypothesis: Hypothesis, axis: Axis, ratio: float, error: float) -> float:
+def _lightness(scaling: Scaling, axis: Axis, ratio: float, error: float) -> float:
     """Return how unlikely an inertia is that is below the vehicle's own. With k, it is k times as large."""
-    scale = min((abs(scale) for one, scale in hypothesis if one.channel.quantity.axis is axis), default=1.0)
+    scale = min((abs(scale) for one, scale in scaling if one.channel.quantity.axis is axis), default=1.0)
     return max(-(ratio + log(scale)) / error, 0.0) ** 2
 
 
-def _drag(hypothesis: Hypothesis, compared: Sequence[_Compared], guessed: Sequence[str]) -> float:
+def _drag(scaling: Scaling, compared: Sequence[_Match], guessed: Sequence[str]) -> float:
     """Return how unlikely the drag of the axes is whose prior of the drag follows from the data.
 
     The drag is relative to the usual one as the simulated velocity, squared, to the measured one.
     """
-    scales, ratios = dict(hypothesis), dict[str, list[float]]()
+    scales, ratios = dict(scaling), dict[str, list[float]]()
     for one in compared:
         axis = one.channel.quantity.axis
         if axis and axis.name in guessed and one.ratios:
@@ -159,7 +159,7 @@ def _drag(hypothesis: Hypothesis, compared: Sequence[_Compared], guessed: Sequen
     return sum((2.0 * float(np.mean(some)) / _USUAL) ** 2 for some in ratios.values())
 
 
-def _customary(one: _Compared, compared: Sequence[_Compared], light: Collection[Axis]) -> Iterator[float]:
+def _customary(one: _Match, compared: Sequence[_Match], light: Collection[Axis]) -> Iterator[float]:
     """Yield the scales of knots and feet, where something speaks for them."""
     quantity = one.channel.quantity
     others = [other for other in compared if other.channel.quantity.axis is quantity.axis and 1.0 in other.ratios]
@@ -181,7 +181,7 @@ def _words(channel: Channel, scale: float) -> str:
     return f"is it {meaning}" if meaning else f"are its numbers {1.0 / scale:g} times too small for its unit"
 
 
-def _hypotheses(likely: Mapping[_Compared, Sequence[float]]) -> Iterator[Hypothesis]:
+def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
     """Yield all suspected channels with one scale, for each scale, and all of them with their most usual scales."""
     for scale in {scale for scales in likely.values() for scale in scales}:
         yield frozenset((one, scale) for one, scales in likely.items() if scale in scales)
@@ -189,9 +189,9 @@ def _hypotheses(likely: Mapping[_Compared, Sequence[float]]) -> Iterator[Hypothe
         yield frozenset((one, scales[0]) for one, scales in likely.items())
 
 
-def _least(tests: Tests, adopted: Sequence[Adopted], hypothesis: Hypothesis, start: Array | None = None) -> float:
+def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Array | None = None) -> float:
     """Return the least J of thinned logs, as a density of the values in the files; inf if no simulation is finite."""
-    scales = {one.channel: scale for one, scale in hypothesis}
+    scales = {one.channel: scale for one, scale in scaling}
     logs = [_corrected(one, scales) for one in tests.folder.logs]
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
     model = Model(known, recorded, rows)
@@ -202,7 +202,7 @@ def _least(tests: Tests, adopted: Sequence[Adopted], hypothesis: Hypothesis, sta
         value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
     except DivergedError:
         return np.inf
-    return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in hypothesis)
+    return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
 
 def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
@@ -213,7 +213,7 @@ def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
 # ---- Comparison with the vehicle of the priors -----------------------------------------------------------------------
 
 
-def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Compared]:
+def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Match]:
     """Yield all channels of a log that the filter reads, beside their simulation."""
     one, record = objective.logs[number], objective.records[number]
     try:
@@ -230,7 +230,7 @@ def _compared(objective: Objective, number: int, guessed: Sequence[str]) -> Iter
             found[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
         most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in found.values())
         ratios = {k: ratio for k, (ratio, unexplained) in found.items() if ratio > 0.0 and unexplained < min(most)}
-        yield _Compared(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
+        yield _Match(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
 
 
 def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:

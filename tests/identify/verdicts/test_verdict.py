@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.identify.result import Disturbance, Effect, Point, Slip, score_of
+from rov_fmu.identify.result import Effect, Point, Slip, score_of
 from rov_fmu.identify.verdict import RULES, WORDS, Evidence, verdict
 from tests.report import results
 
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
 WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
 SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
-FORCE = Disturbance("force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
+FORCE = results.disturbance("slow force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
 
 
 def point(off: float) -> Point:
@@ -56,12 +56,12 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "An unknown slow torque of 4% of the thrusters' acts in log.csv.",
         ),
         (
-            {"disturbances": [replace(FORCE, kind="gain", axis=None)]},
+            {"disturbances": [replace(FORCE, kind="slow gain", axis=None)]},
             "do not use",
             "The thrust changes for an unknown reason by 6% in log.csv.",
         ),
         (
-            {"disturbances": [replace(FORCE, kind="velocity")]},
+            {"disturbances": [replace(FORCE, kind="slow velocity")]},
             "do not use",
             "An unknown slow velocity over ground of 6% of the vehicle's acts in log.csv.",
         ),
