@@ -161,7 +161,7 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
         "idle voltage": (
-            "no effect of the logged voltage ({low} to {high} V) on the thrust is seen, so the vehicle does without it"
+            "no effect of the logged voltage ({volts} V) on the thrust is seen, so the vehicle does without it"
         ),
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
         "rocking": (
@@ -185,6 +185,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "aligned clock",
             "unknown direction",
             "unknown velocity",
+            "velocity corrected",
             "late command",
             "at rest",
             "depth by pressure",
@@ -640,8 +641,8 @@ def _on_vehicle(identification: Identification) -> Iterator[Finding]:
     description, vehicle = identification.folder.rov_file.description, identification.vehicle
     volts = [c.samples[1] for log in identification.folder.logs if (c := log.used("voltage")) and c.count]
     if volts and identification.curves and vehicle.layout.voltage is None:
-        low, high = usual_range(np.concatenate(volts))
-        yield Finding("idle voltage", names={"low": f"{low:.3g}", "high": f"{high:.3g}"})
+        ends = dict.fromkeys(f"{end:.3g}" for end in usual_range(np.concatenate(volts)))
+        yield Finding("idle voltage", names={"volts": " to ".join(ends)})
     if description and description.assumed:
         names = {"base": description.base_name, "reason": description.assumed, "mass": f"{vehicle['m_rov']:.3g} kg"}
         yield Finding("assumed vehicle", names=names)
