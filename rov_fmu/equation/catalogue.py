@@ -280,7 +280,7 @@ CURVE = {
     "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),
     "n_V": Declaration(
-        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 1.0, 4.0, needed=False
+        "1", "Exponent n_V of the {curve}: thrust is proportional to (voltage / V_0)^n_V", 0.0, 4.0, needed=False
     ),
     "a_t": Declaration("N", "Quadratic thrust coefficient a_t of the {curve}{equation}", -1e6, 1e6),
     "b_t": Declaration("N", "Linear thrust coefficient b_t of the {curve}{equation}", -1e6, 1e6),

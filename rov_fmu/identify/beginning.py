@@ -27,7 +27,7 @@ from rov_fmu.identify.likelihood.records import (
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, usual_range
 from rov_fmu.tank.description import ROV_FILE, Draft
 from rov_fmu.tank.findings import SENTENCES, Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
@@ -37,8 +37,8 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _QUADRATIC = 0.7
 """The share of the quadratic drag at a large velocity, where nothing else is known."""
-_SAG = 0.03
-"""Thrust is taken to depend on the voltage if it changes by more than this, relatively."""
+_SAG = 0.03 * 0.9
+"""Thrust may depend on a voltage of which nine tenths change by more than this, relatively: 3 % in a steady fall."""
 _SQUARE = 0.8
 """The usual share of the thrust at full command that grows with the square of the command."""
 _ADDED = 1.5
@@ -335,11 +335,12 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
     Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
     """
     requests = tests.requests
-    values = [c.values[c.there] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
+    values = [c.samples[1] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
     if not values or vehicle.layout.voltage is not None:
         return vehicle
     mean = float(np.mean([np.mean(some) for some in values]))
-    if not requests.voltage and max(float(np.ptp(some)) for some in values) < _SAG * mean:
+    ranges = [usual_range(some) for some in values]
+    if not requests.voltage and max(high - low for low, high in ranges) < _SAG * mean:
         return vehicle
     more = {}
     is_exact = tests.description.tables.priors.get("voltage") == 0.0

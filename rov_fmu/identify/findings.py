@@ -36,7 +36,7 @@ from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank import findings
-from rov_fmu.tank.arrays import rms
+from rov_fmu.tank.arrays import rms, usual_range
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
@@ -160,6 +160,9 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
     },
     "Facts": {
         "effect": "{of}the {name} is {value}{note}",
+        "idle voltage": (
+            "no effect of the logged voltage ({volts} V) on the thrust is seen, so the vehicle does without it"
+        ),
         "small disturbance": "{what} in {files}{since}. It is small, and the intervals allow for it",
         "rocking": (
             "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
@@ -182,6 +185,7 @@ _READ: dict[Heading, frozenset[str]] = {
             "aligned clock",
             "unknown direction",
             "unknown velocity",
+            "velocity corrected",
             "late command",
             "at rest",
             "depth by pressure",
@@ -640,8 +644,12 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
 
 
 def _on_vehicle(identification: Identification) -> Iterator[Finding]:
-    """Yield a finding if nobody described the vehicle."""
+    """Yield a finding if nobody described the vehicle, and one about a logged voltage that acts on nothing."""
     description, vehicle = identification.folder.rov_file.description, identification.vehicle
+    volts = [c.samples[1] for log in identification.folder.logs if (c := log.used("voltage")) and c.count]
+    if volts and identification.curves and vehicle.layout.voltage is None:
+        ends = dict.fromkeys(f"{end:.3g}" for end in usual_range(np.concatenate(volts)))
+        yield Finding("idle voltage", names={"volts": " to ".join(ends)})
     if description and description.assumed:
         names = {"base": description.base_name, "reason": description.assumed, "mass": f"{vehicle['m_rov']:.3g} kg"}
         yield Finding("assumed vehicle", names=names)

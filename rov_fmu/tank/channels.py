@@ -8,6 +8,7 @@ are applied:
 - Of several senders of the same message, the one that sends the commands is used.
 - Of several sources of a quantity, the first in the catalogue that has enough samples and changes is used. Of several
   barometers, it is the one that changes most.
+- A velocity that disagrees with the positions in the same messages is corrected, or left out.
 - A velocity in a frame of the earth is rotated into the body frame by the attitude, and left out without one.
 """
 
@@ -19,6 +20,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.io.messages import listed
+from rov_fmu.tank.agreement import disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, Flags, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
@@ -52,6 +55,8 @@ _COMPARED, _LEAST_COMPARED = 1.0, 8
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 """A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
+_EARTH_AXES, _BODY_AXES = ("to the north", "to the east", "down"), ("forward", "to starboard", "down")
+"""The axes of the two frames."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
 
@@ -123,7 +128,8 @@ def channels_of(
     for measurement in measurements:
         is_velocity = measurement.message.gives == VELOCITY
         reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
-        channels += _channels(replace(measurement, unused=reason), attitude)
+        one = replace(measurement, unused=reason)
+        channels += _channels(*_agreeing(one, measurements, attitude), attitude)
     return with_one_source(channels)
 
 
@@ -256,6 +262,36 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     return f"{against} by its scale, signs or axes" if is_explained else ""
 
 
+def _agreeing(
+    velocity: _Measurement, measurements: Iterable[_Measurement], attitude: Slerp | None
+) -> tuple[_Measurement, str]:
+    """Return a measurement, and by what it is corrected, in words: velocities agree with positions in their messages.
+
+    Both are of one estimator. Offset and scale are along the axes of the frame that the velocity is in.
+    """
+    positions = (m for m in measurements if m.topic is velocity.topic and m.message.gives == POSITION)
+    position, is_of_earth = next(positions, None), _is_of_earth(velocity)
+    is_compared = velocity.message.gives == VELOCITY and not velocity.unused and (is_of_earth or attitude)
+    if not (position and is_compared):
+        return velocity, ""
+    earth, body = _frames(velocity)
+    to_own, names = (earth, _EARTH_AXES) if is_of_earth else (body, _BODY_AXES)
+    values, time = velocity.values @ to_own.T, velocity.topic.time
+    axes = None if is_of_earth or not attitude else _at(attitude, time).as_matrix()
+    found = disagreement(time, position.values @ earth.T, values, axes)
+    if not found or not (found.moved | found.scaled).any():
+        return velocity, ""
+    scale, offset = np.where(found.scaled, found.scale, 1.0), np.where(found.moved, found.offset, 0.0)
+    words = [f"{offset_in_words(offset[n], 'm/s')} {names[n]}" for n in np.flatnonzero(found.moved)]
+    words += [f"a factor of {scale[n]:.3g} {names[n]}" for n in np.flatnonzero(found.scaled)]
+    return replace(velocity, values=(values * scale + offset) @ to_own), listed(words)
+
+
+def _at(attitude: Slerp, time: Array) -> Rotation:
+    """Return the attitude at some times; before and after all that are known, the first and the last one."""
+    return attitude(np.clip(time, *attitude.times[[0, -1]]))
+
+
 def _size(vectors: Array) -> float:
     """Return the root mean square of all components."""
     return float(np.sqrt(np.mean(np.square(vectors))))
@@ -264,8 +300,8 @@ def _size(vectors: Array) -> float:
 # ---- Channels --------------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: _Measurement, attitude: Slerp | None) -> Iterator[Channel]:
-    """Yield the channels of a measurement."""
+def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None) -> Iterator[Channel]:
+    """Yield the channels of a measurement. `corrected` says by what its velocities are corrected."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
     earth, body = _frames(measurement)
     unused = measurement.unused
@@ -280,14 +316,14 @@ def _channels(measurement: _Measurement, attitude: Slerp | None) -> Iterator[Cha
         if not _is_of_earth(measurement):
             values = values @ body.T
         elif attitude:
-            at = attitude(np.clip(topic.time, *attitude.times[[0, -1]]))
-            values = at.inv().apply(values @ earth.T)
+            values = _at(attitude, topic.time).inv().apply(values @ earth.T)
         else:
             frame = topic.source.frames[1] or "the earth"
             unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
         axes = (SURGE, SWAY, HEAVE) if gives == VELOCITY else (ROLL, PITCH, YAW)
         for axis, column in zip(axes, values.T, strict=True):
-            yield Channel(QUANTITIES[f"{axis.name} velocity"], topic.source, topic.time, column, unused=unused)
+            quantity = QUANTITIES[f"{axis.name} velocity"]
+            yield Channel(quantity, topic.source, topic.time, column, unused=unused, corrected=corrected)
     else:
         yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused)
 

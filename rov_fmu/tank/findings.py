@@ -152,6 +152,10 @@ SENTENCES: dict[str, SentenceForm] = {
         "{files}: the {quantity} changes {factor:.3g} times as much as the velocity in {axes} implies. "
         "One of the two sensors has a wrong scale, and both are used. Leave the wrong one out"
     ),
+    "velocity corrected": (
+        "{files}: the {velocity} is corrected by {by}, because the position changes so much faster. The errors of a "
+        "position do not grow with time"
+    ),
     "gaps": "{files}: {count:#gap} in the {quantity}: {gaps}",
     # Logs of autopilots and bags
     "unreadable file": "{files}: left out as unreadable: {reason}",

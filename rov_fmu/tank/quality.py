@@ -6,9 +6,10 @@ from math import pi
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.io.messages import MOST, first_of, listed
+from rov_fmu.tank.agreement import Disagreement, disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, spread
-from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
@@ -19,10 +20,6 @@ _LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
 """A gap is longer than this time, s, and than this many usual intervals."""
 _TURN = 2.0 * pi + 0.3
 """The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
-_APART = 2.0
-"""The time over which changes of a position are compared with a velocity, s."""
-_SAME_SCALE, _CLEAR = 0.01, 4.0
-"""The scales of two sensors differ if the difference exceeds this share, and this number of standard errors."""
 _LEAST_SHARE, _LEAST_TIME = 0.2, 5.0
 """A sensor is frozen if it keeps its last value for more than this share of the log, and for more than this time, s."""
 _CHANGING, _TURNING, _VISIBLE = 0.5, 0.2, 1.5
@@ -41,7 +38,8 @@ steps, and stays there: its median over three samples changes by half of the jum
 def checked(log: Log) -> Log:
     """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
     channels, frozen = _without_frozen(log.file, log.channels)
-    findings = [*log.findings, *frozen]
+    channels = _agreeing(channels, log.axis)
+    findings = [*log.findings, *frozen, *_corrected(log.file, channels)]
     used = [channel for channel in channels if not channel.unused]
     if any(channel.derived_from == "pressure" for channel in used):
         findings.append(about(log.file, "depth by pressure"))
@@ -53,6 +51,13 @@ def checked(log: Log) -> Log:
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
     return replace(log, commands=commands, channels=tuple(channels), findings=tuple(findings))
+
+
+def _corrected(file: str, channels: Sequence[Channel]) -> list[Finding]:
+    """Return a finding for each source of velocities that are corrected."""
+    used = (c for c in channels if c.corrected and not c.unused)
+    told = {(f"velocity of {c.source}" if c.source.kind else c.quantity.name, c.corrected) for c in used}
+    return [about(file, "velocity corrected", velocity=name, by=words) for name, words in sorted(told)]
 
 
 # ---- Sources ---------------------------------------------------------------------------------------------------------
@@ -150,31 +155,49 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
 
 
 def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:
-    """Return a finding if a position changes by another factor than 1 of what the velocity of its axis says.
+    """Return a finding if a position changes by another factor than 1 of what the velocity of its axis says."""
+    found = _disagreement(position, channels)
+    if not found or not found[1].scaled.any():
+        return []
+    quantity, axis = position.quantity, position.quantity.axis
+    assert axis
+    return [about(file, "scales differ", axis.name, quantity=quantity.name, factor=float(found[1].scale[0]))]
 
-    The changes of the position over short times are compared with the integral of the velocity; a constant current is
-    allowed for. Logs with roll or pitch are left out, because there the velocity has another direction.
+
+def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Channel, Disagreement] | None:
+    """Return the velocity that is used along the axis of a position, and how it differs from the position.
+
+    Logs with roll or pitch are left out, because there the velocity has another direction.
     """
-    from scipy.integrate import cumulative_trapezoid  # imported here because it is slow
-
     axis = position.quantity.axis
     used = (c for c in channels if c.quantity.axis == axis and c.quantity.is_velocity and not c.unused)
     velocity = next(used, None)
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
     if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
-        return []
+        return None
     time, values = replace(position, values=unwrapped(position)).samples
     at, speeds = velocity.samples
-    both = np.flatnonzero((time >= at[0]) & (time <= at[-1]))
-    rows = both[first_in_each(time[both], 1.0 / _APART)]
-    travelled = np.interp(time[rows], at, cumulative_trapezoid(speeds, at, initial=0.0))
-    implied, actual = (np.diff(path) / np.diff(time[rows]) for path in (travelled, values[rows]))
-    if len(implied) < LEAST_SAMPLES or not spread(implied):
-        return []
-    (scale, _), covariance = np.polyfit(implied, actual, 1, cov=True)
-    if abs(scale - 1.0) < max(_SAME_SCALE, _CLEAR * np.sqrt(covariance[0, 0])):
-        return []
-    return [about(file, "scales differ", axis.name, quantity=position.quantity.name, factor=float(scale))]
+    both = (at >= time[0]) & (at <= time[-1])
+    if not spread(speeds[both]):
+        return None
+    places = np.interp(at[both], time, values)
+    found = disagreement(at[both], places[:, None], speeds[both, None])
+    return (velocity, found) if found else None
+
+
+def _agreeing(channels: Sequence[Channel], axis: Axis | None) -> list[Channel]:
+    """Return the channels with each velocity moved by its offset from the position of its axis.
+
+    In a log of one axis, velocities are through the water and distances over ground, so that a current moves one.
+    """
+    moved: dict[Channel, Channel] = {}
+    for position in (c for c in channels if not (c.unused or c.quantity.is_velocity or axis in (SURGE, SWAY))):
+        found = _disagreement(position, channels)
+        if found and found[1].moved.any():
+            velocity, offset = found[0], float(found[1].offset[0])
+            words = offset_in_words(offset, velocity.quantity.unit)
+            moved[velocity] = replace(velocity, values=velocity.values + offset, corrected=words)
+    return [moved.get(channel, channel) for channel in channels]
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------

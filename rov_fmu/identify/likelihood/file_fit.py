@@ -37,8 +37,14 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     The effect that is left out next is the one without which J is expected to rise least, given that those before it
     are absent: two effects of which either explains the data are not both left out. Many refits run together, and those
     that hold tell anew what to expect of the next ones.
+
+    A voltage without positive evidence is left out before, whatever the rise: without it, the FMU has an input less.
     """
-    least, absent = best, frozenset[int]()
+    posterior, absent = Posterior.of(objective.table, best.z, best.information), frozenset[int]()
+    if (voltage := objective.table.place("voltage")) is not None and posterior.evidence(voltage) < MOST_RISE:
+        absent = frozenset({voltage})
+        best = minimise(objective.without(absent), best.z, most=_STEPS)
+    least = best
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
         order = [*_weakest(posterior, least.value - best.value)]

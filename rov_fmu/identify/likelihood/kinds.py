@@ -13,7 +13,7 @@ from rov_fmu.equation.catalogue import CURVE
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
 USUAL_EXPONENT = 1.5
-"""The usual exponent of thrust over voltage."""
+"""The usual exponent of thrust over voltage, of thrusters whose speed nothing regulates."""
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
 SLOW = {"slow force": 8.0, "slow gain": 60.0, "slow velocity": 8.0}
@@ -192,11 +192,11 @@ KINDS = {
         unit="s",
     ),
     **{kind: Kind(_PLACE, f"place of the {kind}", _WITHOUT_PLACES, null=0.0, unit="m") for kind in PLACED.values()},
-    "voltage": Kind(  # an exponent is at least 1, and an effect that is absent is below
-        Prior("voltage", 0.5, "the exponent of thrust over voltage", "1 to 2 in published tables"),
+    "voltage": Kind(
+        Prior("voltage", 0.75, "the exponent of thrust over voltage", "0 if the speed is regulated, otherwise 1 to 2"),
         "exponent of thrust over voltage",
         keys=("n_V",),
-        mean=USUAL_EXPONENT,
+        mean=0.75,
         low=CURVE["n_V"].minimum,
         high=CURVE["n_V"].maximum,
         null=0.0,

@@ -13,7 +13,16 @@ import numpy as np
 from scipy.integrate import quad
 
 from tests.folders import THRUSTER
-from tests.identify.scenarios.scenario import NOTHING_SPECIAL, Expected, Table, Truths, answer_names, write_folder
+from tests.identify.scenarios.scenario import (
+    NOTHING_SPECIAL,
+    VOLTAGE,
+    Expected,
+    Given,
+    Table,
+    Truths,
+    answer_names,
+    write_folder,
+)
 from verification.references.pool import Array
 
 _STEP, _ROW = 0.02, 5
@@ -23,6 +32,25 @@ _NOISE = {"surge": 0.008, "yaw": np.radians(0.4), "heave": 0.006}
 _HEADERS = {"surge": "surge velocity [m/s]", "yaw": "heading [deg]", "heave": "depth [m]"}
 _PLACE = 'position = {{ value = [-0.15, {0}, 0.0], unit = "m", source = "drawn" }}\n'
 _AXES = {"surge": "[axes.surge]\n", "yaw": "[axes.yaw]\n", "heave": "[axes.heave]\n"}
+
+
+@dataclass(frozen=True)
+class Battery:
+    """A battery of 16 V whose voltage is logged."""
+
+    exponent: float
+    """Thrust is proportional to this power of the voltage: 0 for thrusters whose speed is regulated."""
+    sag: float = 0.0
+    """The share of the voltage that is lost until the end of a log."""
+    droop: float = 0.0
+    """The share that is lost at full command of all thrusters."""
+    noise: float = 0.03
+    """V."""
+
+    def voltage(self, asked: Sequence[float], part: float) -> float:
+        """Return the voltage after a part of a log, V."""
+        load = sum(c * c for c in asked) / len(asked)
+        return VOLTAGE * (1.0 - self.sag * part - self.droop * load)
 
 
 @dataclass(frozen=True)
@@ -46,6 +74,7 @@ class Fault:
     """The factor of a logged velocity."""
     current: float = 0.0
     """m/s."""
+    battery: Battery = Battery(0.0)
 
 
 @dataclass(frozen=True)
@@ -129,6 +158,8 @@ class Drawn:
     alone: bool = False
     """True if each log drives one axis only."""
     seconds: float = 60.0
+    has_voltage: bool = False
+    """True if the logs have the voltage of the battery."""
     expected: Expected = NOTHING_SPECIAL
 
     def truths(self, seed: int) -> Truths:
@@ -163,7 +194,9 @@ class Drawn:
             hardware += THRUSTER.format(name=name, x=1.0, y=0.0, z=0.0).replace("t200", "main") + _PLACE.format(y)
         if "heave" in self.axes:
             hardware += THRUSTER.format(name="top", x=0.0, y=0.0, z=1.0).replace("t200", "main")
-        write_folder(folder, tables, hardware=hardware + "".join(_AXES[axis] for axis in self.axes), known={})
+        hardware += "".join(_AXES[axis] for axis in self.axes)
+        at = {"V_0_main": Given(VOLTAGE, "V")} if self.has_voltage else {}
+        write_folder(folder, tables, hardware=hardware, known=at, fit=["voltage"] * self.has_voltage)
 
     def _pulled(self, body: Body, random: np.random.Generator) -> Table:
         """Return measured forces with errors of 1.5 %, and 0.3 % of the full force."""
@@ -198,11 +231,13 @@ class Drawn:
             if axis == "surge":
                 values = self.fault.unit * values
             table[_HEADERS[axis]] = np.degrees(values) % 360.0 if axis == "yaw" else values
+        if self.has_voltage:
+            table["voltage [V]"] = motion["voltage"] + self.fault.battery.noise * random.standard_normal(len(time))
         return table
 
 
 def flown(body: Body, fault: Fault, commands: Array, heading: float) -> dict[str, Array]:
-    """Return the surge velocity over ground, the heading and the depth at each row; commands are 3 x rows."""
+    """Return the surge velocity over ground, the heading, the depth and the voltage at each row; commands are 3 x rows."""
     arms, health = (-body.arm, body.arm, 0.0), (*fault.health, 1.0)
     last = commands.shape[1] * _ROW
 
@@ -238,16 +273,18 @@ def flown(body: Body, fault: Fault, commands: Array, heading: float) -> dict[str
     rows = []
     for step in range(last):
         if step % _ROW == 0:
-            rows.append((y[0] + fault.current * cos(y[6]), y[6], 10.0 + y[5]))
+            volts = fault.battery.voltage(commands[:, step // _ROW].tolist(), step / last)
+            rows.append((y[0] + fault.current * cos(y[6]), y[6], 10.0 + y[5], volts))
             asked = np.clip(commands[:, step // _ROW], -fault.saturation, fault.saturation).tolist()
             if fault.is_swapped:
                 asked = [asked[1], asked[0], asked[2]]
         most = fault.slew * _STEP
         followed = [f + min(max(a - f, -most), most) for f, a in zip(followed, asked, strict=True)]
-        thrust = 1.0 - fault.sag * step / last
+        volts = fault.battery.voltage(followed, step / last)
+        thrust = (1.0 - fault.sag * step / last) * (volts / VOLTAGE) ** fault.battery.exponent
         k1 = rates(y, followed, thrust)
         k2 = rates([a + 0.5 * _STEP * b for a, b in zip(y, k1, strict=True)], followed, thrust)
         k3 = rates([a + 0.5 * _STEP * b for a, b in zip(y, k2, strict=True)], followed, thrust)
         k4 = rates([a + _STEP * b for a, b in zip(y, k3, strict=True)], followed, thrust)
         y = [a + _STEP / 6.0 * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=True)]
-    return dict(zip(("surge", "yaw", "heave"), np.array(rows).T, strict=True))
+    return dict(zip(("surge", "yaw", "heave", "voltage"), np.array(rows).T, strict=True))
