@@ -1,5 +1,6 @@
 """Whole results: what is written for vehicles of every kind, and what commands print, each in a file of results/."""
 
+import os
 import re
 from collections.abc import Callable
 from contextlib import redirect_stdout
@@ -8,6 +9,7 @@ from functools import partial
 from io import StringIO
 from math import isclose
 from pathlib import Path
+from unittest.mock import patch
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
@@ -41,9 +43,11 @@ def _in_ros(vehicle: Vehicle) -> str:
 
 
 def _printed(command: str) -> str:
-    """Return what a command prints."""
+    """Return what a command prints without colours."""
     said = StringIO()
-    with redirect_stdout(said):
+    with redirect_stdout(said), patch.dict(os.environ):
+        for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
+            os.environ.pop(name, None)
         assert main(command.split()) == 0
     return said.getvalue()
 
