@@ -4,6 +4,8 @@ The state of the vehicle is a quaternion (eta, epsilon_1, epsilon_2, epsilon_3),
 contains the rotation matrix R from the body frame to the earth frame instead: R' = R S(omega) is a sum of products.
 """
 
+from itertools import product
+
 from .expression import Expression, Name, call, directed, total, where
 
 Formulas = dict[str, Expression]
@@ -17,10 +19,10 @@ def entry(row: int, column: int) -> str:
     return f"R_{row}{column}"
 
 
-def rotation_terms(row: int, velocities: frozenset[str]) -> dict[str, list[tuple[float, tuple[str, str]]]]:
-    """Return the terms of R' = R S(omega) for the entries of a row: signs and factors."""
+def rotation_terms(velocities: frozenset[str]) -> dict[str, list[tuple[float, tuple[str, str]]]]:
+    """Return the terms of R' = R S(omega) for each entry of R: signs and factors."""
     by_entry = {}
-    for column in (1, 2, 3):
+    for row, column in product((1, 2, 3), repeat=2):
         following, last = column % 3 + 1, (column + 1) % 3 + 1
         terms = [(1.0, (_RATES[last], entry(row, following))), (-1.0, (_RATES[following], entry(row, last)))]
         by_entry[entry(row, column)] = [term for term in terms if term[1][0] in velocities]

@@ -463,12 +463,8 @@ def _parameters(layout: Layout, mass: MassMatrix, lags: Iterable[Lag]) -> Formul
 
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:
     """Return the rows of the rotation matrix, if the vehicle rolls or pitches."""
-    velocities = frozenset(layout.velocities)
-    return {
-        name: tuple(Term(of(sign), factors) for sign, factors in terms)
-        for row in ((1, 2, 3) if layout.has_attitude else ())
-        for name, terms in rotation_terms(row, velocities).items()
-    }
+    terms = rotation_terms(frozenset(layout.velocities)) if layout.has_attitude else {}
+    return {name: tuple(Term(of(sign), factors) for sign, factors in own) for name, own in terms.items()}
 
 
 def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
