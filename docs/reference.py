@@ -55,7 +55,7 @@ def tables() -> dict[str, Table]:
     }
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
-    found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals(), "file": _table(schema, schema)}
+    found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify.assess import answers_of_file
 from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
@@ -35,7 +36,7 @@ from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
 FILES = ("log_1.csv", "log_2.csv")
 TIME = np.arange(0.0, 60.0, 0.1)
@@ -181,3 +182,16 @@ def without_findings() -> Identification:
 def example() -> Identification:
     """Return the result with all that is to be told about it."""
     return told(without_findings())
+
+
+def compared_with(other: Vehicle) -> Identification:
+    """Return the example beside another vehicle, whose predictions are half a unit off."""
+    axes = tuple(
+        replace(
+            result,
+            predictions=tuple(replace(p, compared=p.predicted + 0.5) for p in result.predictions),
+            compared=answers_of_file(other, result.axis),
+        )
+        for result in example().axes
+    )
+    return replace(example(), against=other, axes=axes)

@@ -17,7 +17,6 @@ from lxml import html
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.fmu.content import native_content, python_content
-from rov_fmu.identify import assess
 from rov_fmu.identify.findings import STOPPING, driven_aside, next_tests, told
 from rov_fmu.identify.result import AxisResult, Coefficient, Identification, Slip
 from rov_fmu.io.output import write_whole
@@ -39,7 +38,7 @@ from tests.report.pages import (
     text_of,
     unfolded,
 )
-from tests.report.results import FILES, GOOD, example, prediction, without_findings
+from tests.report.results import FILES, GOOD, compared_with, example, prediction, without_findings
 from tests.vehicles import extended
 
 report_page = partial(report.report_page, made=date(2026, 11, 23))
@@ -246,12 +245,7 @@ def test_a_report_of_almost_nothing_says_so(monkeypatch: pytest.MonkeyPatch) -> 
 @pytest.mark.usefixtures("without_plots")
 def test_another_fit_is_compared_in_every_table_that_it_has_numbers_for() -> None:
     other = load_vehicle(VIDEORAY)
-    axes = []
-    for result in example().axes:
-        predictions = tuple(replace(p, compared=p.predicted + 0.5) for p in result.predictions)
-        compared = assess.answers_of_file(other, result.axis)
-        axes.append(replace(result, predictions=predictions, compared=compared))
-    page = report_page(replace(example(), against=other, axes=tuple(axes)))
+    page = report_page(compared_with(other))
     table = rows(page)
     assert f"“Compared” is {other.name}." in unfolded(page)
     V = other.response(SURGE, 0.5)[0]

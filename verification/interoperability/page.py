@@ -25,7 +25,7 @@ def write_table(outcomes: Sequence[Outcome], page: Path) -> None:
         raise PageError(f"{page}: {bad[0].importer.name} {bad[0].verdict.value}, so the table is not written")
     read_table(page)
     text = page.read_text(encoding="utf-8")
-    heads, *rows = matrix(outcomes)
+    heads, *rows = matrix(outcomes, by_vehicle=False)
     head, *lines = [f"| {' | '.join(line)} |" for line in (heads, *rows)]
     content = "\n".join(["", head, f"|{'---|' * len(heads)}", *lines, "", f"Run on {date.today()}.", "", ""])
     write_whole(Output(page, _TABLE.sub(lambda _: content, text).encode()), force=True)
@@ -39,17 +39,23 @@ def read_table(page: Path) -> str:
     return table[0]
 
 
-def matrix(outcomes: Sequence[Outcome]) -> list[list[str]]:
-    """Return the headings, and a row for an importer in one mode, with the larger difference of both FMIs."""
+def matrix(outcomes: Sequence[Outcome], *, by_vehicle: bool = True) -> list[list[str]]:
+    """Return the headings, and a row for an importer in one mode, with the larger difference of both FMIs.
+
+    Each vehicle has a column, or the last column has the largest difference of all, and how many vehicles flew.
+    """
     vehicles = [*dict.fromkeys(one.vehicle for one in outcomes)]
     rows: dict[tuple[str, str], list[Outcome]] = {}
     for one in outcomes:
         title = f"{one.importer.title} {one.importer.version}"
         rows.setdefault((title, one.importer.interface), []).append(one)
-    lines = [["importer", "FMI", "interface", *vehicles]]
+    lines = [["importer", "FMI", "interface", *(vehicles if by_vehicle else ["largest difference"])]]
     for (title, interface), row in rows.items():
         versions = ", ".join(f"{n}.0" for n in sorted({one.importer.fmi for one in row}))
         cells = [_cell([one for one in row if one.vehicle == vehicle]) for vehicle in vehicles]
+        if not by_vehicle:
+            flown = len({one.vehicle for one in row})
+            cells = [_cell(row) + (f" ({flown} vehicles)" if flown < len(vehicles) else "")]
         lines.append([title, versions, interface, *cells])
     return lines
 

@@ -19,6 +19,8 @@ MOST_SAMPLES = 400
 """More samples than this would not be visible."""
 _PANEL, _EDGES = 1.1, 1.4
 """The height of a panel, and of the commands with the axis of time, inches."""
+_NARROW = 5.0
+"""In a figure of at most this width, inches, the legend has a second row."""
 _MOST_LINES = 8
 """Of more commands than this, only those that change are drawn."""
 
@@ -53,7 +55,8 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
     if predictions:
         panels[-1].set_xlim(min(p.time[0] for p in predictions), max(p.time[-1] for p in predictions))
     panels[-1].set_xlabel("time (s)")
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=4)
+    columns = 4 if figure.get_figwidth() > _NARROW else 2
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
 
 
 def _is_absolute(log: Log | None) -> bool:
