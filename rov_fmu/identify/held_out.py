@@ -150,9 +150,13 @@ def _with_currents(objective: Objective, best: Minimum, covariance: Array, numbe
 
 
 def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> float:
-    """Return the variance of the current of an unseen log: about as large as in the other logs of a table."""
-    currents = [n for n, p in enumerate(table.parameters) if p.kind == "current" and p.of != file]
-    return _LEAST_CURRENT**2 + float(np.mean([z[n] ** 2 + covariance[n, n] for n in currents]))
+    """Return the variance of the current of an unseen log: about as large as in the other logs of a table.
+
+    Where no other log has one, it is that of the prior.
+    """
+    currents = [(n, p) for n, p in enumerate(table.parameters) if p.kind == "current"]
+    others = [z[n] ** 2 + covariance[n, n] for n, p in currents if p.of != file]
+    return _LEAST_CURRENT**2 + float(np.mean(others or [p.deviation**2 for _, p in currents]))
 
 
 def cautious(objective: Objective, z: Array) -> Array:

@@ -30,6 +30,8 @@ def test_the_current_of_an_unseen_log_is_about_that_of_the_others() -> None:
     assert unseen_current(table, np.array([5.0, 0.3, -0.4]), covariance, "a") == pytest.approx(
         0.02**2 + (0.3**2 + 0.01**2 + 0.4**2 + 0.02**2) / 2.0
     )
+    alone = replace(table, parameters=currents[:1])
+    assert unseen_current(alone, np.array([5.0]), covariance[:1, :1], "a") == pytest.approx(0.02**2 + 0.1**2)
 
 
 def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit) -> None:
