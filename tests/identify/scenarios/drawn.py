@@ -237,7 +237,8 @@ class Drawn:
 
 
 def flown(body: Body, fault: Fault, commands: Array, heading: float) -> dict[str, Array]:
-    """Return the surge velocity over ground, the heading, the depth and the voltage at each row; commands are 3 x rows."""
+    """Return the surge velocity over ground, the heading, the depth and the voltage at each row for 3 x rows of
+    commands."""
     arms, health = (-body.arm, body.arm, 0.0), (*fault.health, 1.0)
     last = commands.shape[1] * _ROW
 
