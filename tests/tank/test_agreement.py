@@ -124,6 +124,16 @@ def test_velocities_in_the_messages_of_positions_are_corrected_and_told_once(is_
     assert f"cm/s {'to the north' if is_earth else 'forward'}, because the position changes so much faster" in sentence
 
 
+def test_a_position_of_another_scale_moves_no_velocity() -> None:
+    """Such as a distance to the north beside the velocity of a vehicle that turns: one of the two is something else."""
+    position, velocity = (values[:, 0] for values in sensed("noisy", 2))
+    found = checked(
+        Log("a.csv", None, (channel("depth", TIME, 3.0 * position), channel("heave velocity", TIME, velocity + 0.05)))
+    )
+    assert not used(found, "heave velocity").corrected
+    assert {f.kind for f in found.findings} >= {"scales differ"}
+
+
 def test_a_position_that_stays_0_says_nothing() -> None:
     position, velocity = sensed("noisy", 1)
     channels = channels_of([estimates(0.0 * position, velocity + 0.05, ANGLES)], None)
