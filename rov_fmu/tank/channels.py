@@ -267,7 +267,8 @@ def _agreeing(
 ) -> tuple[_Measurement, str]:
     """Return a measurement, and by what it is corrected, in words: velocities agree with positions in their messages.
 
-    Both are of one estimator. Offset and scale are along the axes of the frame that the velocity is in.
+    Both are of one estimator. Offset and scale are along the axes of the frame that the velocity is in. Where a scale
+    is far from 1, such as beside a position that stays 0, something else is wrong.
     """
     positions = (m for m in measurements if m.topic is velocity.topic and m.message.gives == POSITION)
     position, is_of_earth = next(positions, None), _is_of_earth(velocity)
@@ -282,6 +283,8 @@ def _agreeing(
     if not found or not (found.moved | found.scaled).any():
         return velocity, ""
     scale, offset = np.where(found.scaled, found.scale, 1.0), np.where(found.moved, found.offset, 0.0)
+    if np.abs(scale - 1.0).max() > _CONTRADICTS:
+        return velocity, ""
     words = [f"{offset_in_words(offset[n], 'm/s')} {names[n]}" for n in np.flatnonzero(found.moved)]
     words += [f"a factor of {scale[n]:.3g} {names[n]}" for n in np.flatnonzero(found.scaled)]
     return replace(velocity, values=(values * scale + offset) @ to_own), listed(words)

@@ -186,14 +186,14 @@ def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Chann
 
 
 def _agreeing(channels: Sequence[Channel], axis: Axis | None) -> list[Channel]:
-    """Return the channels with each velocity moved by its offset from the position of its axis.
+    """Return the channels with each velocity moved by its offset from the position of its axis, if their scales agree.
 
     In a log of one axis, velocities are through the water and distances over ground, so that a current moves one.
     """
     moved: dict[Channel, Channel] = {}
     for position in (c for c in channels if not (c.unused or c.quantity.is_velocity or axis in (SURGE, SWAY))):
         found = _disagreement(position, channels)
-        if found and found[1].moved.any():
+        if found and found[1].moved.any() and not found[1].scaled.any():
             velocity, offset = found[0], float(found[1].offset[0])
             words = offset_in_words(offset, velocity.quantity.unit)
             moved[velocity] = replace(velocity, values=velocity.values + offset, corrected=words)

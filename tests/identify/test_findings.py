@@ -269,6 +269,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
+        "idle voltage",
+        replace(with_channels("voltage"), curves={"t200": ()}),
+        f"no effect of the logged voltage ({' to '.join(f'{TIME[-1] * part:.3g}' for part in (0.05, 0.95))} V) on the",
+        with_channels("depth"),
+    ),
+    (
         "logging",
         quiet(logging=(LATE,)),
         "log_1.csv: the commands act 0.08 s before their rows. This belongs to the logger, not to the vehicle",

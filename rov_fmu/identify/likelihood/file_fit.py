@@ -38,7 +38,8 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     are absent: two effects of which either explains the data are not both left out. Many refits run together, and those
     that hold tell anew what to expect of the next ones.
 
-    A voltage without positive evidence is left out before, whatever the rise: without it, the FMU has an input less.
+    A voltage without positive evidence (2 ln of the Bayes factor below 2) is left out before, whatever the rise: it
+    would be an input of the FMU.
     """
     posterior, absent = Posterior.of(objective.table, best.z, best.information), frozenset[int]()
     if (voltage := objective.table.place("voltage")) is not None and posterior.evidence(voltage) < MOST_RISE:

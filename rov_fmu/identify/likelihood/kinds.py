@@ -193,7 +193,7 @@ KINDS = {
     ),
     **{kind: Kind(_PLACE, f"place of the {kind}", _WITHOUT_PLACES, null=0.0, unit="m") for kind in PLACED.values()},
     "voltage": Kind(
-        Prior("voltage", 0.75, "the exponent of thrust over voltage", "0 if the speed is regulated, otherwise 1 to 2"),
+        Prior("voltage", 0.75, "the exponent of thrust over voltage", "0 if regulated, else 1 to 2"),
         "exponent of thrust over voltage",
         keys=("n_V",),
         mean=0.75,

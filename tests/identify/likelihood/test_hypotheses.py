@@ -67,6 +67,7 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "healthy": Fault(""),
         "dead": Fault("health", one, 0.0, value=0.0),
         "half": Fault("health", two, 0.5, value=0.5),
+        "three quarters": Fault("health", two, 0.75, value=0.75),
         "reversed": Fault("reversed commands", two, acting=lambda u: {**u, two: -u[two]}),
         "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),

@@ -36,7 +36,7 @@ def known(tmp_path_factory: pytest.TempPathFactory) -> Known:
 PRIORS = """
 lag: 0.05 ± 0.15, 0.02 to inf, absent at 0.02
 dead time: 0 ± 0.05, 0 to inf, absent at 0
-voltage: 1.5 ± 0.5, 1 to 4, absent at 0
+voltage: 0.75 ± 0.75, 0 to 4, absent at 0
 sensor lag of the depth sensor: 0 ± 0.3, 0 to inf, absent at 0
 sensor lag of the position sensor: 0 ± 0.3, 0 to inf, absent at 0
 thrust scale rear: ln 1 ± 0.1, 0 to inf
