@@ -5,7 +5,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from threading import local
 from time import perf_counter
 from typing import Any
 
@@ -23,8 +22,8 @@ REAL = ("Real", "Float64", "Float32")
 _WHOLE = ("Integer", "Boolean", "Enumeration", *(f"{u}Int{size}" for u in ("", "U") for size in (8, 16, 32, 64)))
 NUMBERS = (*REAL, *_WHOLE)
 """The types of variables that are numbers, in FMI 2.0 and 3.0."""
-_MESSAGES = local()
-"""The FMU's last warning in each thread. It is global, because FMPy passes all messages to the latest logger."""
+_MESSAGE = [""]
+"""The FMU's last warning. It is global, because FMPy passes all messages to the latest logger."""
 
 
 @dataclass(frozen=True)
@@ -221,15 +220,14 @@ def keep_message(*arguments: Any) -> None:
     """Keep a warning. The last three arguments of a logger are the same in every version of FMI."""
     status, _, text = arguments[-3:]
     if status >= WARNING:
-        _MESSAGES.last = (text or b"").decode(errors="replace")
+        _MESSAGE[0] = (text or b"").decode(errors="replace")
 
 
 def forget_message() -> None:
     """Forget the last warning, before a call that may give one."""
-    _MESSAGES.last = ""
+    _MESSAGE[0] = ""
 
 
 def last_message(before: str = "; the FMU: ") -> str:
     """Return the last warning as the end of a message, or an empty text."""
-    text = getattr(_MESSAGES, "last", "")
-    return f"{before}{text}" if text else ""
+    return f"{before}{_MESSAGE[0]}" if _MESSAGE[0] else ""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -64,7 +63,7 @@ class _Group:
 
 
 class Simulator:
-    """An instance of an unpacked FMU; for one thread at a time. Raises LoadError."""
+    """An instance of an unpacked FMU, in a process of its own. Raises LoadError."""
 
     def __init__(self, folder: str, description: Any, job: Job) -> None:
         self._folder, self._description, self._job = folder, description, job
@@ -197,18 +196,14 @@ class Simulator:
         return ""
 
 
-_LOAD_LOCK = Lock()
-
-
 @contextmanager
 def _loading() -> Iterator[None]:
-    """Admit one thread at a time, and restore the working directory, which FMPy changes and may not change back."""
-    with _LOAD_LOCK:
-        here = Path.cwd()
-        try:
-            yield
-        finally:
-            os.chdir(here)
+    """Restore the working directory, which FMPy changes and may not change back."""
+    here = Path.cwd()
+    try:
+        yield
+    finally:
+        os.chdir(here)
 
 
 class _FailedError(Exception):
