@@ -224,10 +224,8 @@ def test_only_what_lines_between_far_rows_lack_is_lost(
     """The same function decides in the hypotheses and in what `inspect` tells."""
     layout = model.known.layout
     thrusters = [t.name for t in layout.thrusters]
-    rows = interval * np.arange(len(values))
-    commands = tank_log.Commands.of_rows(
-        thrusters, rows, np.column_stack([values] * len(thrusters)), tank_log.Source("")
-    )
+    rows = np.array([interval * n for n in range(len(values))])
+    commands = tank_log.Commands.of_rows(thrusters, rows, np.array([values] * len(thrusters)).T, tank_log.Source(""))
     lost = lost_between_rows(replace(model.logs[0].log, commands=commands), layout)
     assert max(lost.values(), default=0.0) == pytest.approx(share, abs=0.02)
 
