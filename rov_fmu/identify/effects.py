@@ -9,14 +9,13 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import lost_between_rows, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
-from rov_fmu.io.numbers import percent, significant
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -69,16 +68,8 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
 
 def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
     """Return along which axis most of the command is lost between the rows of some logs, in words."""
-    vehicle, _ = fit.objective.table.model(fit.best.z)
-    shares = {
-        (lost_between_rows(one.thrust(vehicle.coefficients, axis, one.record.inputs)), axis.name, 1.0 / one.interval)
-        for one in fit.objective.logs
-        if one.log.file in files
-        for axis in fit.known.fitted
-        if one.layout.has(axis)
-    }
-    share, axis, rate = max(shares)
-    return {"share": percent(share), "axis": axis, "rate": significant(rate, 2)}
+    most = max((one for one in fit.objective.logs if one.log.file in files), key=lambda one: max(one.lost.values()))
+    return lost_in_words(most.lost, most.interval)
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

@@ -16,10 +16,11 @@ from rov_fmu.identify.beginning import table_rows
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import AHEAD, SETTLING, unchanged
+from rov_fmu.identify.likelihood.hypotheses import SETTLING
 from rov_fmu.identify.likelihood.objective import Objective, Part, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
+from rov_fmu.identify.likelihood.records import unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import Point, Prediction
 from rov_fmu.tank.arrays import Array, rms
@@ -176,7 +177,7 @@ def _predicted(
     inside = np.zeros(len(record.time), bool)
     inside[out.chosen] = True
     begin = max(float(record.time[inside][0] - record.time[0]), 0.0) + SETTLING
-    for span in (inf, AHEAD):
+    for span in (inf, one.horizon):
         try:
             off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
             usual = _usual_noise(objective, z)
@@ -186,7 +187,8 @@ def _predicted(
         later = inside & (record.time >= record.time[0] + begin)
         for number, m in enumerate(one.measured):
             at = later & (record.sensor == number)
-            if at.sum() < 10 or (span < inf and m.sensor.is_velocity) or m.sensor.axis not in out.axes:
+            is_left_out = m.sensor.is_velocity and (span < inf) != bool(one.lost)
+            if at.sum() < 10 or is_left_out or m.sensor.axis not in out.axes:
                 continue
             off, deviation = off_all[at], deviations[at]
             measured = record.value[at]

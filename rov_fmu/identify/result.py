@@ -109,8 +109,8 @@ class Prediction:
 
     @property
     def is_judged(self) -> bool:
-        """True where the band says something: of a velocity over a recording, and of a position over 10 s."""
-        return self.is_position == (self.span < inf)
+        """True where the band says something: not of a position over a recording, whose errors add up."""
+        return not self.is_position or self.span < inf
 
     @property
     def least(self) -> float:

@@ -473,7 +473,7 @@ def test_a_draft_completes_what_is_there_and_keeps_it(name: str, tmp_path: Path,
 def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: Inspect) -> None:
     """Sway is not measured, yaw is only commanded together with surge, and its commands change in each row."""
     time = 0.1 * np.arange(400.0)
-    surge, yaw, down = 0.3 * np.sin(time), 0.3 * np.sin(time + 0.1), 0.2 * np.sin(0.4 * time)
+    surge, yaw, down = 0.3 * np.sin(time), 0.3 * np.sin(time + 0.1), np.tile([0.3, 0.0, 0.1, -0.2], 100)
     sides = [-surge + yaw, -surge - yaw, surge - yaw, surge + yaw, down, down]
     titles = ",".join(["time [s]", *(f"u_{n} [1]" for n in range(1, 7)), "surge velocity [m/s]", "heading [deg]"])
     table(tmp_path / "dive.csv", titles, time, *sides, np.sin(time), np.cos(time))
@@ -483,7 +483,7 @@ def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: 
         "heave stays that of bluerov2: no log has a velocity or a position of heave. Command it both ways, and log the",
         "yaw: known less well, because it is never commanded alone, only together with surge",
         "speeds beyond the strongest commands, 30% in surge and 30% in yaw, are extrapolated",
-        "dive.csv: the commands are momentary values, because they change in 100% of the rows",
+        "dive.csv: the log has momentary commands: about 85% of the heave command is lost between its rows (10 per",
         "forces are relative to an assumed thrust",
     ):
         assert f"- {words}" in told

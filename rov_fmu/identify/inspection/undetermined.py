@@ -1,6 +1,6 @@
 """What recordings cannot determine, and why, told before any fit."""
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
@@ -8,10 +8,10 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
 from rov_fmu.identify.findings import how_to_measure, how_to_record
-from rov_fmu.identify.likelihood.records import driven_axes
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words
+from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent
-from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
@@ -22,9 +22,6 @@ _LEAST_PUSH, _ASIDE = 0.1, 1.0 / 3.0
 axes that share thrusters with it are below the second one, relative to it."""
 _LEAST_TIME = 1.0
 """An axis that is commanded alone for less than this time, s, is never commanded alone."""
-_CHANGING, _SLOWEST = 0.5, 0.04
-"""Commands are momentary values if they change in more than the first share of the rows, and if the rows are farther
-apart than this, s. A controller changes them far more often."""
 _FULL = 0.95
 """A command above this counts as full."""
 _REASONS = {
@@ -69,7 +66,11 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
                 weak.append(f"{percent(largest)} in {axis.name}")
         if weak:
             yield f"speeds beyond the strongest commands, {listed(weak)}, are extrapolated"
-        yield from (words for log in logs if (words := _momentary(log)))
+        for log in logs:
+            logged = layout_of(log, layout if not log.axis else description.layout)
+            if log.commands and (lost := lost_between_rows(log, logged)):
+                words = lost_in_words(lost, log.commands.interval)
+                yield HYPOTHESES["momentary commands"].sentence.format(of=log.file, **words)
         known = {c.name for c in layout.curves if c.coefficient("a_t") in description.known}
         if curves := [c.name for c in layout.curves if c.name not in known.union(measured)]:
             yield (
@@ -103,8 +104,8 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
     alone, largest, beside = 0.0, 0.0, dict.fromkeys(others, 0.0)
     for commands in logs:
         values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
-        own = _push(layout, axis, values)
-        pushed = {other: np.abs(_push(layout, other, values)) for other in others if COMMAND not in values}
+        own = push_along(layout, axis, values)
+        pushed = {other: np.abs(push_along(layout, other, values)) for other in others if COMMAND not in values}
         most = np.max([*pushed.values()], axis=0) if pushed else np.zeros(len(own))
         is_used = np.abs(own) > _LEAST_PUSH
         alone += commands.interval * float(np.sum(is_used & (most < _ASIDE * np.abs(own))))
@@ -116,28 +117,3 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
         return largest, []
     words = f"{axis.name}: known less well, because it is never commanded alone, only together with {listed(together)}"
     return largest, [f"{words}. Command it alone for some seconds, both ways"]
-
-
-def _push(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
-    """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
-    rows = len(next(iter(values.values())))
-    if COMMAND in values:  # of a log of this axis alone
-        return values[COMMAND]
-    effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
-    total = sum(abs(effect) for _, effect in effects)
-    pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]
-    return np.sum(pushes, axis=0) if pushes else np.zeros(rows)
-
-
-def _momentary(log: Log) -> str:
-    """Return a sentence about a log whose commands are momentary values; an empty text about another one."""
-    commands = log.commands
-    if not commands or len(commands.rows) < 2 or commands.interval < _SLOWEST:
-        return ""
-    share = len({*commands.time.tolist()}) / len(commands.rows)
-    if share < _CHANGING:
-        return ""
-    return (
-        f"{log.file}: the commands are momentary values, because they change in {share:.0%} of the rows: what happens "
-        f"between rows, {commands.interval:.2g} s apart, is not known. Log at 50 Hz, or fly without a controller"
-    )

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf, log, nan
+from math import exp, inf, isfinite, log, nan
 
 import numpy as np
 
@@ -18,24 +18,25 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import SIZES
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.likelihood.records import (
+    AHEAD,
+    LEAST_COMMAND,
+    SampledLog,
+    unchanged,
+)
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import ALARM, least_error
+from rov_fmu.io.numbers import percent, significant
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each
 
 WINS, CLOSE = 6.0, 10.0
 """The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
-AHEAD, SETTLING = 10.0, 5.0
-"""Positions are predicted over this time, s. Whole logs are predicted from the data of the first seconds on."""
-_BETWEEN = 0.005
-"""The least share of a command that must be lost between the rows of a log for it to be momentary."""
-_LEAST_COMMAND = 0.05
-"""The least change of a command that counts."""
+SETTLING = 5.0
+"""Predictions begin with what the filter knows after this time, s."""
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted."""
 _STEP = 0.5
@@ -157,21 +158,17 @@ def commands_of(one: SampledLog) -> dict[str, Array]:
     return {t.name: one.record.inputs[:, names.index(f"u_{t.name}")] for t in one.layout.thrusters}
 
 
-def lost_between_rows(values: Array) -> float:
-    """Return the share of the variance of a command that straight lines between its rows do not have."""
-    whole = float(np.var(values))
-    return 1.0 - float(np.var(0.5 * (values[1:] + values[:-1]))) / whole if whole > 0.0 else 0.0
-
-
 def _momentary_files(_: Beginning, logs: Logs) -> Iterator[Of]:
-    """Yield the files whose commands change from row to row."""
-    files = []
-    for one in logs:
-        moving = [c for c in commands_of(one).values() if np.ptp(c) > _LEAST_COMMAND] if not one.is_momentary else []
-        if any(lost_between_rows(c) > _BETWEEN and np.mean(np.diff(c) != 0.0) > 0.5 for c in moving):
-            files.append(one.log.file)
+    """Yield the files with momentary commands."""
+    files = [one.log.file for one in logs if one.lost and not one.is_momentary]
     if files:
         yield tuple(files)
+
+
+def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
+    """Return how much of the command along which axis is lost between rows that are so far apart, s."""
+    axis = max(lost, key=lambda one: lost[one])
+    return {"share": percent(lost[axis]), "axis": axis, "rate": significant(1.0 / interval, 2)}
 
 
 def _thrusters(known: Beginning, logs: Logs) -> Iterator[Of]:
@@ -189,7 +186,7 @@ def _signature(known: Beginning, logs: Logs, name: str) -> Array | None:
     effects = [t.effect(form.axis) for t in known.layout.thrusters if t.name == name for form in known.layout.axes]
     values = [c[name] for one in logs if name in (c := commands_of(one))]
     commands = np.concatenate(values) if values else np.zeros(1)
-    if not any(effects) or np.ptp(commands) < _LEAST_COMMAND:
+    if not any(effects) or np.ptp(commands) < LEAST_COMMAND:
         return None
     sign = 1.0 if next(filter(None, effects)) > 0.0 else -1.0
     return np.outer(np.round(np.multiply(effects, sign), 9), sign * commands)
@@ -297,29 +294,54 @@ HYPOTHESES = {
 # ---- The alarm -------------------------------------------------------------------------------------------------------
 
 
-def structure(objective: Objective, best: Minimum) -> dict[Axis, float]:
-    """Return the largest error of the predictions over 10 s along each axis, relative to the noise of the sensor.
+def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, float]:
+    """Return how much larger the errors along each axis are than the noise of the sensor: near 1 for a right structure.
 
-    The fit has seen these data, so only its structure can be wrong. It is near 1 where it is right, even where noise
-    explains each next sample. Outliers do not count. The noise is at least 1 % of the motion, and contains what
-    momentary commands lack between their rows.
+    The fit has seen these data, so only its structure can be wrong. The errors are those of predictions over 10 s, even
+    where noise explains each next sample. Outliers do not count. The noise is at least 1 % of the motion.
+
+    Over 10 s, nobody predicts a vehicle whose commands change between the rows of its log, least of all one whose
+    heading is unstable without them. There, the errors are those of a filter without slow processes, relative to its
+    own, unless predictions `ahead` are asked for although no short force stands for these commands.
     """
     found: dict[Axis, float] = {}
     for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        try:
-            off = objective.run(best.z, n, begin=SETTLING, span=AHEAD).innovations
-        except DivergedError:
-            off = np.full(len(record.time), inf)
         usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
-        between = _between_rows(objective, best.z, n) if one.is_momentary else np.zeros(len(record.time))
-        for number, m in enumerate(one.measured):
-            at = usual & (record.sensor == number)
-            if at.sum() < 10:
-                continue
-            change = unchanged(record.time[at], record.value[at], AHEAD)
-            least = max(least_error(m.noise, change), float(np.sqrt(np.mean(between[at]))))
-            found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), rms(off[at]) / least)
+        places = [usual & (record.sensor == number) for number in range(len(one.measured))]
+        least = [
+            least_error(m.noise, unchanged(record.time[at], record.value[at], AHEAD)) if at.sum() >= 10 else nan
+            for m, at in zip(one.measured, places, strict=True)
+        ]
+        try:
+            if one.is_momentary or (one.lost and not ahead):
+                run = objective.run(_without_slow_noise(objective.table, best.z, one, least), n)
+                errors = run.innovations / np.sqrt(run.variances)
+            else:
+                run = objective.run(best.z, n, begin=SETTLING, span=AHEAD)
+                errors = run.innovations / np.array(least)[record.sensor]
+        except DivergedError:
+            errors = np.full(len(record.time), inf)
+        for m, at in zip(one.measured, places, strict=True):
+            if at.sum() >= 10:
+                found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), rms(errors[at]))
     return found
+
+
+def _without_slow_noise(table: Table, z: Array, one: SampledLog, least: Sequence[float]) -> Array:
+    """Return the parameters with at least the given noise of the sensors of a log, and with no slow processes.
+
+    Coloured noise and what momentary commands lack are at most as large as usual.
+    """
+    noise = {m.channel.quantity.name: value for m, value in zip(one.measured, least, strict=True) if isfinite(value)}
+    quiet = z.copy()
+    for n, p in enumerate(table.parameters):
+        if p.kind in ("coloured noise", "short force"):
+            quiet[n] = min(z[n], p.mean)
+        elif p.is_slow_size:
+            quiet[n] = p.low
+        elif p.kind == "white noise" and p.of in noise:
+            quiet[n] = max(z[n], log(noise[p.of]))
+    return quiet
 
 
 def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
@@ -331,21 +353,6 @@ def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, floa
         )
         for axis in (form.axis for form in layout.axes)
     }
-
-
-def _between_rows(objective: Objective, z: Array, number: int) -> Array:
-    """Return the variance of predictions over 10 s of a log by what its commands lack between their rows."""
-    parameters = objective.table.parameters
-    quiet = np.array([p.low if p.kind in SIZES and p.kind != "short force" else z[n] for n, p in enumerate(parameters)])
-    return objective.run(quiet, number, begin=SETTLING, span=AHEAD).variances
-
-
-def unchanged(time: Array, values: Array, span: float) -> float:
-    """Return the RMS change of a quantity since the start of its prediction."""
-    if span == inf:
-        return rms(values - values[0])
-    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
-    return rms(values - values[first])
 
 
 def probability(odds: float) -> float:
@@ -407,8 +414,7 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
     """
     now = Explained(model, full, near)
     for _ in range(_MOST):
-        error = max(structure(now.objective, now.minimum).values(), default=0.0)
-        fits = [_fitted(now, one, z) for one, z in _likely(now, error, search)]
+        fits = [_fitted(now, one, z) for one, z in _likely(now, search)]
         if not (fits := [one for one in fits if one]):
             break
         best = max(fits, key=lambda one: one.adopted[-1].odds)
@@ -420,18 +426,20 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
     return now
 
 
-def _likely(now: Explained, error: float, search: Search) -> Iterator[tuple[Variant, Minimum]]:
+def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]:
     """Yield the hypotheses that are worth a fit to all samples, with their minima for thinned logs.
 
-    `error` is the largest one over 10 s, relative to the noise.
     Of the variants that change the thrust, those are fitted that explain most of the unknown force, which the filter
     follows with a slow process of the largest size.
     """
     model = now.model
+    errors = {
+        ahead: max(structure(now.objective, now.minimum, ahead=ahead).values(), default=0.0) for ahead in (True, False)
+    }
     variants = {
         Variant(kind, of): [*hypothesis.starts] or [nan]
         for kind, hypothesis in HYPOTHESES.items()
-        if error > hypothesis.alarm
+        if errors[not hypothesis.changes_thrust] > hypothesis.alarm
         for of in hypothesis.variants(model.known, model.logs)
     }
     ranked = {one: starts for one, starts in variants.items() if HYPOTHESES[one.kind].changes_thrust}

@@ -179,9 +179,10 @@ def derivatives(function: Callable[[Array], Array], z: Array, places: Sequence[i
 
 def cost(innovations: Array, variances: Array) -> float:
     """Return the sum over the samples of log S + rho(eps^2 / S)."""
-    u = innovations**2 / variances
     if not np.all(variances > 0.0):  # rounding, where a motion is about to diverge
         return np.inf
+    with np.errstate(over="ignore"):  # far from the minimum, a velocity may be any number
+        u = innovations**2 / variances
     beyond = OUTLYING**2 * (1.0 + np.log(np.maximum(u, OUTLYING**2) / OUTLYING**2))
     return float(np.sum(np.log(variances) + np.where(u > OUTLYING**2, beyond, u)))
 

@@ -5,17 +5,19 @@ which keeps what they tell and bounds the time of a fit.
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from math import cos, sin
+from dataclasses import dataclass, field, replace
+from math import cos, inf, sin
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
+from rov_fmu.identify.result import least_error
 from rov_fmu.io.messages import MOST, first_of
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each
+from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps, unwrapped
@@ -36,6 +38,15 @@ _LEAST_CHANGE = 0.001
 _LEAST_SPEED, _SLOWED = 0.1, 0.5
 """A vehicle slows down by itself if it is faster than the first number at the beginning, m/s or rad/s, and if less than
 this share of the speed is left at the end."""
+AHEAD = 10.0
+"""Positions are predicted over this time, s."""
+_ROWS_AHEAD = 10
+"""Where commands change between the rows of a log, everything is predicted over so many rows."""
+LEAST_COMMAND = 0.05
+"""The least change of a command that counts."""
+_CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
+"""Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
+them has another command, and if more than the third share of a command is lost between them."""
 _LEAST_PUSH = 0.02
 """The smallest change of thrust that tests an axis, as a share of full thrust. Smaller changes are due to a heading or
 depth controller, or to rounded pulses."""
@@ -63,8 +74,15 @@ class SampledLog:
     """The same with fewer samples."""
     interval: float
     """The usual time between two rows of commands, s."""
+    lost: Mapping[str, float] = field(default_factory=dict)
+    """The share of the command along each axis that is lost between its rows, by the axis."""
     is_momentary: bool = False
     """True if its rows have the commands of a moment, between which they follow a straight line, on the average."""
+
+    @property
+    def horizon(self) -> float:
+        """How far ahead positions are predicted, s, and velocities, too, if commands are lost between rows."""
+        return _ROWS_AHEAD * self.interval if self.lost else AHEAD
 
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows."""
@@ -124,6 +142,9 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
     assert log.commands
     begin = float(log.commands.rows[0])
     measured = tuple(_measured(log, layout))[:MOST_SENSORS]
+    lost = lost_between_rows(log, layout)
+    if lost:  # where a sensor is more exact than the commands, J is rough
+        measured = tuple(replace(m, noise=_least_noise(m)) for m in measured)
     since, told, inputs = _rows(log, layout)
     full = _samples(measured, begin, FASTEST, averaged=True)
     thin = _samples(measured, begin, THINNED, averaged=False)
@@ -132,7 +153,7 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
     record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout))
     time, value, sensor = thin
     thinned = replace(record, time=time, value=value, sensor=sensor)
-    return SampledLog(log, layout, measured, record, thinned, log.commands.interval)
+    return SampledLog(log, layout, measured, record, thinned, log.commands.interval, lost)
 
 
 def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
@@ -162,6 +183,41 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
     return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings
+
+
+def lost_between_rows(log: Log, layout: Layout) -> dict[str, float]:
+    """Return the share of the command along each axis that is lost between the rows of a log, by the axis.
+
+    A controller changes the commands more often than the log has rows, which are then momentary values. The share is
+    that of the variance that straight lines between rows lack. No axis is among them where the commands of rows hold,
+    or where rows are so close together that lines follow them.
+    """
+    commands = log.commands
+    if not commands or commands.interval < _CLOSE_ROWS:
+        return {}
+    if len({*commands.time.tolist()}) < _MOST_CHANGE * len(commands.rows):
+        return {}
+    values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
+    pushes = {form.axis.name: push_along(layout, form.axis, values) for form in layout.axes}
+    lost = {axis: beside_lines(push) for axis, push in pushes.items() if np.ptp(push) > LEAST_COMMAND}
+    return {axis: share for axis, share in lost.items() if share > _LEAST_LOST}
+
+
+def beside_lines(values: Array) -> float:
+    """Return the share of the variance of equidistant values that straight lines between them do not have."""
+    whole = float(np.var(values))
+    return 1.0 - float(np.var(0.5 * (values[1:] + values[:-1]))) / whole if whole > 0.0 else 0.0
+
+
+def push_along(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
+    """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
+    rows = len(next(iter(values.values())))
+    if COMMAND in values:  # of a log of this axis alone
+        return values[COMMAND]
+    effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
+    total = sum(abs(effect) for _, effect in effects)
+    pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]
+    return np.sum(pushes, axis=0) if pushes else np.zeros(rows)
 
 
 def shown_axes(log: Log, layout: Layout) -> list[Axis]:
@@ -240,6 +296,18 @@ def _measured(log: Log, layout: Layout) -> Iterator[SampledChannel]:
         noise = float(1.4826 * np.median(np.abs(differences))) or float(np.std(differences))
         sensor = Sensor(axis, channel.quantity.is_velocity, over_ground=log.axis is None)  # in a tank, water is ground
         yield SampledChannel(channel, sensor, max(noise, 1e-9))
+
+
+def unchanged(time: Array, values: Array, span: float) -> float:
+    """Return the RMS change of a quantity since the start of its prediction."""
+    if span == inf:
+        return rms(values - values[0])
+    first = np.searchsorted(time, time[0] + span * np.floor((time - time[0]) / span))
+    return rms(values - values[first])
+
+
+def _least_noise(m: SampledChannel) -> float:
+    return least_error(m.noise, unchanged(m.channel.time, m.channel.values, AHEAD))
 
 
 def _samples(

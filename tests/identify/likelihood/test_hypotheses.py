@@ -19,12 +19,17 @@ from rov_fmu.identify.likelihood.hypotheses import (
     HYPOTHESES,
     Model,
     Variant,
-    lost_between_rows,
     probability,
+    structure,
     twins,
 )
+from rov_fmu.identify.likelihood.objective import Data
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.records import beside_lines, lost_between_rows
+from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.result import ALARM, USUAL
 from rov_fmu.interface.model import VehicleModel
+from rov_fmu.tank import log as tank_log
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -198,9 +203,32 @@ def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
 def test_momentary_commands_lose_what_changes_between_rows() -> None:
     """White commands lose half of their variance, and held ones that change seldom nearly nothing."""
     rng = np.random.default_rng(0)
-    assert lost_between_rows(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
-    assert lost_between_rows(np.repeat(rng.standard_normal(400), 50)) < 0.03
-    assert lost_between_rows(np.zeros(10)) == 0.0
+    assert beside_lines(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
+    assert beside_lines(np.repeat(rng.standard_normal(400), 50)) < 0.03
+    assert beside_lines(np.zeros(10)) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "interval", "share"),
+    [
+        (np.tile([0.3, -0.2], 200), 0.1, 1.0),
+        (np.tile([0.3, -0.2], 200), 0.02, 0.0),
+        (np.tile([0.01, -0.01], 200), 0.1, 0.0),
+        (np.sin(0.05 * np.arange(400)), 0.1, 0.0),
+        (np.repeat([0.3, -0.3] * 40, 5), 0.1, 0.0),
+    ],
+    ids=["from row to row", "close rows", "small changes", "a pilot's stick", "steps that hold"],
+)
+def test_only_what_lines_between_far_rows_lack_is_lost(
+    values: Array, interval: float, share: float, model: Model
+) -> None:
+    """The same function decides in the hypotheses and in what `inspect` tells."""
+    layout = model.known.layout
+    thrusters = [t.name for t in layout.thrusters]
+    rows = np.array([interval * n for n in range(len(values))])
+    commands = tank_log.Commands.of_rows(thrusters, rows, np.array([values] * len(thrusters)).T, tank_log.Source(""))
+    lost = lost_between_rows(replace(model.logs[0].log, commands=commands), layout)
+    assert max(lost.values(), default=0.0) == pytest.approx(share, abs=0.02)
 
 
 @pytest.mark.parametrize("vehicle", ["bluerov2", "bluerov2_heavy"])
@@ -213,6 +241,33 @@ def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path
     assert one.is_momentary
     assert not list(HYPOTHESES["momentary commands"].variants(known, [one]))
     assert all(one.between_rows(known.coefficients, form.axis) > 0.0 for form in one.layout.axes)
+
+
+@pytest.mark.parametrize("health", [1.0, 0.5])
+def test_only_what_is_named_silences_the_alarm(health: float, tmp_path: Path) -> None:
+    """The heading of the vehicle is unstable, and its controller acts between the rows of the log.
+
+    So the vehicle that flew cannot be predicted over 10 s, and is right all the same. The model that lacks an ill
+    thruster is wrong, although large slow and short forces explain each next sample.
+    """
+    logs = {"flight.csv": flown(rov_fmu.load("bluerov2").with_(health_3=health), 25.0, 1)}
+    held = Model(*begin(load_tests(folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', logs))))
+    loud = {"slow force", "short force", "slow gain", "coloured noise"} if health < 1.0 else set[str]()
+    for model in (held, held.applied(Variant("momentary commands", ("flight.csv",)))):
+        objective = model.objective()
+        z = np.array([p.mean + 2.0 * p.deviation * (p.kind in loud) for p in model.table.parameters])
+        runs = objective.runs(z)
+        data = [Data.of(run, [], len(z)) for run in runs]
+        best = Minimum(z, objective.value(z, runs), runs, data, np.eye(len(z)))
+        assert np.sqrt(np.mean(data[0].normalised ** 2)) < 1.5
+        errors = {axis.name: error for axis, error in structure(objective, best).items()}
+        if health < 1.0:
+            assert errors["yaw"] > ALARM
+        else:
+            assert max(errors.values()) < USUAL
+        if model is held:
+            ahead = {axis.name: error for axis, error in structure(objective, best, ahead=True).items()}
+            assert ahead["yaw"] > ALARM
 
 
 def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(model: Model) -> None:

@@ -134,7 +134,7 @@ def outcome(scenario: Scenario, seed: int, folder: Path) -> Outcome:
         return Outcome(error=f"{type(error).__name__}: {error}", seconds=time.process_time() - begin)
     held_out = {path.name for path in (folder / UNSEEN).glob("*")}
     kept = [p for p in predictions if p.file in held_out or not held_out]
-    return read_result(result, scenario.truths(seed), [p for p in kept if p.is_position == (p.span < inf)], seconds)
+    return read_result(result, scenario.truths(seed), [p for p in kept if p.is_judged], seconds)
 
 
 def _with_unseen(folder: Path) -> Identification | None:
