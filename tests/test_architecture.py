@@ -59,7 +59,8 @@ LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,
-    "tests/fmu": 13,
+    "rov_fmu/tank": 13,
+    "tests/tank": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
 }

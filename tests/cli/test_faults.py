@@ -121,15 +121,15 @@ _QUICK = (("tune", "output"), ("simulate", "plot"))
     ids=" ".join,
 )
 def test_an_interrupt_before_the_last_move_leaves_nothing(key: tuple[str, str], tmp_path: Path) -> None:
-    """A flight without an autopilot writes no log."""
+    """A flight without an autopilot writes no log. What the compiler keeps in its cache is written elsewhere, before."""
     command = COMMANDS[key]
     target = tmp_path / "out" / command.name
     target.parent.mkdir()
     action = f"""
 def interrupt(_):
-    assert [*Path({str(target.parent)!r}).iterdir()], "the draft is there"
-    os.kill(os.getpid(), signal.SIGINT)
-    time.sleep(600.0)
+    if any(Path({str(target.parent)!r}).iterdir()):
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(600.0)
 os.fsync = interrupt
 def action():
     from rov_fmu.cli import main

@@ -90,7 +90,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     assert f"faster than {records.FASTEST:g} per second are averaged" in page
     assert f"up to |u| = c = {objective.OUTLYING:g}, and" in page
     assert f"The filter reads the first {hypotheses.SETTLING:g} s" in page
-    assert f"positions and headings over {hypotheses.AHEAD:g} s" in page
+    assert f"positions and headings over {records.AHEAD:g} s" in page
     assert f"never claimed to better than {100.0 * assess.EXACT:g} %" in page
     assert f"a change of thrust of at least {100.0 * held_out._LEAST_GAIN:g} %" in page
     assert (

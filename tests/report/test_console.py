@@ -96,7 +96,7 @@ def test_numbers_and_words_are_written_for_readers() -> None:
     assert written == ["–", "–", "+0.0 %", "+12.3 %", "−∞ %"]
     plain = [terminal.text(value, ".1f") for value in (None, nan, -0.04, -0.06, -inf)]
     assert plain == ["-", "-", "0.0", "-0.1", "-inf"]
-    assert sentence("all 3 of -5% (-2 deg) in 3 us") == "All 3 of −5 % (−2 °) in 3 µs"
+    assert sentence("all 3 of -5% (-2 deg) in 3 us") == "All 3 of −5\xa0% (−2 °) in 3 µs"
     assert sentence("log_1.csv: it lacks") == "log_1.csv: it lacks"
     assert [*map(pretty_unit, ("N.m.s2/rad2", "1", "us", "deg/s"))] == ["N·m·s²/rad²", "1", "µs", "°/s"]
     assert [in_words("time to 63 %", "s"), in_words("force", "1")] == ["Time to 63 % (s)", "Force"]
