@@ -121,7 +121,7 @@ _QUICK = (("tune", "output"), ("simulate", "plot"))
     ids=" ".join,
 )
 def test_an_interrupt_before_the_last_move_leaves_nothing(key: tuple[str, str], tmp_path: Path) -> None:
-    """A flight without an autopilot writes no log. What the compiler keeps in its cache is written elsewhere, before."""
+    """A flight without an autopilot writes no log. The cache of the compiler is elsewhere."""
     command = COMMANDS[key]
     target = tmp_path / "out" / command.name
     target.parent.mkdir()
