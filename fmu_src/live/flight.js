@@ -440,10 +440,14 @@ function handedOver(from, to, get) {
   const given = {};
   for (const [name] of from.variables.slice(0, from.inputs)) given[name] = get(name);
   if (to.commands.every((name) => from.commands.includes(name))) return given;
+  /** @param {number[]} values */
+  const mean = (values) => values.reduce((sum, value) => sum + value, 0) / values.length;
   const demands = new Map(
     from.axes.map(({ name, signs }) => {
-      const driving = Object.entries(signs);
-      return [name, driving.reduce((sum, [command, sign]) => sum + (sign * get(command)) / driving.length, 0)];
+      const driving = Object.entries(signs).map(([command, sign]) => sign * get(command));
+      if (!MOVES.includes(name)) return [name, mean(driving)];
+      const force = mean(driving.map((command) => command * Math.abs(command))); // see turningAbout
+      return [name, Math.sign(force) * Math.sqrt(Math.abs(force))];
     }),
   );
   return { ...given, ...commandsOf(to, demands) };

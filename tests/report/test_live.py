@@ -3,7 +3,7 @@
 import random
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import ceil, exp, log
+from math import ceil, exp, log, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -150,7 +150,8 @@ def test_a_gamepad_steers_and_lets_go(fly: Fly, heavy: Vehicle) -> None:
     page.evaluate("axes => { navigator.getGamepads = () => [null, { mapping: 'standard', axes }]; }", axes)
     until(page, "live.flight.pilot.model.get('r') > 0.1")
     expected = dict.fromkeys(heavy.layout.commands, 0.0)
-    shares = sticks | {"sway": 0.0, "yaw": 0.25}  # a turn of 0.5 about 0.75 ahead would saturate one side
+    # A turn of 0.5 would saturate one side. The force of both sides is that of 0.75 ahead, because thrust is quadratic.
+    shares = sticks | {"sway": 0.0, "yaw": 0.25, "surge": sqrt(0.75**2 - 0.25**2)}
     for form in heavy.layout.axes:
         for name, sign in heavy.layout.signs(form.axis).items():
             expected[name] += sign * shares[form.axis.name]
