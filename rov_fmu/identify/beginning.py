@@ -335,7 +335,7 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
     Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
     """
     requests = tests.requests
-    values = [c.samples[1] for log in tests.folder.logs if (c := log.used("voltage")) and c.count]
+    values = tests.folder.voltages
     if not values or vehicle.layout.voltage is not None:
         return vehicle
     mean = float(np.mean([np.mean(some) for some in values]))

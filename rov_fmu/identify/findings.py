@@ -646,7 +646,7 @@ def _on_scale(identification: Identification) -> Iterator[Finding]:
 def _on_vehicle(identification: Identification) -> Iterator[Finding]:
     """Yield a finding if nobody described the vehicle, and one about a logged voltage that acts on nothing."""
     description, vehicle = identification.folder.rov_file.description, identification.vehicle
-    volts = [c.samples[1] for log in identification.folder.logs if (c := log.used("voltage")) and c.count]
+    volts = identification.folder.voltages
     if volts and identification.curves and vehicle.layout.voltage is None:
         ends = dict.fromkeys(f"{end:.3g}" for end in usual_range(np.concatenate(volts)))
         yield Finding("idle voltage", names={"volts": " to ".join(ends)})

@@ -172,7 +172,10 @@ def cautious(objective: Objective, z: Array) -> Array:
 def _predicted(
     objective: Objective, out: HeldOut, z: Array, covariance: Array, other: Table | None
 ) -> Iterator[Prediction]:
-    """Yield the predictions of what is held out over its whole length, and of its positions over a shorter time."""
+    """Yield the predictions of what is held out: over its whole length, and over a shorter time.
+
+    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows.
+    """
     one, record = objective.logs[out.log], objective.records[out.log]
     inside = np.zeros(len(record.time), bool)
     inside[out.chosen] = True

@@ -25,6 +25,7 @@ from rov_fmu.io.file_kinds import OWN_SUFFIXES, TESTS, check_suffix
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
 from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.io.toml_file import join_names, key_line
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Draft, Requests, RovFile, RovTables, read_description
@@ -87,6 +88,11 @@ class Folder:
     def logged(self) -> Layout | None:
         """The layout with the axes that a log of several axes may measure."""
         return self.rov_file.description.logged if self.rov_file.description else None
+
+    @property
+    def voltages(self) -> list[Array]:
+        """The samples of the voltage of each log that has one, V."""
+        return [c.samples[1] for log in self.logs if (c := log.used("voltage")) and c.count]
 
     def read(self, path: Path) -> None:
         """Read one file."""

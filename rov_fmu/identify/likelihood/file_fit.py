@@ -10,12 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, refits
 
 MOST_RISE = 2.0
 """The largest rise of J, twice a log likelihood, by all effects that are left out."""
+_POSITIVE = 2.0
+"""2 ln of the Bayes factor from which evidence is positive (Kass and Raftery 1995)."""
 _EXPECTED = 1.5
 """Effects are tried while J is expected to rise by at most so many times MOST_RISE: it is only nearly quadratic."""
 _STEPS = 2
@@ -38,12 +41,13 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     are absent: two effects of which either explains the data are not both left out. Many refits run together, and those
     that hold tell anew what to expect of the next ones.
 
-    A voltage without positive evidence (2 ln of the Bayes factor below 2) is left out before, whatever the rise: it
-    would be an input of the FMU.
+    An effect that would be an input of the FMU, such as the voltage, is left out before, whatever the rise, if the
+    evidence for it is not positive.
     """
-    posterior, absent = Posterior.of(objective.table, best.z, best.information), frozenset[int]()
-    if (voltage := objective.table.place("voltage")) is not None and posterior.evidence(voltage) < MOST_RISE:
-        absent = frozenset({voltage})
+    posterior, parameters = Posterior.of(objective.table, best.z, best.information), objective.table.parameters
+    inputs = (n for n, p in enumerate(parameters) if KINDS[p.kind].adds_input)
+    absent = frozenset(n for n in inputs if posterior.evidence(n) < _POSITIVE)
+    if absent:
         best = minimise(objective.without(absent), best.z, most=_STEPS)
     least = best
     while True:

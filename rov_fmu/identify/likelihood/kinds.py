@@ -67,6 +67,8 @@ class Kind(Coordinate):
     """True if the coordinate of the effect is the logarithm of a ratio."""
     keys: tuple[str, ...] = ()
     """The keys of the coefficients that only a vehicle with the effect has."""
+    adds_input: bool = False
+    """True if a vehicle with the effect has an input more."""
 
 
 def _slow(prior: Prior, usual: float, least: float, largest: float) -> Kind:
@@ -196,6 +198,7 @@ KINDS = {
         Prior("voltage", 0.75, "the exponent of thrust over voltage", "0 if regulated, else 1 to 2"),
         "exponent of thrust over voltage",
         keys=("n_V",),
+        adds_input=True,
         mean=0.75,
         low=CURVE["n_V"].minimum,
         high=CURVE["n_V"].maximum,

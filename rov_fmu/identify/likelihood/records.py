@@ -307,6 +307,7 @@ def unchanged(time: Array, values: Array, span: float) -> float:
 
 
 def _least_noise(m: SampledChannel) -> float:
+    """Return the guess of a channel's noise, or 1 % of its motion if that is more."""
     return least_error(m.noise, unchanged(m.channel.time, m.channel.values, AHEAD))
 
 
