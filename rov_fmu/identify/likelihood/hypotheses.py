@@ -21,12 +21,7 @@ from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.records import (
-    AHEAD,
-    LEAST_COMMAND,
-    SampledLog,
-    unchanged,
-)
+from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.io.numbers import percent, significant
@@ -300,9 +295,10 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     The fit has seen these data, so only its structure can be wrong. The errors are those of predictions over 10 s, even
     where noise explains each next sample. Outliers do not count. The noise is at least 1 % of the motion.
 
-    Over 10 s, nobody predicts a vehicle whose commands change between the rows of its log, least of all one whose
-    heading is unstable without them. There, the errors are those of a filter without slow processes, relative to its
-    own, unless predictions `ahead` are asked for although no short force stands for these commands.
+    The motion in a log whose commands change between its rows cannot be predicted over 10 s, least of all a heading
+    that is unstable without them. The errors of such a log are the innovations of a filter without slow processes,
+    relative to its own standard deviations. If `ahead` is True, they are those of predictions over 10 s there, too, as
+    long as the log has no short force, which stands for these commands.
     """
     found: dict[Axis, float] = {}
     for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
@@ -351,7 +347,7 @@ def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, floa
             (error for other, error in errors.items() if other is axis or layout.shares_thrusters(axis, other)),
             default=0.0,
         )
-        for axis in (form.axis for form in layout.axes)
+        for axis in layout.bare_axes
     }
 
 
@@ -433,13 +429,13 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
     follows with a slow process of the largest size.
     """
     model = now.model
-    errors = {
-        ahead: max(structure(now.objective, now.minimum, ahead=ahead).values(), default=0.0) for ahead in (True, False)
-    }
+    predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
+    if any(one.lost and not one.is_momentary for one in model.logs):
+        filtered = max(structure(now.objective, now.minimum).values(), default=0.0)
     variants = {
         Variant(kind, of): [*hypothesis.starts] or [nan]
         for kind, hypothesis in HYPOTHESES.items()
-        if errors[not hypothesis.changes_thrust] > hypothesis.alarm
+        if (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
         for of in hypothesis.variants(model.known, model.logs)
     }
     ranked = {one: starts for one, starts in variants.items() if HYPOTHESES[one.kind].changes_thrust}
@@ -473,7 +469,7 @@ class _Unknown:
             elif p.is_slow_size:
                 z[n] = p.low
         self.vehicle, _ = table.model(now.minimum.z)
-        self.scale = {axis.name: float(table.force_unit(z, axis)) for axis in (f.axis for f in table.layout.axes)}
+        self.scale = {axis.name: float(table.force_unit(z, axis)) for axis in table.layout.bare_axes}
         self.time, self.force = [], []
         for n, one in enumerate(now.model.logs):
             first, record = objective.filters[n].force, objective.records[n]
