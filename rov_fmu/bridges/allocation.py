@@ -52,7 +52,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         for curve in layout.curves
     }
     content = {
-        "axes": {axis.name: axis for axis in (part.axis for part in layout.axes)},
+        "axes": {axis.name: axis for axis in layout.bare_axes},
         "matrix": matrix.tolist(),
         "pseudo_inverse": np.linalg.pinv(matrix).tolist(),
         "of_inputs": np.linalg.pinv(_gains(vehicle)).tolist() if layout.mix else [],
@@ -79,7 +79,7 @@ def allocation_matrix(vehicle: Vehicle) -> Array:
                 * vehicle.effect(thruster, axis)
                 for thruster in vehicle.layout.thrusters
             ]
-            for axis in (part.axis for part in vehicle.layout.axes)
+            for axis in vehicle.layout.bare_axes
         ]
     )
 

@@ -254,7 +254,7 @@ def _missing_or_doubled_tests(
         for pair in (names, reverse_names) if backward else (names,):
             if given := [name for name in pair if name in description.known]:
                 yield f"rov.toml gives {', '.join(given)}, but there is {file} too"
-    for axis in (form.axis for form in layout.axes):
+    for axis in layout.bare_axes:
         drag = [name for name in (axis.coefficient("a_d"), axis.coefficient("b_d")) if name not in known]
         if drag and axis.name not in {*tested.steady, *tested.logs}:
             yield (

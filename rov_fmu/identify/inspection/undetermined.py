@@ -48,7 +48,7 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
         findings += found
     tested = {axis for axes in driven.values() for axis in axes}
     groups: dict[tuple[str, str], list[Axis]] = {}
-    for axis in (form.axis for form in layout.axes if form.axis not in tested):
+    for axis in (axis for axis in layout.bare_axes if axis not in tested):
         groups.setdefault(_reason(axis, findings, logs), []).append(axis)
     for (reason, sensor), axes in groups.items():
         named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
@@ -58,7 +58,7 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
         yield f"{named} {stays}: {why}. {how}"
     if not layout.has_wrench:
         weak: list[str] = []
-        for axis in (form.axis for form in layout.axes if form.axis in tested):
+        for axis in (axis for axis in layout.bare_axes if axis in tested):
             own = [log.commands for log, axes in driven.items() if axis in axes and log.commands]
             largest, told = _by_commands(axis, own, layout)
             yield from told
@@ -98,7 +98,7 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
     alone."""
     others = [
         other
-        for other in (form.axis for form in layout.axes)
+        for other in layout.bare_axes
         if other is not axis and layout.shares_thrusters(axis, other) and axis.is_rotation + other.is_rotation < 2
     ]
     alone, largest, beside = 0.0, 0.0, dict.fromkeys(others, 0.0)

@@ -364,7 +364,7 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
     def of(names: Sequence[str], among: Mapping[str, object]) -> list[int]:
         return [places[name] if name in among else -1 for name in names]
 
-    axes = [form.axis for form in layout.axes]
+    axes = layout.bare_axes
     return [
         *of([axis.external for axis in axes], layout.inputs),
         *(-1 if axis.is_rotation else axis.place for axis in axes),

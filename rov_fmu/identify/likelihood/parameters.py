@@ -223,7 +223,7 @@ class Table:
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             found[name] = self.get(z, "current", file, part)
         whole = self.get(z, "slow gain")
-        axes = [form.axis for form in layout.axes]
+        axes = layout.bare_axes
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
         for thruster, curve in ((t, c) for t, c in layout.curve_of.items() if not c.has_rotors):
             units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
@@ -481,7 +481,7 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
 
 def _of_noise(known: Beginning, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     moving = {form.axis.name for one in logs for form in one.layout.axes}
-    for axis in (form.axis for form in known.layout.axes):
+    for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield from make("slow force", axis.name)
             momentary = [one for one in logs if one.is_momentary and axis.name in one.layout.by_name]

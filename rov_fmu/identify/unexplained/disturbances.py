@@ -87,7 +87,7 @@ def _disturbance(
     first = _place(objective, number, parameter)
     if first < 0:
         return None
-    axis = next((form.axis for form in one.layout.axes if form.axis.name == parameter.of), None)
+    axis = next((axis for axis in one.layout.bare_axes if axis.name == parameter.of), None)
     columns = [first, first + 1] if parameter.kind == "slow velocity" and axis is not HEAVE else [first]
     states, deviations = run.states[:, columns], run.deviations[:, columns]
     size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))

@@ -242,7 +242,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
     one, record = objective.logs[number], objective.records[number]
     parameters = objective.table.of_log(objective.mean, one)
     usual = dict(parameters.coefficients)
-    for axis in (form.axis for form in one.layout.axes if form.axis.name in guessed):
+    for axis in (axis for axis in one.layout.bare_axes if axis.name in guessed):
         volume = usual[axis.inertia] / _DENSITY
         drag = 0.5 * _DENSITY * (_TURNING * volume if axis.is_rotation else _MOVING * volume ** (2.0 / 3.0))
         for end in ("", REVERSE):

@@ -193,8 +193,7 @@ def _multiplied_out(x: Expression) -> list[tuple[Expression, ...]]:
 def coupled(layout: Layout) -> list[str]:
     """Return the names of the axes with Coriolis and Munk terms."""
     rows = equation_of(layout).rows
-    axes = (form.axis for form in layout.axes)
-    return [axis.name for axis in axes if any(term.effect is COUPLING for term in rows[axis.velocity])]
+    return [axis.name for axis in layout.bare_axes if any(term.effect is COUPLING for term in rows[axis.velocity])]
 
 
 def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:

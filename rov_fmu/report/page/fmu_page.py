@@ -77,7 +77,7 @@ def documentation_page(
     tables = tables_by_axis(vehicle)
     held = held_commands(vehicle, tables.values())
     first = vehicle.shown_axis
-    driven = [form.axis for form in layout.axes if layout.signs(form.axis)]
+    driven = [axis for axis in layout.bare_axes if layout.signs(axis)]
     told = [axis for axis in driven if axis not in vehicle.unidentified]
     start = layout.example(first)
     return page(

@@ -227,7 +227,7 @@ def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     layout = vehicle.layout
     if not layout.has_attitude:
         return layout.signs(axis)
-    axes = [form.axis for form in layout.axes]
+    axes = layout.bare_axes
     effects = [
         [
             sum(vehicle.effect(t, one) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
@@ -332,7 +332,7 @@ def _health(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, s
 def _tuning(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
     """Yield the sliders of the tuning factors."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
-        for axis in (form.axis for form in vehicle.layout.axes):
+        for axis in vehicle.layout.bare_axes:
             value = vehicle[name := axis.coefficient(key)]
             yield name, f"{letter} of {axis.name}", min(0.1, value), max(3.0, 2.0 * value), value, "", ""
 

@@ -136,7 +136,7 @@ def _add_identified(
         topic = topics.get(topic_name(signal["quantity"]))
         if topic and "low" in topic.fields:
             signal["band"] = band(topic.fields, topic.time)
-    for n, axis in enumerate(form.axis for form in layout.axes):
+    for n, axis in enumerate(layout.bare_axes):
         if topic := topics.get(f"unknown_force/{axis.name}"):
             values = {"times": _rounded(topic.time + begin), "values": _rounded(topic.fields["force"])}
             yield {"axis": n, **values, "band": band(topic.fields, topic.time)}

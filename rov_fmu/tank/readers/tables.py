@@ -183,7 +183,7 @@ def _no_motion(
     headers: Mapping[str, str], layout: Layout, axis: Axis | None, known: Mapping[str, LogColumn], renaming: str
 ) -> Iterator[str]:
     """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
-    axes = [axis] if axis else [form.axis for form in layout.axes]
+    axes = [axis] if axis else layout.bare_axes
     quantities = {name: one.entry.quantity for name, one in known.items() if one.entry and one.entry.quantity}
     wanted = {name: quantity.unit for name, quantity in quantities.items() if quantity.axis in axes}
     if not headers.keys() & {*wanted, "pressure"}:
