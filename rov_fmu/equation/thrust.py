@@ -97,7 +97,8 @@ def _add_steady_thrust(formulas: Formulas, name: str, curve: Curve, health: Expr
         if "V_0" in curve.keys:
             force = force * _by_voltage(curve, formulas.names)
         if "d" in curve.keys:
-            loss = product(health, by_direction(command, curve, "d"), call("abs", command), share)
+            at_voltage = [_of_speed(curve, formulas.names)] if "V_0" in curve.keys else []
+            loss = product(health, by_direction(command, curve, "d"), call("abs", command), *at_voltage, share)
             formulas.define(loss, "loss", name)
         if curve.tables:
             force = product(force, share)
@@ -105,7 +106,16 @@ def _add_steady_thrust(formulas: Formulas, name: str, curve: Curve, health: Expr
 
 
 def _by_voltage(curve: Curve, names: Names) -> Expression:
+    """Return the factor of the thrust at the present voltage."""
     return call("pow", names("battery") / Name(curve.coefficient("V_0")), Name(curve.coefficient("n_V")))
+
+
+def _of_speed(curve: Curve, names: Names) -> Expression:
+    """Return the factor of the speed of a rotor at the present voltage, and so of what it loses by its advance.
+
+    The thrust is proportional to the square of that speed, and the loss to the speed (Fossen 2021).
+    """
+    return call("pow", names("battery") / Name(curve.coefficient("V_0")), 0.5 * Name(curve.coefficient("n_V")))
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:
@@ -166,6 +176,8 @@ def _from_speed(formulas: Formulas, name: str, curve: Curve, health: Expression)
     speed = formulas.define(command, "speed", name)
     if "V_0" in curve.keys:
         formulas.define(_by_voltage(curve, formulas.names), "by_voltage", name)
+        if "d" in curve.keys:
+            formulas.define(_of_speed(curve, formulas.names), "speed_by_voltage", name)
     return _of_rotor(name, curve, formulas.names, health, _per_speed(speed, speed, curve), speed)
 
 
@@ -202,8 +214,10 @@ def add_rotor(formulas: Formulas, name: str, curve: Curve, health: Name) -> None
     formulas.define(of_rotor(_per_speed(n, heads, curve, 2.0), change), "rise", name)
     formulas.define(of_rotor(signed("a_t"), change, change), "bend", name)
     if "d" in curve.keys:
-        formulas.define(product(health, by_direction(heads, curve, "d"), call("abs", n), share), "loss", name)
-        formulas.define(product(health, signed("d"), change, share), "loss_rise", name)
+        of_speed = [names("speed_by_voltage", name)] if "V_0" in curve.keys else []
+        loss = product(health, by_direction(heads, curve, "d"), call("abs", n), *of_speed, share)
+        formulas.define(loss, "loss", name)
+        formulas.define(product(health, signed("d"), change, *of_speed, share), "loss_rise", name)
 
 
 @dataclass(frozen=True)

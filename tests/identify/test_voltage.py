@@ -35,7 +35,7 @@ def without_column(folder: Path, to: Path) -> Identification:
 
 
 def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) -> None:
-    """The voltage is told to act on nothing, and moves no answer by more than a tenth of its interval's half-width."""
+    """The voltage is told to act on nothing, and moves no answer by more than a quarter of its interval's half-width."""
     found = identified(folder / "with", battery, seed, dive)
     other = without_column(folder / "with", folder / "without")
     assert found.vehicle.layout.voltage is None
@@ -47,7 +47,7 @@ def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) ->
             for (value, (low, high)), (without, _) in zip(
                 (one.steady, one.rise, one.stop), (two.steady, two.rise, two.stop), strict=True
             ):
-                assert abs(value - without) < 0.1 * 0.5 * abs(high - low), (one, two)
+                assert abs(value - without) < 0.25 * 0.5 * abs(high - low), (one, two)
 
 
 def test_a_voltage_that_acts_on_nothing_changes_no_answer(tmp_path: Path) -> None:
@@ -71,11 +71,10 @@ def test_no_idle_voltage_changes_an_answer(battery: Battery, seed: int, tmp_path
     [(0.5, 0), *(pytest.param(n, seed, marks=pytest.mark.weekly) for n in (0.5, 1.0, 1.5, 2.0) for seed in range(5))],
 )
 def test_an_exponent_is_found(exponent: float, seed: int, tmp_path: Path) -> None:
-    """In the model, the loss with speed does not depend on the voltage. Here it does, which takes up to 10 %."""
     found = identified(tmp_path / "a", Battery(exponent, sag=0.12, droop=0.06), seed)
     (effect,) = (one for one in found.effects if one.kind == "voltage")
     low, high = effect.interval
     assert effect.kept
-    assert 0.9 * low <= exponent <= high / 0.9
+    assert low <= exponent <= high
     assert high - low < 0.6
     assert found.vehicle["n_V_main"] == pytest.approx(exponent, abs=0.3)

@@ -135,11 +135,7 @@ def _limited(command: Number, numbers: Any) -> Number:
 
 def thrust(rov: Vehicle, curve: Curve, command: Number, numbers: Any, voltage: Number = 0) -> Number:
     """Return the steady force of a thruster: by its tables or by its coefficients, at the voltage of the battery."""
-    by_voltage, voltage = numbers.one, max(numbers.mpf(voltage), numbers.zero)
-    if "V_0" in curve.keys:
-        by_voltage = (voltage / numbers.mpf(rov.coefficients[f"V_0_{curve.name}"])) ** numbers.mpf(
-            rov.coefficients[f"n_V_{curve.name}"]
-        )
+    by_voltage, voltage = of_voltage(rov, curve, voltage, numbers), max(numbers.mpf(voltage), numbers.zero)
     if not curve.tables:
         return by_voltage * _quadratic(rov, curve, command, numbers)
     measured = [_interpolated(table, command, numbers) for table in curve.tables]
@@ -151,6 +147,14 @@ def thrust(rov: Vehicle, curve: Curve, command: Number, numbers: Any, voltage: N
     else:
         force = measured[0] if voltage < curve.tables[0].voltage else measured[-1]
     return numbers.mpf(rov.coefficients[f"k_t_{curve.name}"]) * by_voltage * force / curve.n_thrusters
+
+
+def of_voltage(rov: Vehicle, curve: Curve, voltage: Number, numbers: Any, power: int = 2) -> Number:
+    """Return the factor of a power of the speed of a rotor at a voltage. The thrust is proportional to its square."""
+    if "V_0" not in curve.keys:
+        return numbers.one
+    V_0, n_V = (numbers.mpf(rov.coefficients[f"{key}_{curve.name}"]) for key in ("V_0", "n_V"))
+    return (max(numbers.mpf(voltage), numbers.zero) / V_0) ** (n_V * power / 2)
 
 
 def _interpolated(table: ThrustTable, command: Number, numbers: Any) -> Number:

@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import cross_name
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from . import equations, rigid_body
-from .equations import commands, rotor_speed, steady_forces
+from .equations import commands, of_voltage, rotor_speed, steady_forces
 from .extrapolation import BITS, plain, real, until_reversal
 from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, rigid_body_mass, rotation, skew
 
@@ -92,6 +92,7 @@ def _thrusters(rov: Vehicle, inputs: Values, number: Callable[[Number], Number])
         assert thruster.position
         reverse = "_reverse" if command < 0 and "d_reverse" in curve.keys else ""
         loss = mp.mpf(rov.coefficients[f"d_{curve.name}{reverse}"]) if "d" in curve.keys else mp.zero
+        loss *= of_voltage(rov, curve, inputs.get("voltage", 0), mp, power=1)
         lag = mp.mpf(rov.coefficients[f"T_{curve.name}"]) if curve.has_lag else mp.zero
         wrench = _wrench(thruster.place, thruster.direction.value)
         health = mp.mpf(rov.coefficients[f"health_{name}"])
@@ -109,11 +110,7 @@ def _rotors(rov: Vehicle, inputs: Values, number: Callable[[Number], Number]) ->
             row = []
             for name, curve in curves.items():
                 value = mp.mpf(k.get(f"{key}_{curve.name}{end}", k.get(f"{key}_{curve.name}", 0.0)))
-                if "V_0" in curve.keys and key != "d":
-                    U, V_0, n_V = (
-                        mp.mpf(x) for x in (inputs["voltage"], k[f"V_0_{curve.name}"], k[f"n_V_{curve.name}"])
-                    )
-                    value *= (max(U, mp.zero) / V_0) ** n_V
+                value *= of_voltage(rov, curve, inputs.get("voltage", 0), mp, power=1 if key == "d" else 2)
                 row.append(number(mp.mpf(k[f"health_{name}"]) * value / curve.n_thrusters))
             rows.append(row)
     return np.array(rows).reshape(2, 3, -1), np.array([curve.has_rotors for curve in curves.values()], bool)

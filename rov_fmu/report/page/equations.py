@@ -205,7 +205,17 @@ def _rotation(layout: Layout, equation: Equation) -> dict[str, Expression]:
 def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
     """Return the formulas that replace their names, because the page has no equation of these names."""
     names = equation.names
-    kinds = ("saturated", "command", "magnitude", "by_voltage", "net_weight", "righting", "arm", "constant")
+    kinds = (
+        "saturated",
+        "command",
+        "magnitude",
+        "by_voltage",
+        "speed_by_voltage",
+        "net_weight",
+        "righting",
+        "arm",
+        "constant",
+    )
     inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
     full = {t.name for t in layout.thrusters if "c_0" not in layout.curve_of[t.name].keys}  # without a dead band
     inlined |= {name.identifier for name in names.of_kind("beyond") if full.issuperset(name.owners)}
