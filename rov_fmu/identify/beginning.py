@@ -29,7 +29,7 @@ from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array, usual_range
 from rov_fmu.tank.description import ROV_FILE, Draft
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
@@ -131,7 +131,7 @@ class _Contents:
         """Return the line that refuses a folder without a better log."""
         file = self.log.file
         left_out = [finding for finding in self.log.findings if finding.kind == "channel left out"]
-        reasons = [line.removeprefix(f"{file}: ") for line in sentences([*left_out, *self.told], SENTENCES)]
+        reasons = [line.removeprefix(f"{file}: ") for line in sentences([*left_out, *self.told])]
         return f"{folder / file}: {'; '.join(first_of(reasons, _MOST_REASONS))}: nothing is identifiable"
 
 
@@ -153,7 +153,7 @@ def _driven_together(found: Folder) -> Iterator[Finding]:
             for axis in (form.axis for form in found.layout.axes if not found.logged.has(form.axis)):
                 is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
                 if is_measured and not log.axis and axis not in (ROLL, PITCH):
-                    yield Finding("together", axis.name, file=log.file, names={"axis": axis.name})
+                    yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
 
 
 def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:

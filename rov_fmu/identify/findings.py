@@ -3,10 +3,9 @@
 A finding is never read back: it only becomes a sentence in the terminal, in the report, and in the vehicle file.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import floor, inf, isfinite, log, log10
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -39,13 +38,11 @@ from rov_fmu.tank import findings
 from rov_fmu.tank.arrays import rms, usual_range
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
+from rov_fmu.tank.findings import MISFITS, Finding, Heading, about
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.vehicle import Vehicle
-
-Heading = Literal["Warnings", "Doubts", "Facts"]
 
 _CONTRADICTION = 0.15
 """Tables that differ by more than this from the model contradict it: batteries and scales explain less."""
@@ -76,7 +73,7 @@ _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
-_OWN: dict[Heading, dict[str, SentenceForm]] = {
+_OWN: Mapping[Heading, Mapping[str, str]] = {
     "Warnings": {
         "worse than no change": (
             "{axes}: the prediction of the {quantity} in {files} is off by {error} (RMS), and a prediction of no "
@@ -175,67 +172,13 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
 }
 _FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip", *MISFITS)
 """The warnings that stand first: wrong predictions, and wrong or missing data."""
-_READ: dict[Heading, frozenset[str]] = {
-    "Doubts": frozenset(
-        {
-            "grown rows",
-            "too few samples",
-            "time of arrival",
-            "other clock",
-            "aligned clock",
-            "unknown direction",
-            "unknown velocity",
-            "velocity corrected",
-            "late command",
-            "at rest",
-            "depth by pressure",
-        }
-    ),
-    "Facts": frozenset(
-        {
-            "wrench",
-            "source of wrench",
-            "other files",
-            "code page",
-            "lines before header",
-            "rows sorted",
-            "time stamps merged",
-            "rows without time",
-            "rows before commands",
-            "torn rows",
-            "unread cells",
-            "no pulse",
-            "no servo pulse",
-            "invalid",
-            "beyond full thrust",
-            "constant motion",
-            "constant push",
-            "free decay",
-            "cancelling thrusters",
-            "gaps",
-            "source of commands",
-            "source",
-            "range of pulses",
-            "dropouts",
-            "damaged pieces",
-            "reversed motors",
-            "axis left out",
-            "not coupled",
-            "unused curve",
-        }
-    ),
-}
-"""The kinds of findings about reading (rov_fmu/tank/findings.py) that are no warnings."""
-SEVERITY: dict[str, Heading] = {
-    **dict.fromkeys(findings.SENTENCES, "Warnings"),
-    **{kind: heading for heading, kinds in (*_READ.items(), *_OWN.items()) for kind in kinds},
-}
-"""The heading of each kind: warnings ask for something, doubts are open questions, and facts need no action."""
-SENTENCES: dict[str, SentenceForm] = {**_OWN["Warnings"], **_OWN["Doubts"], **_OWN["Facts"], **findings.SENTENCES}
+_FORMS = {heading: {**forms, **findings.HEADINGS[heading]} for heading, forms in _OWN.items()}
+SEVERITY: Mapping[str, Heading] = {kind: heading for heading, forms in _FORMS.items() for kind in forms}
+"""The heading of each kind."""
+SENTENCES = {kind: form for forms in _FORMS.values() for kind, form in forms.items()}
 """The form of the sentence of each kind."""
-_HEADINGS: tuple[Heading, ...] = get_args(Heading)
 _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
-"""The kinds in the order in which they are told under their heading."""
+"""The kinds in the order in which they are told, the warnings first."""
 
 
 def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
@@ -243,28 +186,24 @@ def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
     return findings.sentences((one for one in found if kind in ("", one.kind)), SENTENCES)
 
 
-def heading(finding: Finding) -> Heading:
-    """Return the heading that a finding belongs to."""
-    return SEVERITY[finding.kind]
-
-
 def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     """Return the sentences of findings of all axes by their headings: the warnings of all axes come first."""
-    groups: dict[Heading, list[Finding]] = {name: [] for name in _HEADINGS}
+    groups: dict[Heading, list[Finding]] = {name: [] for name in _FORMS}
     for finding in found:
-        groups[heading(finding)].append(finding)
+        groups[SEVERITY[finding.kind]].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
 
 
 def told(identification: Identification) -> Identification:
     """Return an identification with its findings; its vehicle has them too, with its verdicts and errors."""
     findings = findings_of(identification)
+    # other files beside the tests say nothing about the vehicle
+    groups = by_heading(finding for finding in findings if finding.kind != "other files")
     made = identification.vehicle.provenance
     assert made
     sentences_of = {
-        "warnings": warnings(findings),
-        # other files beside the tests say nothing about the vehicle
-        "facts": facts(finding for finding in findings if finding.kind != "other files"),
+        "warnings": (*groups["Warnings"], *groups["Doubts"]),
+        "facts": groups["Facts"],
         "verdicts": tuple(verdict.of(axis) for axis, verdict in identification.verdicts.items()),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }
@@ -275,16 +214,6 @@ def told(identification: Identification) -> Identification:
     data = vehicle.measured_from + (f" ({scale})" if scale else "")
     vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
-
-
-def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of warnings and doubts, as the vehicle file has them."""
-    return sentences(finding for finding in found if heading(finding) != "Facts")
-
-
-def facts(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of the findings that only say what was found or done."""
-    return sentences(finding for finding in found if heading(finding) == "Facts")
 
 
 # ---- Findings from the result ----------------------------------------------------------------------------------------
@@ -299,7 +228,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         if result.verdict.word == "do not use":
             found.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
-            found.append(Finding("structure", result.axis.name, names={"ratio": significant(result.structure, 2)}))
+            found.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
         if may_rock(identification.folder, result.axis):
             found.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -315,13 +244,12 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     found += filter(None, map(_logging, identification.logging))
     for sensor in identification.sensors:
         if sensor.outliers > _MOST_OUTLIERS:
-            numbers = {"share": sensor.outliers}
-            found.append(Finding("outliers", sensor.axis.name, names={"quantity": sensor.quantity}, numbers=numbers))
+            found.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
     found += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     found += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
-        found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
-    return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
+        found.append(about(slip.file, "slip", quantity=slip.quantity, words=slip.words))
+    return tuple(sorted(found, key=lambda one: _ORDER.index(one.kind)))
 
 
 def name_of(p: Prediction) -> str:
@@ -567,10 +495,9 @@ def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     warned = {(p.file, p.quantity) for p in worse if p.is_judged}
     for p in worse:
         if p.is_judged or (p.file, p.quantity) not in warned:
-            names = {"quantity": p.quantity}
-            names |= {"error": size_in_words(p.error, p.unit), "unchanged": size_in_words(p.unchanged, p.unit)}
             kind = "worse than no change" if p.is_judged else "drift"
-            yield Finding(kind, result.axis.name, file=p.file, names=names)
+            error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+            yield about(p.file, kind, result.axis.name, quantity=p.quantity, error=error, unchanged=unchanged)
 
 
 def _on_coefficients(identification: Identification, result: AxisResult) -> Iterator[Finding]:
@@ -588,7 +515,7 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
             curves = {thruster.curve for thruster in identification.vehicle.layout.thrusters_along(axis)}
             files = [*dict.fromkeys(p.file for p in identification.forces if p.subject in curves)]
             names["forces"] = f" (in {listed(files)})" if files else ""
-            yield Finding("implausible inertia", axis.name, names=names)
+            yield Finding("implausible inertia", axis.name, words=names)
 
 
 def _not_identified(
@@ -596,7 +523,7 @@ def _not_identified(
 ) -> Iterator[Finding]:
     if names := [one.name for one in known if one.interval is None]:
         words = {"of": of, "coefficients": listed(names), "instead": instead}
-        yield Finding("not identified", axis, curve, names=words)
+        yield Finding("not identified", axis, curve, words=words)
 
 
 def _on_points(result: AxisResult) -> Iterator[Finding]:
@@ -604,7 +531,7 @@ def _on_points(result: AxisResult) -> Iterator[Finding]:
     for quantity in ("V_ss", "Tau"):
         error = relative_error((p for p in result.points if p.quantity == quantity), "model")
         if error > _CONTRADICTION:
-            yield Finding("points differ", result.axis.name, names={"quantity": quantity}, numbers={"error": error})
+            yield about("", "points differ", result.axis.name, quantity=quantity, error=error)
 
 
 def _on_forces(identification: Identification) -> Iterator[Finding]:
@@ -616,7 +543,7 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
     for (curve, file), ratios in by_table.items():
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
-            yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+            yield Finding("thrust tables", curve=curve, file=file, words={"ratio": significant(ratio, 2)})
 
 
 def may_rock(folder: Folder, axis: Axis) -> bool:
@@ -649,10 +576,10 @@ def _on_vehicle(identification: Identification) -> Iterator[Finding]:
     volts = identification.folder.voltages
     if volts and identification.curves and vehicle.layout.voltage is None:
         ends = dict.fromkeys(f"{end:.3g}" for end in usual_range(np.concatenate(volts)))
-        yield Finding("idle voltage", names={"volts": " to ".join(ends)})
+        yield about("", "idle voltage", volts=" to ".join(ends))
     if description and description.assumed:
         names = {"base": description.base_name, "reason": description.assumed, "mass": f"{vehicle['m_rov']:.3g} kg"}
-        yield Finding("assumed vehicle", names=names)
+        yield Finding("assumed vehicle", words=names)
 
 
 _REMEDIES = {
@@ -682,7 +609,7 @@ def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
         kind = "small disturbance"
     since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
     names = {"what": what, "since": since, "cause": d.cause, "remedy": _REMEDIES.get(d.cause, "")}
-    return Finding(kind, axis, file=d.file, names=names)
+    return Finding(kind, axis, file=d.file, words=names)
 
 
 def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
@@ -690,8 +617,8 @@ def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
     for axis in (form.axis for form in own.layout.axes if own.layout.thrusters):
         largest, most = wrench.strongest(axis), own.strongest(axis)
         if largest > _BEYOND * most:
-            names = {"largest": f"{largest:.3g} {axis.load}", "most": f"{most:.3g} {axis.load}"}
-            yield Finding("beyond thrusters", axis.name, names=names)
+            sizes = {"largest": f"{largest:.3g} {axis.load}", "most": f"{most:.3g} {axis.load}"}
+            yield about("", "beyond thrusters", axis.name, **sizes)
 
 
 def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
@@ -702,7 +629,7 @@ def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
         values = np.abs(one.commands.at(one.commands.rows))
         share = float(np.mean(np.any(values >= _FULL, axis=1)))
         if share > _SATURATED:
-            yield Finding("saturation", file=one.file, numbers={"share": share})
+            yield about(one.file, "saturation", share=share)
     layout = identification.vehicle.layout
     if all(map(layout.has, COUPLED_AXES)) and not layout.coupled:
         surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in one.channels) for a in COUPLED_AXES)
@@ -716,7 +643,7 @@ def _structure(one: Structure) -> Finding | None:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
     odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
-    return Finding(one.kind, names={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
+    return Finding(one.kind, words={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
 
 
 def _logging(one: Logging) -> Finding | None:
@@ -728,11 +655,8 @@ def _logging(one: Logging) -> Finding | None:
     if low <= 0.0 <= high:
         return None
     is_usual = high >= -1.5 * one.interval and low <= 0.5 * one.interval
-    names = {"beside": "before" if one.offset < 0.0 else "after"}
-    if is_usual:
-        return Finding("logging", file=one.file, names=names, numbers={"time": _rounded(one.offset)})
-    numbers = {"time": _rounded(one.offset), "interval": _rounded(one.interval)}
-    return Finding("clock", file=one.file, names=names, numbers=numbers)
+    kind, beside = "logging" if is_usual else "clock", "before" if one.offset < 0.0 else "after"
+    return about(one.file, kind, beside=beside, time=_rounded(one.offset), interval=_rounded(one.interval))
 
 
 def _rounded(time: float) -> float:

@@ -214,9 +214,9 @@ def _left_out(description: Description, tested: TestContents, layout: Layout) ->
     for name in description.axes:
         if name not in layout.by_name:
             drag = ", ".join(AXES[name].coefficient(key) for key in ("a_d", "b_d"))
-            yield Finding("axis left out", axis=name, names={"drag": drag})
+            yield Finding("axis left out", axis=name, words={"drag": drag})
     if layout.fins:
-        yield Finding("fins not fitted", names={"fins": listed([fin.name for fin in layout.fins])})
+        yield Finding("fins not fitted", words={"fins": listed([fin.name for fin in layout.fins])})
     if description.layout.coupled and not layout.coupled:
         yield Finding("not coupled")
     for name, (file, _) in tested.thrust.items():

@@ -101,7 +101,8 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells."""
+    """The reason, with `size`, the value with two digits, `share`, the value in percent, `known`, how well a number is
+    known whose half-width the value is, and what `names` tells."""
     names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
@@ -142,6 +143,13 @@ def _reach(e: Evidence) -> dict[str, str]:
     if score < 0.0:
         return {"reach": "are worse than no change"}
     return {"reach": f"reach {percent(score)} of the way from no change (0%) to the noise of the sensors (100%)"}
+
+
+def _known(half_width: float) -> str:
+    """Return how well a number is known, as the end of a sentence, by the relative half-width of its interval."""
+    if half_width > 1.0:
+        return "not known: its interval is wider than its value"
+    return f"known to no better than {percent(half_width)}"
 
 
 RULES = (
@@ -217,14 +225,14 @@ RULES = (
         lambda e: e.half_width("steady"),
         0.15,
         0.3,
-        "A steady velocity is known to no better than {share}.",
+        "A steady velocity is {known}.",
     ),
     Rule(
         "the same of times and stopping distances",
         lambda e: e.half_width("rise", "stop"),
         0.3,
         None,
-        "A time or a stopping distance is known to no better than {share}.",
+        "A time or a stopping distance is {known}.",
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
@@ -291,7 +299,7 @@ def verdict(e: Evidence) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
-        rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
+        rule.sentence.format(size=significant(value, 2), share=percent(value), known=_known(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]

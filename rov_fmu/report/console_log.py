@@ -9,7 +9,7 @@ from rov_fmu.identify.inspection.inspected import Inspected
 from rov_fmu.io.messages import first_of, print_message
 from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import Inspection, Row
 
 _LEVELS = "▁▂▃▄▅▆▇█"
@@ -73,7 +73,7 @@ def unrecognised(inspection: Inspection) -> list[str]:
 
 def notes(inspection: Inspection) -> list[str]:
     """Return what headers are taken for, and what was left out, taken or doubted."""
-    told = (line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings, SENTENCES))
+    told = (line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings))
     return [*(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()), *told]
 
 

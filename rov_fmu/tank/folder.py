@@ -160,7 +160,7 @@ class Folder:
             commanded = {name for one in largest for name, most in one.items() if most}
             told = [f"{name} = {full[name]:.3g} {loads[name]}" for name in full if name in loads.keys() & commanded]
             inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
-            self.findings.append(Finding("wrench", names={"full": listed(told) or "there is none", "inputs": inputs}))
+            self.findings.append(Finding("wrench", words={"full": listed(told) or "there is none", "inputs": inputs}))
 
     def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""

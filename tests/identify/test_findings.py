@@ -15,7 +15,6 @@ from rov_fmu.identify.findings import (
     by_heading,
     extrapolated,
     findings_of,
-    heading,
     next_tests,
     repairs,
     sentences,
@@ -461,10 +460,10 @@ def test_a_log_that_disagrees_with_the_others_is_repaired_before_anything_is_mea
 
 def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     kinds = [finding.kind for finding in example().findings]
-    headings = [*map(heading, example().findings)]
+    headings = [SEVERITY[finding.kind] for finding in example().findings]
     assert kinds[:2] == ["worse than no change", "unknown force"]
     assert headings == sorted(headings, key=["Warnings", "Doubts", "Facts"].index)
-    lost = Finding("missing column", file=FILES[0], names={"column": "t"})
+    lost = Finding("missing column", file=FILES[0], words={"column": "t"})
     result = without_findings()
     late = told(replace(result, folder=replace(result.folder, findings=[lost])))
     assert [finding.kind for finding in late.findings].index("missing column") == 1

@@ -13,7 +13,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import facts, warnings
+from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification, coverage_of
@@ -129,7 +129,8 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     }
     assert of_tables.vehicle.provenance
     assert of_tables.vehicle.measured_from == "tank tests"
-    assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
+    groups = by_heading(of_tables.findings)
+    assert (made.warnings, made.facts) == ((*groups["Warnings"], *groups["Doubts"]), groups["Facts"])
     assert vehicle.command_range == (0.2, 0.8)
 
 

@@ -203,7 +203,7 @@ def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
     found = identify(load_tests(tmp_path))
     assert not {"beyond thrusters", "saturation"} & {finding.kind for finding in findings_of(found)}
     (wrench,) = (finding for finding in found.findings if finding.kind == "wrench")
-    assert wrench.names["full"].count(" = ") == 2, "only of the forces that the logs command"
+    assert str(wrench.words["full"]).count(" = ") == 2, "only of the forces that the logs command"
     for answer in found.axes[0].answers:
         thrust = (QUADRATIC_THRUST * abs(answer.command) + LINEAR_THRUST) * abs(answer.command)
         force = (2.0 * np.cos(TOE) + np.sin(TILT)) * thrust

@@ -13,7 +13,7 @@ from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, has_wrench, read_description
-from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
+from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
 from rov_fmu.tank.inspection.draft import LikelyVehicle, completed, dives, draft, lacking, likely_vehicle
 from rov_fmu.tank.inspection.headers import TableHeaders, headers_of_tables
@@ -148,8 +148,8 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     warnings = [finding for finding in findings if finding not in notes]
     inspected = Inspected(
         logs=inspections,
-        warnings=[*sentences(warnings, SENTENCES), *described.mistakes],
-        notes=sentences(notes, SENTENCES),
+        warnings=[*sentences(warnings), *described.mistakes],
+        notes=sentences(notes),
         path=place,
         own=own,
         text=lacks,
