@@ -105,10 +105,12 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 correlation=others,
             )
     validity = tests.description.tables.validity
-    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.inputs))
+    made = Provenance(
+        tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.folder.inputs)
+    )
     vehicle = replace(
         rov,
-        **dict(tests.head),
+        **dict(tests.description.tables.vehicle or ()),
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},

@@ -88,8 +88,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     found = Identification(
-        folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
-        inputs=tests.inputs,
+        folder=replace(tests.folder, findings=[*tests.folder.findings, *beyond_thrusters(vehicle, of_file)]),
         vehicle=of_file,
         against=against,
         axes=tuple(axes),
@@ -136,7 +135,7 @@ def _axis(
         )
     unknown = [d for d in slow if d.axis is axis or d.kind == "slow gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
-    misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
+    misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
@@ -180,11 +179,11 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     description = tests.description
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
     shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
-    lacking = [AXES[f.axis] for f in tests.findings if f.kind in ("axis left out", "axis not pushed")]
+    lacking = [AXES[f.axis] for f in tests.folder.findings if f.kind in ("axis left out", "axis not pushed")]
     for axis in (*(one.axis for one in vehicle.layout.axes if one.axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known
         told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
-        if axis.name in tests.tested.axes:
+        if axis.name in tests.axes:
             told = "no test changes it"
         elif axis in shown:
             told = "nothing in the logs drives it"

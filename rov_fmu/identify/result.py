@@ -405,8 +405,6 @@ class Identification:
 
     folder: Folder
     """The tests, with rov.toml."""
-    inputs: Mapping[str, str]
-    """The SHA3-256 of every file that was read, by its name."""
     vehicle: Vehicle
     against: Vehicle | None
     """The vehicle to compare with."""

@@ -147,7 +147,7 @@ def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], No
     assert [line.partition(" ")[0] for line in lines] == ["m_rov", "I_r"]
     path.write_text(draft.replace('value = "?"', "value = 20.0"), encoding="utf-8")
     tests = load_tests(tmp_path)
-    assert tests.tested.logs == axes.split()
+    assert tests.logged == axes.split()
     (log,) = tests.folder.logs
     assert log.commands
     places = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]

@@ -152,7 +152,6 @@ def without_findings() -> Identification:
     inputs = {"rov.toml": "0" * 64, FILES[0]: "1" * 64, FILES[1]: "2" * 64, "thrust_top.csv": "3" * 64}
     return Identification(
         folder=Folder(Path("pond"), NO_ROV_FILE, logs=[*map(log, FILES)], inputs=inputs, findings=findings, rows=rows),
-        inputs=inputs,
         vehicle=vehicle,
         against=None,
         axes=axes,

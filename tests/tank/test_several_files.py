@@ -44,10 +44,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def read(folder: Path) -> tuple[tuple[Finding, ...], Log]:
+def read(folder: Path) -> tuple[list[Finding], Log]:
     tests = load_tests(folder)
     (log,) = tests.folder.logs
-    return tests.findings, log
+    return tests.folder.findings, log
 
 
 def mistakes(folder: Path) -> list[str]:
@@ -67,7 +67,13 @@ def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
         assert channel.count == count
         assert channel.values == pytest.approx(start + rate * (channel.time - 1000.0), abs=1e-6)
     assert commanded(log, "5", 1000.0 + TIME) == pytest.approx(np.where(TIME > 0.999, 0.5, 0.0))
-    assert load_tests(folder).inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+    assert load_tests(folder).folder.inputs.keys() == {
+        "rov.toml",
+        "bluerov2",
+        "commands.csv",
+        "depth.csv",
+        "heading.csv",
+    }
 
 
 def test_the_page_that_flies_joins_the_files_of_a_dive(folder: Path) -> None:
