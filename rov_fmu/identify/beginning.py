@@ -13,8 +13,8 @@ from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import (
     SampledLog,
     changes,
@@ -56,7 +56,7 @@ QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
 
 
 def load_tests(
-    folder: Path,
+    path: Path,
     check_inputs: Callable[[Sequence[Path]], None] = lambda _: None,
     base: Path | None = None,
     files: Collection[Path] = (),
@@ -67,58 +67,57 @@ def load_tests(
     `check_inputs` is called with every file that the identification reads, before any test is read. `base` is the
     vehicle to begin from, in place of that of rov.toml, and `draft` stands in for rov.toml itself.
     """
-    found = read_folder(folder, check_inputs, base, files, draft)
-    description = found.rov_file.description
+    folder = read_folder(path, check_inputs, base, files, draft)
+    description = folder.rov_file.description
     # A log that could not be read may test the axis in its name.
-    logged = dict.fromkeys(axis for kind, axis in found.files if kind == "log" and axis and found.mistakes)
+    logged = dict.fromkeys(axis for kind, axis in folder.files if kind == "log" and axis and folder.mistakes)
     of_logs, useless = list[Finding](), list[str]()
-    for log in found.logs:
-        axes, told = driven_axes(log, layout_of(log, found))
+    for log in folder.logs:
+        axes, told = driven_axes(log, layout_of(log, folder))
         told = told or ([] if axes else [Finding("nothing measured", file=log.file)])
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
-        useless.append(_refusal(folder, log, told))
-    tested = axes_of(found, logged)
+        useless.append(_refusal(path, log, told))
+    tested = axes_of(folder, logged)
     useless = [] if tested else useless
-    if not found.astern("thrust"):
-        found.mistakes += useless
-    found.mistakes += _without_force(found)
+    if not folder.astern("thrust"):
+        folder.mistakes += useless
+    folder.mistakes += _without_force(folder)
     tests = None
     # If no axis was found, it may be in a file that could not be read.
-    if description and (tested or not found.mistakes):
-        tests = narrowed(found, description, [*logged], useless)
-    found.rov_file_mistakes += _wrong_priors(found)
-    if mistakes := [*found.rov_file_mistakes, *found.mistakes]:
-        raise (DataFileError if found.mistakes else VehicleFileError)(*mistakes)
+    if description and (tested or not folder.mistakes):
+        tests = narrowed(folder, description, [*logged], useless)
+    folder.rov_file_mistakes += _wrong_priors(folder)
+    if mistakes := [*folder.rov_file_mistakes, *folder.mistakes]:
+        raise (DataFileError if folder.mistakes else VehicleFileError)(*mistakes)
     assert tests
-    path = tests.description.tables.base
-    of_base = {tests.description.base_name: file_hash(path)} if path else {}
-    own = {name: digest for name, digest in found.inputs.items() if name == ROV_FILE}
-    found.inputs = own | of_base | found.inputs
-    if not path:
-        found.findings[:] = _not_pushed(found.findings, of_logs)
-    found.findings += [*of_logs, *_driven_together(found)]
+    of_base = {tests.description.base_name: file_hash(own)} if (own := tests.description.tables.base) else {}
+    of_rov = {name: digest for name, digest in folder.inputs.items() if name == ROV_FILE}
+    folder.inputs = of_rov | of_base | folder.inputs
+    if not of_base:
+        folder.findings[:] = _not_pushed(folder.findings, of_logs)
+    folder.findings += [*of_logs, *_driven_together(folder)]
     return tests
 
 
-def _wrong_priors(found: Folder) -> list[str]:
+def _wrong_priors(folder: Folder) -> list[str]:
     """Return a line for each key of [priors] that no prior has, and for each noise that is said to be exact."""
     lines = []
-    for key, deviation in found.rov_file.tables.priors.items():
+    for key, deviation in folder.rov_file.tables.priors.items():
         if key not in PRIORS:
             lines.append(key_line(f"priors.{key}", f"unknown{only(key, PRIORS)}"))
         elif key in _NEVER_EXACT and deviation == 0.0:
             reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
             lines.append(key_line(f"priors.{key} = 0", reason))
-    return lines_on(found.path / ROV_FILE, lines)
+    return lines_on(folder.path / ROV_FILE, lines)
 
 
-def _without_force(found: Folder) -> Iterator[str]:
+def _without_force(folder: Folder) -> Iterator[str]:
     """Yield a line for each thrust curve whose largest measured force is 0."""
-    for (kind, curve), rows in found.rows.items():
+    for (kind, curve), rows in folder.rows.items():
         largest = max((row.value * np.sign(row.command) for row in rows), default=0.0)
         if kind == "thrust" and largest < _LEAST_FORCE:
-            yield f"{found.path}: thrust_{curve}*.csv: must give a force above 0, not {largest:.3g} N at most"
+            yield f"{folder.path}: thrust_{curve}*.csv: must give a force above 0, not {largest:.3g} N at most"
 
 
 def _refusal(folder: Path, log: Log, told: Sequence[Finding]) -> str:
@@ -139,11 +138,11 @@ def _not_pushed(findings: Sequence[Finding], of_logs: Sequence[Finding]) -> Iter
         yield Finding("axis not pushed", finding.axis) if is_one else finding
 
 
-def _driven_together(found: Folder) -> Iterator[Finding]:
+def _driven_together(folder: Folder) -> Iterator[Finding]:
     """Yield a finding for each axis that a log measures, but that the thrusters drive only together with others."""
-    if found.layout and found.logged:
-        for log in found.logs:
-            for axis in (form.axis for form in found.layout.axes if not found.logged.has(form.axis)):
+    if folder.layout and folder.logged:
+        for log in folder.logs:
+            for axis in (form.axis for form in folder.layout.axes if not folder.logged.has(form.axis)):
                 is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
                 if is_measured and not log.axis and axis not in (ROLL, PITCH):
                     yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
@@ -167,7 +166,7 @@ def layout_of(log: Log, of: Folder | Layout) -> Layout:
 # ---- The prior -------------------------------------------------------------------------------------------------------
 
 
-def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
+def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     deviations = tests.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
@@ -197,7 +196,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
     moved = {form.axis for one in logs for form in one.layout.axes}
-    known = Beginning(
+    known = Prior(
         vehicle.layout,
         values,
         fitted,
@@ -245,13 +244,13 @@ def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
 
 def _thrust_errors(tests: Tests, curves: Sequence[Curve]) -> dict[str, float]:
     """Return the relative standard error of the forces of a curve whose a_t rov.toml gives with an interval."""
-    found = {}
+    errors = {}
     for curve in curves:
         quantity = tests.description.known.get(curve.coefficient("a_t"))
         if quantity and quantity.interval:
             low, high = quantity.interval
-            found[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
-    return found
+            errors[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
+    return errors
 
 
 def _is_fitted(axis: Axis, tests: Tests) -> bool:
@@ -267,9 +266,7 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
     """
     base, deviations = tests.base, tests.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
-    vehicle = Vehicle(
-        replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
-    )  # a log tells thrusters' commands
+    vehicle = Vehicle(replace(vehicle.layout, mix={}), vehicle.coefficients)  # a log tells thrusters' commands
     centres = dict.fromkeys(_centres(vehicle.layout, shown), 0.0)
     restoring = tuple(key for key in RESTORING if key in {*vehicle.layout.restoring, *centres})
     layout = replace(vehicle.layout, restoring=restoring)
@@ -354,12 +351,12 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
 
     start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), _SQUARE, 0.0]
     fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):
         if not end or astern:
             for key, share in (("a_t", fit[1]), ("b_t", 1.0 - fit[1])):
-                found[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
-    return found
+                values[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
+    return values
 
 
 def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:

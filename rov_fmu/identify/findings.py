@@ -34,11 +34,11 @@ from rov_fmu.identify.result import (
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
-from rov_fmu.tank import findings
 from rov_fmu.tank.arrays import rms, usual_range
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import MISFITS, Finding, Heading, about
+from rov_fmu.tank.findings import HEADINGS, MISFITS, Finding, Heading, about
+from rov_fmu.tank.findings import sentences as sentences_by
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
@@ -172,7 +172,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
 }
 _FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip", *MISFITS)
 """The warnings that stand first: wrong predictions, and wrong or missing data."""
-_FORMS = {heading: {**forms, **findings.HEADINGS[heading]} for heading, forms in _OWN.items()}
+_FORMS = {heading: {**forms, **HEADINGS[heading]} for heading, forms in _OWN.items()}
 SEVERITY: Mapping[str, Heading] = {kind: heading for heading, forms in _FORMS.items() for kind in forms}
 """The heading of each kind."""
 SENTENCES = {kind: form for forms in _FORMS.values() for kind, form in forms.items()}
@@ -181,15 +181,15 @@ _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
 """The kinds in the order in which they are told, the warnings first."""
 
 
-def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
+def sentences(some: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
     """Return the sentences of findings, if given only of those of a kind; similar findings share one sentence."""
-    return findings.sentences((one for one in found if kind in ("", one.kind)), SENTENCES)
+    return sentences_by((one for one in some if kind in ("", one.kind)), SENTENCES)
 
 
-def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
+def by_heading(findings: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     """Return the sentences of findings of all axes by their headings: the warnings of all axes come first."""
     groups: dict[Heading, list[Finding]] = {name: [] for name in _FORMS}
-    for finding in found:
+    for finding in findings:
         groups[SEVERITY[finding.kind]].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
 
@@ -221,35 +221,35 @@ def told(identification: Identification) -> Identification:
 
 def findings_of(identification: Identification) -> tuple[Finding, ...]:
     """Return all findings of an identification with those about reading, the most important kinds first."""
-    found = [*identification.folder.findings]
+    findings = [*identification.folder.findings]
     for result in identification.axes:
-        found += [*_on_predictions(result), *_on_coefficients(identification, result)]
-        found += [*_on_points(result)]
+        findings += [*_on_predictions(result), *_on_coefficients(identification, result)]
+        findings += [*_on_points(result)]
         if result.verdict.word == "do not use":
-            found.append(Finding("do not use", result.axis.name))
+            findings.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
-            found.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
+            findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
         if may_rock(identification.folder, result.axis):
-            found.append(Finding("rocking", result.axis.name))
+            findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
-        found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
+        findings += _not_identified(known, f"{curve} thrust", curve=curve)
+    findings += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
     if identification.agreement > DISAGREEMENT:
-        found.append(Finding("second start"))
-    found += [
+        findings.append(Finding("second start"))
+    findings += [
         _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
     ]
     for log_of in identification.folder.logs:
-        found += _on_log(identification, log_of)
-    found += filter(None, map(_logging, identification.logging))
+        findings += _on_log(identification, log_of)
+    findings += filter(None, map(_logging, identification.logging))
     for sensor in identification.sensors:
         if sensor.outliers > _MOST_OUTLIERS:
-            found.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
-    found += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
-    found += filter(None, map(_structure, identification.structures))
+            findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
+    findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
+    findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
-        found.append(about(slip.file, "slip", quantity=slip.quantity, words=slip.words))
-    return tuple(sorted(found, key=lambda one: _ORDER.index(one.kind)))
+        findings.append(about(slip.file, "slip", quantity=slip.quantity, words=slip.words))
+    return tuple(sorted(findings, key=lambda one: _ORDER.index(one.kind)))
 
 
 def name_of(p: Prediction) -> str:
@@ -409,7 +409,8 @@ def extrapolated(identification: Identification) -> list[str]:
 
 def with_lag(identification: Identification) -> list[str]:
     """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
-    told = [f"{with_error(one.lagged, 's')} ({one.axis.name})" for one in identification.axes if one.lagged]
+    halves = filter(None, (answer_at(one, 0.5) for one in identification.axes))
+    told = [f"{with_error(half.lagged, 's')} ({half.axis.name})" for half in halves if half.lagged]
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
@@ -427,17 +428,17 @@ def _ranges(identification: Identification) -> Iterator[Range]:
 
     The ends have three digits, and an end that is next to nothing is no range.
     """
-    found: dict[str, list[float]] = {}
+    ends_of: dict[str, list[float]] = {}
     for one in identification.folder.logs:
         for channel in one.channels:
             if not channel.unused and (name := _variable(channel.quantity)):
                 ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                found.setdefault(name, []).extend(ends)
+                ends_of.setdefault(name, []).extend(ends)
     for result in identification.axes:
         measured = [p.measured for p in result.points if p.quantity == "V_ss"]
         if measured:
-            found.setdefault(result.axis.velocity, []).extend(measured)
-    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found.items()}
+            ends_of.setdefault(result.axis.velocity, []).extend(measured)
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
     if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
         yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
         yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
@@ -592,24 +593,29 @@ _REMEDIES = {
 """What each cause means, or what takes it into account."""
 
 
+def acting(d: Disturbance) -> str:
+    """Return what a disturbance does in its log as a sentence without the file: `an unknown slow force of ... acts`."""
+    slow, is_turn = KINDS[d.kind].slow, d.axis is not None and d.axis.is_rotation
+    assert slow
+    return slow.sentence.format(
+        unknown="a" if d.cause else "an unknown",
+        push="torque" if is_turn else "force",
+        thrust="torque" if is_turn else "thrust",
+        size=percent(d.value) if d.changes_thrust else size_in_words(d.value, d.unit),
+        share=percent(d.share),
+    )
+
+
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
-    axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.value, d.unit), percent(d.share)
-    push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
-    where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
-    kind, what = {
-        "slow gain": ("change of thrust", f"the thrust changes slowly by {percent(d.value)} (RMS)"),
-        "slow velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
-        "slow force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
-    }[d.kind]
-    if d.cause:
-        kind = "explained disturbance"
-    elif d.share < MOST_UNKNOWN:
-        kind = "small disturbance"
+    slow = KINDS[d.kind].slow
+    assert slow
+    kind = "explained disturbance" if d.cause else slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
+    where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
+    what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
     since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
-    names = {"what": what, "since": since, "cause": d.cause, "remedy": _REMEDIES.get(d.cause, "")}
-    return Finding(kind, axis, file=d.file, words=names)
+    remedy = _REMEDIES.get(d.cause, "")
+    return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since, cause=d.cause, remedy=remedy)
 
 
 def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
@@ -667,13 +673,11 @@ def _rounded(time: float) -> float:
 def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]:
     """Yield the fact about an effect that is kept, after the doubt about one of an unusual size."""
     of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
-    names = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name, "note": ""}
-    names["value"] = in_words(effect.value, effect.interval, effect.unit)
+    words = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name}
+    words["value"] = in_words(effect.value, effect.interval, effect.unit)
     if effect.is_unusual:
-        yield Finding("unusual effect", "", "", "", names)
-    if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
-        names["note"] = KINDS[effect.kind].why_not
-    if scale := assumed_scale(identification, effect.unit):
-        names["note"] += f", {scale}"
+        yield Finding("unusual effect", words=words)
+    scale = assumed_scale(identification, effect.unit)
+    words["note"] = KINDS[effect.kind].why_not + (f", {scale}" if scale else "")
     axis = of if of in AXES else ""
-    yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)
+    yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, words)

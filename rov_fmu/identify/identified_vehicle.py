@@ -19,7 +19,7 @@ from rov_fmu.equation.parts import Part
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Interval
@@ -42,8 +42,6 @@ _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 _SAME = 0.1
 """The difference of J that makes no other vehicle; 1 is one unit of 2 ln of the likelihood."""
-EXACT_BAND = 0.01
-"""A dead band is never claimed to better than this command: thrust begins gradually."""
 
 
 def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coefficient]]:
@@ -200,9 +198,9 @@ def _given_the_last(covariance: Array, count: int) -> Array:
     """
     first, last = slice(count), slice(count, None)
     regression = covariance[first, last] @ np.linalg.pinv(covariance[last, last], hermitian=True)
-    found = covariance[first, first] - regression @ covariance[last, first]
-    np.fill_diagonal(found, np.maximum(np.diag(found), 0.0))
-    return np.asarray(found)
+    conditional = covariance[first, first] - regression @ covariance[last, first]
+    np.fill_diagonal(conditional, np.maximum(np.diag(conditional), 0.0))
+    return np.asarray(conditional)
 
 
 METHOD = (
@@ -263,14 +261,14 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
         coefficients, misfits = _in_file(posterior, fit, z), [one.misfit for one in measured(z)]
         return np.vstack([*(np.broadcast_to(coefficients[name], z.shape[1]) for name in names), *misfits])
 
-    found, covariance, prior = posterior.numbers(values)
+    means, covariance, prior = posterior.numbers(values)
     first, own = len(names), slice(len(names))
     for one in measured(posterior.z[:, None]):
         here = slice(first, first := first + len(one.misfit))
         places = [names.index(name) for name in one.coefficients]
-        mean_square = float(np.mean(found[here] ** 2 + np.diag(covariance[here, here])))
+        mean_square = float(np.mean(means[here] ** 2 + np.diag(covariance[here, here])))
         covariance[np.ix_(places, places)] += one.covariance(mean_square)
-    return _Numbers(found[own], covariance[own, own], prior[own, own])
+    return _Numbers(means[own], covariance[own, own], prior[own, own])
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
@@ -292,7 +290,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         if name in base or not key.endswith(REVERSE) or key not in EFFECT_OF:
             return True
         effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
-        return (effect, of) in present or (effect == "reverse thrust" and fit.known.measured_curves.get(of, False))
+        return (effect, of) in present
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
@@ -304,8 +302,6 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=tests.vehicle.layout.mix,
-        pulse=tests.vehicle.layout.pulse,
-        has_dead_time=tests.vehicle.layout.has_dead_time,
     )
 
 

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify.findings import acting
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     LEAST_TESTED,
@@ -126,15 +127,10 @@ class Rule:
 
 
 def _largest(e: Evidence) -> dict[str, str]:
-    """Return what the largest unknown disturbance is, as a sentence without its size."""
+    """Return what the largest unknown disturbance does, and its file."""
     largest = max(e.unknown, key=lambda d: d.share)
-    is_turn = largest.axis is not None and largest.axis.is_rotation
-    what = {
-        "slow gain": "The thrust changes for an unknown reason by {}",
-        "slow force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
-        "slow velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
-    }
-    return {"what": what[largest.kind].format(percent(largest.share)), "file": largest.file}
+    what = acting(largest)
+    return {"what": what[:1].upper() + what[1:], "file": largest.file}
 
 
 def _reach(e: Evidence) -> dict[str, str]:

@@ -484,7 +484,7 @@ def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: 
         "yaw: known less well, because it is never commanded alone, only together with surge",
         "speeds beyond the strongest commands, 30% in surge and 30% in yaw, are extrapolated",
         "dive.csv: the log has momentary commands: about 85% of the heave command is lost between its rows (10 per",
-        "forces are relative to an assumed thrust",
+        "t200 thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust",
     ):
         assert f"- {words}" in told
     still = [np.where(time < 20.0, 0.3, 0.0) for _ in range(4)] + [np.zeros(400)] * 2
@@ -507,7 +507,7 @@ def test_a_log_of_one_axis_commands_it_alone_and_measured_forces_are_not_assumed
     assert "speeds beyond the strongest commands, 50% in surge, are extrapolated" in told
     assert not re.search("alone|assumed thrust", told)
     (tmp_path / "thrust_top.csv").unlink()
-    assert "unless thrust_top.csv has measured ones" in inspect(option="")[0]
+    assert "write command and force into thrust_top.csv" in inspect(option="")[0]
 
 
 def test_the_page_of_logs_has_a_picture_of_each(tmp_path: Path) -> None:

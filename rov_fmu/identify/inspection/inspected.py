@@ -71,11 +71,11 @@ class Inspected:
         """The logs with commands, each with the channels of the files without commands that belong to it."""
         by_name = {one.path.name: one.log for one in self.logs if one.log}
         joined = {files[0]: files for files in dives(self.logs)}
-        found = []
+        logs = []
         for one in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
             parts = [by_name[name] for name in joined.get(one.file, ()) if by_name.get(name)]
-            found.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
-        return found
+            logs.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
+        return logs
 
     @property
     def undetermined(self) -> list[str]:
