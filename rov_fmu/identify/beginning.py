@@ -56,7 +56,7 @@ QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
 
 
 def load_tests(
-    path: Path,
+    folder: Path,
     check_inputs: Callable[[Sequence[Path]], None] = lambda _: None,
     base: Path | None = None,
     files: Collection[Path] = (),
@@ -67,36 +67,36 @@ def load_tests(
     `check_inputs` is called with every file that the identification reads, before any test is read. `base` is the
     vehicle to begin from, in place of that of rov.toml, and `draft` stands in for rov.toml itself.
     """
-    folder = read_folder(path, check_inputs, base, files, draft)
-    description = folder.rov_file.description
+    contents = read_folder(folder, check_inputs, base, files, draft)
+    description = contents.rov_file.description
     # A log that could not be read may test the axis in its name.
-    logged = dict.fromkeys(axis for kind, axis in folder.files if kind == "log" and axis and folder.mistakes)
+    logged = dict.fromkeys(axis for kind, axis in contents.files if kind == "log" and axis and contents.mistakes)
     of_logs, useless = list[Finding](), list[str]()
-    for log in folder.logs:
-        axes, told = driven_axes(log, layout_of(log, folder))
+    for log in contents.logs:
+        axes, told = driven_axes(log, layout_of(log, contents))
         told = told or ([] if axes else [Finding("nothing measured", file=log.file)])
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
-        useless.append(_refusal(path, log, told))
-    tested = axes_of(folder, logged)
+        useless.append(_refusal(folder, log, told))
+    tested = axes_of(contents, logged)
     useless = [] if tested else useless
-    if not folder.astern("thrust"):
-        folder.mistakes += useless
-    folder.mistakes += _without_force(folder)
+    if not contents.astern("thrust"):
+        contents.mistakes += useless
+    contents.mistakes += _without_force(contents)
     tests = None
     # If no axis was found, it may be in a file that could not be read.
-    if description and (tested or not folder.mistakes):
-        tests = narrowed(folder, description, [*logged], useless)
-    folder.rov_file_mistakes += _wrong_priors(folder)
-    if mistakes := [*folder.rov_file_mistakes, *folder.mistakes]:
-        raise (DataFileError if folder.mistakes else VehicleFileError)(*mistakes)
+    if description and (tested or not contents.mistakes):
+        tests = narrowed(contents, description, [*logged], useless)
+    contents.rov_file_mistakes += _wrong_priors(contents)
+    if mistakes := [*contents.rov_file_mistakes, *contents.mistakes]:
+        raise (DataFileError if contents.mistakes else VehicleFileError)(*mistakes)
     assert tests
     of_base = {tests.description.base_name: file_hash(own)} if (own := tests.description.tables.base) else {}
-    of_rov = {name: digest for name, digest in folder.inputs.items() if name == ROV_FILE}
-    folder.inputs = of_rov | of_base | folder.inputs
+    of_rov = {name: digest for name, digest in contents.inputs.items() if name == ROV_FILE}
+    contents.inputs = of_rov | of_base | contents.inputs
     if not of_base:
-        folder.findings[:] = _not_pushed(folder.findings, of_logs)
-    folder.findings += [*of_logs, *_driven_together(folder)]
+        contents.findings[:] = _not_pushed(contents.findings, of_logs)
+    contents.findings += [*of_logs, *_driven_together(contents)]
     return tests
 
 
