@@ -10,7 +10,7 @@ from math import floor, inf, isfinite, log, log10
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
-from rov_fmu.equation.parts import EVERY_COMMAND, Range
+from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
@@ -35,13 +35,11 @@ from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank.arrays import rms, usual_range
-from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import HEADINGS, MISFITS, Finding, Heading, about
 from rov_fmu.tank.findings import sentences as sentences_by
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
-from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _CONTRADICTION = 0.15
@@ -64,8 +62,6 @@ STOPPING = (
 _ASIDE = 0.2
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
 which gives it almost half of its full speed. A symmetric pair leaves less, if its thrust astern is above 60 %."""
-_WITHOUT_OUTLIERS = (0.005, 0.995)
-"""The quantiles between which a quantity counts as tested."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _SURE = 0.99
@@ -209,7 +205,7 @@ def told(identification: Identification) -> Identification:
     }
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
-    layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
+    layout = replace(vehicle.layout, identified=tuple(tested_ranges(identification)))
     scale = assumed_scale(identification)
     data = vehicle.measured_from + (f" ({scale})" if scale else "")
     vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
@@ -421,38 +417,6 @@ def with_error(known: tuple[float, Interval], unit: str) -> str:
         return "-"
     words, _, _ = in_words(value, interval, unit).partition(" (")
     return f"{words} ±{percent(half_width(known), '>')}"
-
-
-def _ranges(identification: Identification) -> Iterator[Range]:
-    """Yield the range of the commands, and those of each velocity, of roll and pitch and of the depth in the tests.
-
-    The ends have three digits, and an end that is next to nothing is no range.
-    """
-    ends_of: dict[str, list[float]] = {}
-    for one in identification.folder.logs:
-        for channel in one.channels:
-            if not channel.unused and (name := _variable(channel.quantity)):
-                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                ends_of.setdefault(name, []).extend(ends)
-    for result in identification.axes:
-        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
-        if measured:
-            ends_of.setdefault(result.axis.velocity, []).extend(measured)
-    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
-    if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
-        yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
-        yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
-
-
-def _variable(quantity: Quantity) -> str:
-    """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
-    if quantity.axis is None:
-        return ""
-    return quantity.axis.velocity if quantity.is_velocity else _POSITIONS.get(quantity.axis, "")
-
-
-_POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta"}
-"""The variables of the depth and of the angles from the level."""
 
 
 def size_in_words(value: float, unit: str) -> str:

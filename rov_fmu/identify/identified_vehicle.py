@@ -13,19 +13,20 @@ from typing import Any
 import numpy as np
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import REVERSE
+from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Part
+from rov_fmu.equation.parts import EVERY_COMMAND, Part, Range
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
-from rov_fmu.identify.result import Coefficient, Interval
+from rov_fmu.identify.result import Coefficient, Identification, Interval
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.description import Provenance
+from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
@@ -33,6 +34,8 @@ from rov_fmu.vehicle.writer import vehicle_text
 
 _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 """The keys of dead bands."""
+_WITHOUT_OUTLIERS = (0.005, 0.995)
+"""The quantiles between which a quantity counts as tested."""
 _DIGITS = (6, 9, 17)
 """The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1:
 more than most tests give, and few enough to be equal on every machine. The others are for very exact data."""
@@ -340,3 +343,38 @@ def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Number
     ]
     low, high = hull((vehicle[name], vehicle[name]), *ends)
     return float(max(low, declaration.minimum)), float(min(high, declaration.maximum))
+
+
+# ---- The ranges of the tests -----------------------------------------------------------------------------------------
+
+
+def tested_ranges(identification: Identification) -> Iterator[Range]:
+    """Yield the range of the commands, and those of each velocity, of roll and pitch and of the depth in the tests.
+
+    The ends have three digits, and an end that is next to nothing is no range.
+    """
+    ends_of: dict[str, list[float]] = {}
+    for one in identification.folder.logs:
+        for channel in one.channels:
+            if not channel.unused and (name := _variable(channel.quantity)):
+                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
+                ends_of.setdefault(name, []).extend(ends)
+    for result in identification.axes:
+        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
+        if measured:
+            ends_of.setdefault(result.axis.velocity, []).extend(measured)
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
+    if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
+        yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
+        yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
+
+
+def _variable(quantity: Quantity) -> str:
+    """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
+    if quantity.axis is None:
+        return ""
+    return quantity.axis.velocity if quantity.is_velocity else _POSITIONS.get(quantity.axis, "")
+
+
+_POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta"}
+"""The variables of the depth and of the angles from the level."""
