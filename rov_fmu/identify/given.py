@@ -14,6 +14,7 @@ from rov_fmu.equation.catalogue import (
     Axis,
 )
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.io.messages import lines_on, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.description import Description
@@ -127,16 +128,10 @@ def _kept_from_base(folder: Folder, description: Description, logged: Collection
             replaced |= {*map(curve.name_of, keys)}
     for form in description.layout.axes:
         name = form.axis.name
-        keys = []
-        if name in logged or name in steady:
-            keys += ["a_d", "b_d"]
-        if name in logged or steady.get(name, False):
-            keys += ["a_d_reverse", "b_d_reverse"]
-        if name in logged or name in times:
-            keys += ["beta"]
-        if name in logged:
-            keys += ["F_0"]
-        replaced |= {*map(form.name_of, keys)}
+        tests = {"log": name in logged, "steady": name in steady, "time_constant": name in times}
+        tests["astern"] = steady.get(name, False)
+        told = (kind for kind in KINDS.values() if any(tests[test] for test in kind.told_by))
+        replaced |= {form.name_of(key) for kind in told for key in kind.keys}
     return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
 
 

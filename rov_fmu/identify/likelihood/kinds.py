@@ -91,6 +91,9 @@ class Kind(Coordinate):
     """True if its number is the coefficient with the first of these keys."""
     of_axis: Callable[[Prior, VehicleAxis], Mapping[str, Any] | None] = lambda *_: None
     """What its parameter of an axis has in place of the fields above; None where the axis has no such parameter."""
+    told_by: tuple[str, ...] = ()
+    """The tests of an axis that tell it, which replace a coefficient of the base: `log`, `steady`, `astern` (steady
+    velocities of negative commands) and `time_constant`."""
     adds_input: bool = False
     """True if a vehicle with the effect has an input more."""
     is_lag: bool = False
@@ -227,6 +230,8 @@ KINDS = {
     "inertia": Kind(
         Deviation("inertia", 0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
         is_log=True,
+        keys=("beta",),
+        told_by=("log", "time_constant"),
         of_axis=_inertia,
     ),
     "quadratic drag": Kind(
@@ -235,6 +240,7 @@ KINDS = {
         ),
         keys=("a_d",),
         is_coefficient=True,
+        told_by=("log", "steady"),
         of_axis=_drag("a_d"),
         is_log=True,
     ),
@@ -244,6 +250,7 @@ KINDS = {
         ),
         keys=("b_d",),
         is_coefficient=True,
+        told_by=("log", "steady"),
         of_axis=_drag("b_d"),
         is_log=True,
     ),
@@ -251,6 +258,7 @@ KINDS = {
         Deviation("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
         "drag astern relative to drag ahead",
         keys=("a_d_reverse", "b_d_reverse"),
+        told_by=("log", "astern"),
         of_axis=_drag_astern,
         is_ratio=True,
         null=0.0,
@@ -268,6 +276,7 @@ KINDS = {
         "constant load",
         keys=("F_0",),
         is_coefficient=True,
+        told_by=("log",),
         of_axis=_load,
         null=0.0,
     ),
