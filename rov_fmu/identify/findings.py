@@ -411,12 +411,15 @@ def with_lag(identification: Identification) -> list[str]:
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:
-    """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
+    """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
+    wider than the value is not known."""
     value, interval = known
     if not 0.0 < abs(value) < inf:
         return "-"
+    if (error := half_width(known)) > 1.0:
+        return "not known"
     words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{percent(half_width(known), '>')}"
+    return f"{words} ±{error:.0%}"
 
 
 def size_in_words(value: float, unit: str) -> str:

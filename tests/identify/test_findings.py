@@ -474,7 +474,7 @@ def test_warnings_of_all_axes_come_first_and_the_gravest_of_them() -> None:
     [
         (0.62, 0.5, 0.64, "m/s", "0.62 m/s ±19%"),
         (0.5, 0.001, 0.7, "rad/s", "29 deg/s ±100%"),
-        (0.5, -0.1, 0.7, "rad", "29 deg ±>100%"),
+        (0.5, -0.1, 0.7, "rad", "not known"),
         (-0.5, -0.6, -0.4, "1", "-0.50 ±20%"),
         (0.0, 0.0, 0.0, "m", "-"),
         (np.inf, 0.0, np.inf, "m", "-"),
