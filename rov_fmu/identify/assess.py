@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.objective import TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import Answer, Interval
+from rov_fmu.identify.result import Answer
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -38,29 +38,47 @@ _DRAWS = 256
 
 
 def _responses_of(
-    vehicle: Vehicle, shapes: Shapes, axis: Axis, commands: Sequence[float], pushes: Sequence[float]
+    vehicle: Vehicle,
+    shapes: Shapes,
+    axis: Axis,
+    commands: Sequence[float],
+    pushes: Sequence[float] = (),
+    *,
+    with_lag: bool = False,
 ) -> Array:
-    """Return V_ss, Tau and the stopping distance for c commands, or pushes relative to the full one: c x 3 (x n)."""
+    """Return V_ss, Tau and the stopping distance for c commands, or pushes relative to the full one: c x 3 (x n).
+
+    `with_lag` adds the time with the lag of the thrusters.
+    """
     rest = shapes.motions(vehicle, axis, np.zeros(1))
     if not pushes:
-        return _responses(shapes.motions(vehicle, axis, np.array(commands)), rest)
+        responses = _responses(shapes.motions(vehicle, axis, np.array(commands)), rest)
+        if not with_lag:
+            return responses
+        times = modelled([TableRow("", axis, "Tau", c, 1.0, 1.0) for c in commands], vehicle, shapes)
+        return np.concatenate([responses, times[:, None]], axis=1)
     full = shapes.motions(vehicle, axis, np.ones(1)).of
     push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
     return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
 
 
 def logarithms(
-    table: Table, axis: Axis, commands: Sequence[float] = ANSWERED, pushes: Sequence[float] = ()
+    table: Table,
+    axis: Axis,
+    commands: Sequence[float] = ANSWERED,
+    pushes: Sequence[float] = (),
+    *,
+    with_lag: bool = False,
 ) -> Callable[[Array], Array]:
     """Return the function that gives ln of V_ss, Tau and the stopping distance for c commands.
 
-    It returns 3 c x n numbers for p x n coordinates.
+    It returns 3 c x n numbers for p x n coordinates, or 4 c x n `with_lag`, which adds the time with the lag.
     """
 
     def of(z: Array) -> Array:
         with np.errstate(divide="ignore", invalid="ignore"):
-            found = np.log(np.abs(_responses_of(*table.model(z), axis, commands, pushes)))
-        return found.reshape(3 * len(found), -1)
+            values = np.log(np.abs(_responses_of(*table.model(z), axis, commands, pushes, with_lag=with_lag)))
+        return values.reshape(values.shape[0] * values.shape[1], -1)
 
     return of
 
@@ -81,52 +99,27 @@ def answers(
     `least`. They are wider for commands beyond the strongest one of the tests, and contain the answers of those of
     `fits`, which lack a part of the data, that disagree with the last posterior: the difference of a fit to all data
     and of one to a part has the variance by which theirs differ (Hausman 1978, doi:10.2307/1913827).
+
+    The lag and the time without it share what the tests tell about their sum, so the interval of the time with the lag
+    is its own. Thrusters beside logs with a wrench have none: no test shows their lag.
     """
+    curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
+    with_lag = not pushes and any(curve.has_lag for curve in curves)
     sizes = np.abs(pushes or ANSWERED)
-    of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes)
+    of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes, with_lag=with_lag)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-
-    def more(posterior: Posterior) -> Array:
-        of_gain = _variance_of_gain(posterior) * np.array([1.0, 1.0, 0.0])
-        return np.asarray(of_gain + ((_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2)[:, None])
-
-    low, high = _intervals(
-        own,
-        posteriors,
-        lambda table: logarithms(table, axis, pushes=pushes),
-        more,
-        fits,
-        np.array([least, EXACT, EXACT]),
-    )
-    low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
-    return _finite(axis, of_file, low, high)
-
-
-def _variance_of_gain(posterior: Posterior) -> float:
-    """Return the variance of ln V_ss and of ln Tau by thrust that changes slowly: V_ss² grows like the thrust."""
-    return float((_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2)
-
-
-def _intervals(
-    own: Array,
-    posteriors: Sequence[Posterior],
-    logarithms_of: Callable[[Table], Callable[[Array], Array]],
-    more: Callable[[Posterior], Array],
-    fits: Sequence[Posterior],
-    narrowest: Array,
-) -> tuple[Array, Array]:
-    """Return both ends of the intervals of numbers with the logarithms `own`, as `answers` tells.
-
-    `more` returns the variances of the logarithms beside those of a posterior.
-    """
+    of_gain = np.array([1.0, 1.0, 0.0, 1.0])[: own.shape[1]]
+    narrowest = np.array([least, EXACT, EXACT, EXACT])[: own.shape[1]]
+    beyond = (_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2
     ends = [own - narrowest, own + narrowest]
     for posterior in posteriors:
-        fitted = logarithms_of(posterior.table)
+        fitted = logarithms(posterior.table, axis, pushes=pushes, with_lag=with_lag)
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
             slopes = posterior.slopes(fitted)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
-        variances = variances_of(slopes, posterior.covariance).reshape(own.shape) + more(posterior)
+        variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
+        variances += _variance_of_gain(posterior) * of_gain + beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
         ends += [middle - half, middle + half]
@@ -135,41 +128,13 @@ def _intervals(
         lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
         ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
-    return low, high
+    low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
+    return _finite(axis, of_file, low, high)
 
 
-def time_with_lag(
-    posteriors: Sequence[Posterior],
-    axis: Axis,
-    vehicle: Vehicle,
-    pushes: Sequence[float] = (),
-    fits: Sequence[Posterior] = (),
-) -> tuple[float, Interval] | None:
-    """Return the time from rest to 63 % of V_ss at half command, s, with the lag of the thrusters; None without one.
-
-    The lag and the time without it share what the tests tell about their sum, so the interval of the sum is its own.
-    Thrusters beside logs with a wrench have none: no test shows their lag.
-    """
-    curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
-    if pushes or not any(curve.has_lag for curve in curves):
-        return None
-    row = TableRow("", axis, "Tau", 0.5, 1.0, 1.0)
-    time = modelled([row], vehicle, NO_SHAPES).reshape(1)
-    if not np.isfinite(time).all():
-        return None
-
-    def logarithms_of(table: Table) -> Callable[[Array], Array]:
-        def of(z: Array) -> Array:
-            with np.errstate(divide="ignore", invalid="ignore"):  # far from the fit, a time may be no number
-                return np.asarray(np.log(modelled([row], *table.model(z)))).reshape(1, -1)
-
-        return of
-
-    def more(posterior: Posterior) -> Array:
-        return np.array([_variance_of_gain(posterior)])
-
-    low, high = _intervals(np.log(time), posteriors, logarithms_of, more, fits, np.array([EXACT]))
-    return float(time[0]), (float(low[0]), float(high[0]))
+def _variance_of_gain(posterior: Posterior) -> float:
+    """Return the variance of ln V_ss and of ln Tau by thrust that changes slowly: V_ss² grows like the thrust."""
+    return float((_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2)
 
 
 def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:
@@ -197,7 +162,7 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
     rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
-    responses = _responses_of(rovs, NO_SHAPES, axis, ANSWERED, ()).reshape(len(ANSWERED), 3, -1)
+    responses = _responses_of(rovs, NO_SHAPES, axis, ANSWERED).reshape(len(ANSWERED), 3, -1)
     values = responses[..., 0]
     low, high = values, values
     if known.names:
@@ -206,13 +171,13 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
 
 
 def _finite(axis: Axis, values: Array, low: Array, high: Array) -> tuple[Answer, ...]:
-    """Return the answers that are finite, for the usual commands: c x 3 values with the ends of their intervals."""
-    found = []
+    """Return the answers that are finite, for the usual commands: c x 3 or 4 values and the ends of their intervals."""
+    finite = []
     for command, numbers in zip(ANSWERED, np.stack([values, low, high], axis=-1).tolist(), strict=True):
-        steady, rise, stop = ((value, (least, most)) for value, least, most in numbers)
+        steady, rise, stop, *lagged = ((value, (least, most)) for value, least, most in numbers)
         if steady[0] and isfinite(steady[0]) and isfinite(rise[0]):
-            found.append(Answer(axis, command, steady, rise, stop))
-    return tuple(found)
+            finite.append(Answer(axis, command, steady, rise, stop, *lagged))
+    return tuple(finite)
 
 
 def _responses(motions: Motions, rest: Motions) -> Array:

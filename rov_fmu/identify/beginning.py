@@ -1,7 +1,7 @@
 """What is known before the fit: the tests of a folder, the part of the vehicle that they concern, and its prior."""
 
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +10,11 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import TestContents, Tests, narrowed, window_of, with_axes_alone
+from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning
 from rov_fmu.identify.likelihood.posterior import QUANTILE
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import (
     SampledLog,
     changes,
@@ -29,7 +29,7 @@ from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array, usual_range
 from rov_fmu.tank.description import ROV_FILE, Draft
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
@@ -67,112 +67,85 @@ def load_tests(
     `check_inputs` is called with every file that the identification reads, before any test is read. `base` is the
     vehicle to begin from, in place of that of rov.toml, and `draft` stands in for rov.toml itself.
     """
-    found = read_folder(folder, check_inputs, base, files, draft)
-    description = found.rov_file.description
-    logs = [_Contents(log, *driven_axes(log, layout_of(log, found))) for log in found.logs]
-    tested = _tested(found, logs)
-    useless = [one.refusal(folder) for one in logs] if not tested.axes else []
-    if not tested.thrust:
-        found.mistakes += useless
-    found.mistakes += _without_force(found)
+    contents = read_folder(folder, check_inputs, base, files, draft)
+    description = contents.rov_file.description
+    # A log that could not be read may test the axis in its name.
+    logged = dict.fromkeys(axis for kind, axis in contents.files if kind == "log" and axis and contents.mistakes)
+    of_logs, useless = list[Finding](), list[str]()
+    for log in contents.logs:
+        axes, told = driven_axes(log, layout_of(log, contents))
+        told = told or ([] if axes else [Finding("nothing measured", file=log.file)])
+        logged |= dict.fromkeys(axis.name for axis in axes)
+        of_logs += told
+        useless.append(_refusal(folder, log, told))
+    tested = axes_of(contents, logged)
+    useless = [] if tested else useless
+    if not contents.astern("thrust"):
+        contents.mistakes += useless
+    contents.mistakes += _without_force(contents)
     tests = None
     # If no axis was found, it may be in a file that could not be read.
-    if description and (tested.axes or not found.mistakes):
-        tests = narrowed(found, description, tested, useless)
-    found.rov_file_mistakes += _wrong_priors(found)
-    if mistakes := [*found.rov_file_mistakes, *found.mistakes]:
-        raise (DataFileError if found.mistakes else VehicleFileError)(*mistakes)
+    if description and (tested or not contents.mistakes):
+        tests = narrowed(contents, description, [*logged], useless)
+    contents.rov_file_mistakes += _wrong_priors(contents)
+    if mistakes := [*contents.rov_file_mistakes, *contents.mistakes]:
+        raise (DataFileError if contents.mistakes else VehicleFileError)(*mistakes)
     assert tests
-    path = tests.description.tables.base
-    of_base = {tests.description.base_name: file_hash(path)} if path else {}
-    own = {name: digest for name, digest in found.inputs.items() if name == ROV_FILE}
-    inputs = own | of_base | found.inputs
-    of_logs = [finding for one in logs for finding in one.told]
-    of_vehicle = tests.findings if path else _not_pushed(tests.findings, of_logs)
-    findings = (*of_vehicle, *found.findings, *of_logs, *_driven_together(found))
-    return replace(tests, inputs=inputs, findings=findings)
+    of_base = {tests.description.base_name: file_hash(own)} if (own := tests.description.tables.base) else {}
+    of_rov = {name: digest for name, digest in contents.inputs.items() if name == ROV_FILE}
+    contents.inputs = of_rov | of_base | contents.inputs
+    if not of_base:
+        contents.findings[:] = _not_pushed(contents.findings, of_logs)
+    contents.findings += [*of_logs, *_driven_together(contents)]
+    return tests
 
 
-def _wrong_priors(found: Folder) -> list[str]:
+def _wrong_priors(folder: Folder) -> list[str]:
     """Return a line for each key of [priors] that no prior has, and for each noise that is said to be exact."""
     lines = []
-    for key, deviation in found.rov_file.tables.priors.items():
+    for key, deviation in folder.rov_file.tables.priors.items():
         if key not in PRIORS:
             lines.append(key_line(f"priors.{key}", f"unknown{only(key, PRIORS)}"))
         elif key in _NEVER_EXACT and deviation == 0.0:
             reason = "must be above 0: the noise of a sensor is seen in its samples, and never known exactly"
             lines.append(key_line(f"priors.{key} = 0", reason))
-    return lines_on(found.path / ROV_FILE, lines)
+    return lines_on(folder.path / ROV_FILE, lines)
 
 
-def _without_force(found: Folder) -> Iterator[str]:
+def _without_force(folder: Folder) -> Iterator[str]:
     """Yield a line for each thrust curve whose largest measured force is 0."""
-    for (kind, curve), rows in found.rows.items():
+    for (kind, curve), rows in folder.rows.items():
         largest = max((row.value * np.sign(row.command) for row in rows), default=0.0)
         if kind == "thrust" and largest < _LEAST_FORCE:
-            yield f"{found.path}: thrust_{curve}*.csv: must give a force above 0, not {largest:.3g} N at most"
+            yield f"{folder.path}: thrust_{curve}*.csv: must give a force above 0, not {largest:.3g} N at most"
 
 
-@dataclass(frozen=True, eq=False)
-class _Contents:
-    """What a log tests."""
-
-    log: Log
-    axes: Sequence[Axis]
-    findings: Sequence[Finding]
-    """About its channels and axes."""
-
-    @property
-    def told(self) -> Sequence[Finding]:
-        """The findings, of which there is at least one if the log tests nothing."""
-        return self.findings or ([] if self.axes else [Finding("nothing measured", file=self.log.file)])
-
-    def refusal(self, folder: Path) -> str:
-        """Return the line that refuses a folder without a better log."""
-        file = self.log.file
-        left_out = [finding for finding in self.log.findings if finding.kind == "channel left out"]
-        reasons = [line.removeprefix(f"{file}: ") for line in sentences([*left_out, *self.told], SENTENCES)]
-        return f"{folder / file}: {'; '.join(first_of(reasons, _MOST_REASONS))}: nothing is identifiable"
+def _refusal(folder: Path, log: Log, told: Sequence[Finding]) -> str:
+    """Return the line that refuses a folder without a better log than one of which this is told."""
+    left_out = [finding for finding in log.findings if finding.kind == "channel left out"]
+    reasons = [line.removeprefix(f"{log.file}: ") for line in sentences([*left_out, *told])]
+    return f"{folder / log.file}: {'; '.join(first_of(reasons, _MOST_REASONS))}: nothing is identifiable"
 
 
-def _not_pushed(of_vehicle: Sequence[Finding], of_logs: Sequence[Finding]) -> Iterator[Finding]:
-    """Yield the findings about the vehicle, with a warning for each axis that it lacks because its thrusters cancel.
+def _not_pushed(findings: Sequence[Finding], of_logs: Sequence[Finding]) -> Iterator[Finding]:
+    """Yield findings, with a warning for each axis that the vehicle lacks because its thrusters cancel.
 
     That is for a vehicle without a base, which may have axes that the logs do not concern.
     """
     cancelling = {finding.axis for finding in of_logs if finding.kind == "cancelling thrusters"}
-    for finding in of_vehicle:
+    for finding in findings:
         is_one = finding.kind == "axis left out" and finding.axis in cancelling
         yield Finding("axis not pushed", finding.axis) if is_one else finding
 
 
-def _driven_together(found: Folder) -> Iterator[Finding]:
+def _driven_together(folder: Folder) -> Iterator[Finding]:
     """Yield a finding for each axis that a log measures, but that the thrusters drive only together with others."""
-    if found.layout and found.logged:
-        for log in found.logs:
-            for axis in (form.axis for form in found.layout.axes if not found.logged.has(form.axis)):
+    if folder.layout and folder.logged:
+        for log in folder.logs:
+            for axis in (form.axis for form in folder.layout.axes if not folder.logged.has(form.axis)):
                 is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
                 if is_measured and not log.axis and axis not in (ROLL, PITCH):
-                    yield Finding("together", axis.name, file=log.file, names={"axis": axis.name})
-
-
-def _tested(found: Folder, logs: Sequence[_Contents]) -> TestContents:
-    """Return what the files test. A log that could not be read may test the axis in its name."""
-
-    def subjects(kind: str) -> list[str]:
-        return [subject for other, subject in found.files if other == kind]
-
-    def has_backward_rows(kind: str, subject: str) -> bool:
-        low, _ = window_of(found.rov_file.description, kind, subject)
-        return any(low <= row.command < 0.0 for row in found.rows.get((kind, subject), ()))
-
-    unread = filter(None, subjects("log")) if found.mistakes else ()
-    return TestContents(
-        {name: (found.files["thrust", name][0], has_backward_rows("thrust", name)) for name in subjects("thrust")},
-        {name: has_backward_rows("steady", name) for name in subjects("steady")},
-        subjects("time_constant"),
-        list(dict.fromkeys([*unread, *(axis.name for one in logs for axis in one.axes)])),
-    )
+                    yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
 
 
 def layout_of(log: Log, of: Folder | Layout) -> Layout:
@@ -193,7 +166,7 @@ def layout_of(log: Log, of: Folder | Layout) -> Layout:
 # ---- The prior -------------------------------------------------------------------------------------------------------
 
 
-def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
+def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     """Return what is known before the fit, the logs as the filter reads them, and the rows of all tables."""
     deviations = tests.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
@@ -223,7 +196,7 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
     moved = {form.axis for one in logs for form in one.layout.axes}
-    known = Beginning(
+    known = Prior(
         vehicle.layout,
         values,
         fitted,
@@ -236,14 +209,14 @@ def begin(tests: Tests) -> tuple[Beginning, list[SampledLog], list[TableRow]]:
         exact=_exact(tests, vehicle.layout, measured, moved, shown),
         thrust_errors=_thrust_errors(tests, curves),
         unseen=[form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}],
-        has_times=bool(tests.tested.time_constants),
+        has_times=bool(tests.folder.astern("time_constant")),
         bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
     counted = [
         one
         for kind in QUANTITIES
         for row, one in table_rows(tests, vehicle.layout, kind)
-        if tests.counts(kind, one.subject.name, row.command)
+        if tests.folder.counts(kind, one.subject.name, row.command)
     ]
     return known, logs, counted
 
@@ -271,17 +244,17 @@ def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:
 
 def _thrust_errors(tests: Tests, curves: Sequence[Curve]) -> dict[str, float]:
     """Return the relative standard error of the forces of a curve whose a_t rov.toml gives with an interval."""
-    found = {}
+    errors = {}
     for curve in curves:
         quantity = tests.description.known.get(curve.coefficient("a_t"))
         if quantity and quantity.interval:
             low, high = quantity.interval
-            found[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
-    return found
+            errors[curve.name] = (high - low) / (2.0 * QUANTILE * abs(quantity.value))
+    return errors
 
 
 def _is_fitted(axis: Axis, tests: Tests) -> bool:
-    given, tested = tests.known, tests.tested.axes
+    given, tested = tests.known, tests.axes
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
@@ -293,20 +266,18 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
     """
     base, deviations = tests.base, tests.description.tables.priors
     values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
-    vehicle = Vehicle(
-        replace(vehicle.layout, mix={}, pulse=None, has_dead_time=False), vehicle.coefficients
-    )  # a log tells thrusters' commands
+    vehicle = Vehicle(replace(vehicle.layout, mix={}), vehicle.coefficients)  # a log tells thrusters' commands
     centres = dict.fromkeys(_centres(vehicle.layout, shown), 0.0)
     restoring = tuple(key for key in RESTORING if key in {*vehicle.layout.restoring, *centres})
     layout = replace(vehicle.layout, restoring=restoring)
     vehicle, values = Vehicle(layout, {**centres, **vehicle.coefficients}), {**centres, **values}
     more: dict[str, float] = {}
-    logged = {*tests.tested.logs}
+    logged, steady = {*tests.logged}, tests.folder.astern("steady")
     for form in layout.axes:
         axis = form.axis
-        if axis.name in logged or tests.tested.steady.get(axis.name):
+        if axis.name in logged or steady.get(axis.name):
             more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
-        is_loaded = axis.name in logged or tests.tested.steady.get(axis.name) or axis in shown
+        is_loaded = axis.name in logged or steady.get(axis.name) or axis in shown
         if is_loaded and not (centres and axis in (ROLL, PITCH)):
             more[form.name_of("F_0")] = ABSENT["F_0"]
     vehicle = _with_voltage(vehicle, base, tests)
@@ -317,11 +288,11 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
         if not curve.tables and not exact:
             for key in ("a_t", "b_t"):
                 more[curve.name_of(f"{key}{REVERSE}")] = values[curve.coefficient(key)]
-            if logged or curve.name in tests.tested.thrust:
+            if logged or curve.name in tests.folder.astern("thrust"):
                 more[curve.coefficient("c_0")] = ABSENT["c_0"]
             if measured.get(curve.name):
                 more[curve.name_of(f"c_0{REVERSE}")] = base.get(curve.coefficient("c_0"), 0.0)
-        if logged or tests.tested.time_constants:
+        if logged or tests.folder.astern("time_constant"):
             more[curve.coefficient("T")] = ABSENT["T"]
         if logged and not (layout.has_wrench or curve.tables):
             more[curve.coefficient("d")] = ABSENT["d"]
@@ -334,13 +305,12 @@ def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> 
 
     Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
     """
-    requests = tests.requests
     values = tests.folder.voltages
     if not values or vehicle.layout.voltage is not None:
         return vehicle
     mean = float(np.mean([np.mean(some) for some in values]))
     ranges = [usual_range(some) for some in values]
-    if not requests.voltage and max(high - low for low, high in ranges) < _SAG * mean:
+    if not tests.description.requests.voltage and max(high - low for low, high in ranges) < _SAG * mean:
         return vehicle
     more = {}
     is_exact = tests.description.tables.priors.get("voltage") == 0.0
@@ -381,12 +351,12 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
 
     start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), _SQUARE, 0.0]
     fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):
         if not end or astern:
             for key, share in (("a_t", fit[1]), ("b_t", 1.0 - fit[1])):
-                found[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
-    return found
+                values[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
+    return values
 
 
 def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:

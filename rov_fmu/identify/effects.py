@@ -6,12 +6,10 @@ from math import inf, pi
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES
-from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
-from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
+from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
@@ -27,23 +25,15 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
-        assert p.null is not None
-        posterior = fit.posterior if n in file.absent else file
-        value, error, unit = float(posterior.z[n]), posterior.errors[n], p.unit
-        if p.kind == "dead band":
-            error = max(error, EXACT_BAND / QUANTILE)
-        if p.kind == "load":
-            full = fit.known.full[p.of]
-            value, error, unit = (value - p.null) * full, error * full, AXES[p.of].load
-        if p.kind == "centre of buoyancy":
-            value += file.table.base[CENTRE[p.part]]
-        low, high = around(value, error)
-        if KINDS[p.kind].is_ratio:
+        posterior, kind = fit.posterior if n in file.absent else file, KINDS[p.kind]
+        value = p.offset + p.factor * float(posterior.z[n])
+        low, high = around(value, max(p.factor * posterior.errors[n], kind.finest / QUANTILE))
+        if kind.is_ratio or p.is_log:
             value, low, high = np.exp([value, low, high]).tolist()
-        name = KINDS[p.kind].words + (f" {p.part}" if p.part else "")
+        name = kind.words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
-        yield Effect(p.kind, p.of, name, value, (low, high), unit, evidence, float(beyond), least)
+        yield Effect(p.kind, p.of, name, value, (low, high), p.unit, evidence, float(beyond), least)
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:
@@ -56,14 +46,14 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
             words = _lost(fit, one.variant.of)
         elif kind in ("health", "reversed commands"):
             of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
-        found = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
+        structure = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
         if place is not None:
             p = posterior.table.parameters[place]
             low, high = around(float(posterior.z[place]), posterior.errors[place])
             ends = np.clip([posterior.z[place], low, high], p.low, p.high)
             value, low, high = (np.exp(ends) if p.is_log else ends).tolist()
-            found = replace(found, value=value, interval=(low, high), unit=p.unit)
-        yield found
+            structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
+        yield structure
 
 
 def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
@@ -81,7 +71,7 @@ def _shortest(fit: Fit, p: Parameter) -> float:
         float(np.median(np.diff(one.record.time[one.record.sensor == n])))
         for one in fit.objective.logs
         for n, m in enumerate(one.measured)
-        if p.kind == "lag" or (p.kind == "sensor lag" and with_same_lag(m.sensor) == p.part)
+        if KINDS[p.kind].is_lag and p.part in ("", with_same_lag(m.sensor))
     ]
     return min(intervals, default=-inf) / (2.0 * pi)
 

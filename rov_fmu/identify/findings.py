@@ -3,15 +3,14 @@
 A finding is never read back: it only becomes a sentence in the terminal, in the report, and in the vehicle file.
 """
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from math import floor, inf, isfinite, log, log10
-from typing import Literal, get_args
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
-from rov_fmu.equation.parts import EVERY_COMMAND, Range
+from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import (
@@ -35,17 +34,13 @@ from rov_fmu.identify.result import (
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
-from rov_fmu.tank import findings
 from rov_fmu.tank.arrays import rms, usual_range
-from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import MISFITS, Finding, SentenceForm
+from rov_fmu.tank.findings import HEADINGS, MISFITS, Finding, Heading, about
+from rov_fmu.tank.findings import sentences as sentences_by
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.log import Log
-from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE
 from rov_fmu.vehicle.vehicle import Vehicle
-
-Heading = Literal["Warnings", "Doubts", "Facts"]
 
 _CONTRADICTION = 0.15
 """Tables that differ by more than this from the model contradict it: batteries and scales explain less."""
@@ -67,8 +62,6 @@ STOPPING = (
 _ASIDE = 0.2
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
 which gives it almost half of its full speed. A symmetric pair leaves less, if its thrust astern is above 60 %."""
-_WITHOUT_OUTLIERS = (0.005, 0.995)
-"""The quantiles between which a quantity counts as tested."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _SURE = 0.99
@@ -76,7 +69,7 @@ _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
 
-_OWN: dict[Heading, dict[str, SentenceForm]] = {
+_OWN: Mapping[Heading, Mapping[str, str]] = {
     "Warnings": {
         "worse than no change": (
             "{axes}: the prediction of the {quantity} in {files} is off by {error} (RMS), and a prediction of no "
@@ -175,116 +168,48 @@ _OWN: dict[Heading, dict[str, SentenceForm]] = {
 }
 _FIRST = ("worse than no change", "unreadable file", "missing column", "copy", "frozen sensors", "slip", *MISFITS)
 """The warnings that stand first: wrong predictions, and wrong or missing data."""
-_READ: dict[Heading, frozenset[str]] = {
-    "Doubts": frozenset(
-        {
-            "grown rows",
-            "too few samples",
-            "time of arrival",
-            "other clock",
-            "aligned clock",
-            "unknown direction",
-            "unknown velocity",
-            "velocity corrected",
-            "late command",
-            "at rest",
-            "depth by pressure",
-        }
-    ),
-    "Facts": frozenset(
-        {
-            "wrench",
-            "source of wrench",
-            "other files",
-            "code page",
-            "lines before header",
-            "rows sorted",
-            "time stamps merged",
-            "rows without time",
-            "rows before commands",
-            "torn rows",
-            "unread cells",
-            "no pulse",
-            "no servo pulse",
-            "invalid",
-            "beyond full thrust",
-            "constant motion",
-            "constant push",
-            "free decay",
-            "cancelling thrusters",
-            "gaps",
-            "source of commands",
-            "source",
-            "range of pulses",
-            "dropouts",
-            "damaged pieces",
-            "reversed motors",
-            "axis left out",
-            "not coupled",
-            "unused curve",
-        }
-    ),
-}
-"""The kinds of findings about reading (rov_fmu/tank/findings.py) that are no warnings."""
-SEVERITY: dict[str, Heading] = {
-    **dict.fromkeys(findings.SENTENCES, "Warnings"),
-    **{kind: heading for heading, kinds in (*_READ.items(), *_OWN.items()) for kind in kinds},
-}
-"""The heading of each kind: warnings ask for something, doubts are open questions, and facts need no action."""
-SENTENCES: dict[str, SentenceForm] = {**_OWN["Warnings"], **_OWN["Doubts"], **_OWN["Facts"], **findings.SENTENCES}
+_FORMS = {heading: {**forms, **HEADINGS[heading]} for heading, forms in _OWN.items()}
+SEVERITY: Mapping[str, Heading] = {kind: heading for heading, forms in _FORMS.items() for kind in forms}
+"""The heading of each kind."""
+SENTENCES = {kind: form for forms in _FORMS.values() for kind, form in forms.items()}
 """The form of the sentence of each kind."""
-_HEADINGS: tuple[Heading, ...] = get_args(Heading)
 _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
-"""The kinds in the order in which they are told under their heading."""
+"""The kinds in the order in which they are told, the warnings first."""
 
 
-def sentences(found: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
+def sentences(some: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
     """Return the sentences of findings, if given only of those of a kind; similar findings share one sentence."""
-    return findings.sentences((one for one in found if kind in ("", one.kind)), SENTENCES)
+    return sentences_by((one for one in some if kind in ("", one.kind)), SENTENCES)
 
 
-def heading(finding: Finding) -> Heading:
-    """Return the heading that a finding belongs to."""
-    return SEVERITY[finding.kind]
-
-
-def by_heading(found: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
+def by_heading(findings: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     """Return the sentences of findings of all axes by their headings: the warnings of all axes come first."""
-    groups: dict[Heading, list[Finding]] = {name: [] for name in _HEADINGS}
-    for finding in found:
-        groups[heading(finding)].append(finding)
+    groups: dict[Heading, list[Finding]] = {name: [] for name in _FORMS}
+    for finding in findings:
+        groups[SEVERITY[finding.kind]].append(finding)
     return {name: sentences(some) for name, some in groups.items()}
 
 
 def told(identification: Identification) -> Identification:
     """Return an identification with its findings; its vehicle has them too, with its verdicts and errors."""
     findings = findings_of(identification)
+    # other files beside the tests say nothing about the vehicle
+    groups = by_heading(finding for finding in findings if finding.kind != "other files")
     made = identification.vehicle.provenance
     assert made
     sentences_of = {
-        "warnings": warnings(findings),
-        # other files beside the tests say nothing about the vehicle
-        "facts": facts(finding for finding in findings if finding.kind != "other files"),
+        "warnings": (*groups["Warnings"], *groups["Doubts"]),
+        "facts": groups["Facts"],
         "verdicts": tuple(verdict.of(axis) for axis, verdict in identification.verdicts.items()),
         "errors": tuple(error_in_words(result.main) for result in identification.axes if result.main),
     }
     made = made.model_copy(update=sentences_of)
     vehicle = identification.vehicle
-    layout = replace(vehicle.layout, identified=tuple(_ranges(identification)))
+    layout = replace(vehicle.layout, identified=tuple(tested_ranges(identification)))
     scale = assumed_scale(identification)
     data = vehicle.measured_from + (f" ({scale})" if scale else "")
     vehicle = replace(vehicle, layout=layout, provenance=made, measured_from=data)
     return replace(identification, findings=findings, vehicle=vehicle)
-
-
-def warnings(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of warnings and doubts, as the vehicle file has them."""
-    return sentences(finding for finding in found if heading(finding) != "Facts")
-
-
-def facts(found: Iterable[Finding]) -> tuple[str, ...]:
-    """Return the sentences of the findings that only say what was found or done."""
-    return sentences(finding for finding in found if heading(finding) == "Facts")
 
 
 # ---- Findings from the result ----------------------------------------------------------------------------------------
@@ -292,36 +217,35 @@ def facts(found: Iterable[Finding]) -> tuple[str, ...]:
 
 def findings_of(identification: Identification) -> tuple[Finding, ...]:
     """Return all findings of an identification with those about reading, the most important kinds first."""
-    found = [*identification.folder.findings]
+    findings = [*identification.folder.findings]
     for result in identification.axes:
-        found += [*_on_predictions(result), *_on_coefficients(identification, result)]
-        found += [*_on_points(result)]
+        findings += [*_on_predictions(result), *_on_coefficients(identification, result)]
+        findings += [*_on_points(result)]
         if result.verdict.word == "do not use":
-            found.append(Finding("do not use", result.axis.name))
+            findings.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
-            found.append(Finding("structure", result.axis.name, names={"ratio": significant(result.structure, 2)}))
+            findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
         if may_rock(identification.folder, result.axis):
-            found.append(Finding("rocking", result.axis.name))
+            findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
-        found += _not_identified(known, f"{curve} thrust", curve=curve)
-    found += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
+        findings += _not_identified(known, f"{curve} thrust", curve=curve)
+    findings += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
     if identification.agreement > DISAGREEMENT:
-        found.append(Finding("second start"))
-    found += [
+        findings.append(Finding("second start"))
+    findings += [
         _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
     ]
     for log_of in identification.folder.logs:
-        found += _on_log(identification, log_of)
-    found += filter(None, map(_logging, identification.logging))
+        findings += _on_log(identification, log_of)
+    findings += filter(None, map(_logging, identification.logging))
     for sensor in identification.sensors:
         if sensor.outliers > _MOST_OUTLIERS:
-            numbers = {"share": sensor.outliers}
-            found.append(Finding("outliers", sensor.axis.name, names={"quantity": sensor.quantity}, numbers=numbers))
-    found += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
-    found += filter(None, map(_structure, identification.structures))
+            findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
+    findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
+    findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
-        found.append(Finding("slip", file=slip.file, names={"quantity": slip.quantity, "words": slip.words}))
-    return tuple(sorted(found, key=lambda one: (_HEADINGS.index(heading(one)), _ORDER.index(one.kind))))
+        findings.append(about(slip.file, "slip", quantity=slip.quantity, words=slip.words))
+    return tuple(sorted(findings, key=lambda one: _ORDER.index(one.kind)))
 
 
 def name_of(p: Prediction) -> str:
@@ -481,49 +405,21 @@ def extrapolated(identification: Identification) -> list[str]:
 
 def with_lag(identification: Identification) -> list[str]:
     """Return a sentence with the times at half command that contain the lag of the thrusters, if there is one."""
-    told = [f"{with_error(one.lagged, 's')} ({one.axis.name})" for one in identification.axes if one.lagged]
+    halves = filter(None, (answer_at(one, 0.5) for one in identification.axes))
+    told = [f"{with_error(half.lagged, 's')} ({half.axis.name})" for half in halves if half.lagged]
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
 def with_error(known: tuple[float, Interval], unit: str) -> str:
-    """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`."""
+    """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
+    wider than the value is not known."""
     value, interval = known
     if not 0.0 < abs(value) < inf:
         return "-"
+    if (error := half_width(known)) > 1.0:
+        return "not known"
     words, _, _ = in_words(value, interval, unit).partition(" (")
-    return f"{words} ±{percent(half_width(known), '>')}"
-
-
-def _ranges(identification: Identification) -> Iterator[Range]:
-    """Yield the range of the commands, and those of each velocity, of roll and pitch and of the depth in the tests.
-
-    The ends have three digits, and an end that is next to nothing is no range.
-    """
-    found: dict[str, list[float]] = {}
-    for one in identification.folder.logs:
-        for channel in one.channels:
-            if not channel.unused and (name := _variable(channel.quantity)):
-                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                found.setdefault(name, []).extend(ends)
-    for result in identification.axes:
-        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
-        if measured:
-            found.setdefault(result.axis.velocity, []).extend(measured)
-    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found.items()}
-    if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
-        yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
-        yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
-
-
-def _variable(quantity: Quantity) -> str:
-    """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
-    if quantity.axis is None:
-        return ""
-    return quantity.axis.velocity if quantity.is_velocity else _POSITIONS.get(quantity.axis, "")
-
-
-_POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta"}
-"""The variables of the depth and of the angles from the level."""
+    return f"{words} ±{error:.0%}"
 
 
 def size_in_words(value: float, unit: str) -> str:
@@ -567,10 +463,9 @@ def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     warned = {(p.file, p.quantity) for p in worse if p.is_judged}
     for p in worse:
         if p.is_judged or (p.file, p.quantity) not in warned:
-            names = {"quantity": p.quantity}
-            names |= {"error": size_in_words(p.error, p.unit), "unchanged": size_in_words(p.unchanged, p.unit)}
             kind = "worse than no change" if p.is_judged else "drift"
-            yield Finding(kind, result.axis.name, file=p.file, names=names)
+            error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+            yield about(p.file, kind, result.axis.name, quantity=p.quantity, error=error, unchanged=unchanged)
 
 
 def _on_coefficients(identification: Identification, result: AxisResult) -> Iterator[Finding]:
@@ -588,7 +483,7 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
             curves = {thruster.curve for thruster in identification.vehicle.layout.thrusters_along(axis)}
             files = [*dict.fromkeys(p.file for p in identification.forces if p.subject in curves)]
             names["forces"] = f" (in {listed(files)})" if files else ""
-            yield Finding("implausible inertia", axis.name, names=names)
+            yield Finding("implausible inertia", axis.name, words=names)
 
 
 def _not_identified(
@@ -596,7 +491,7 @@ def _not_identified(
 ) -> Iterator[Finding]:
     if names := [one.name for one in known if one.interval is None]:
         words = {"of": of, "coefficients": listed(names), "instead": instead}
-        yield Finding("not identified", axis, curve, names=words)
+        yield Finding("not identified", axis, curve, words=words)
 
 
 def _on_points(result: AxisResult) -> Iterator[Finding]:
@@ -604,7 +499,7 @@ def _on_points(result: AxisResult) -> Iterator[Finding]:
     for quantity in ("V_ss", "Tau"):
         error = relative_error((p for p in result.points if p.quantity == quantity), "model")
         if error > _CONTRADICTION:
-            yield Finding("points differ", result.axis.name, names={"quantity": quantity}, numbers={"error": error})
+            yield about("", "points differ", result.axis.name, quantity=quantity, error=error)
 
 
 def _on_forces(identification: Identification) -> Iterator[Finding]:
@@ -616,7 +511,7 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
     for (curve, file), ratios in by_table.items():
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
-            yield Finding("thrust tables", curve=curve, file=file, names={"ratio": significant(ratio, 2)})
+            yield Finding("thrust tables", curve=curve, file=file, words={"ratio": significant(ratio, 2)})
 
 
 def may_rock(folder: Folder, axis: Axis) -> bool:
@@ -649,10 +544,10 @@ def _on_vehicle(identification: Identification) -> Iterator[Finding]:
     volts = identification.folder.voltages
     if volts and identification.curves and vehicle.layout.voltage is None:
         ends = dict.fromkeys(f"{end:.3g}" for end in usual_range(np.concatenate(volts)))
-        yield Finding("idle voltage", names={"volts": " to ".join(ends)})
+        yield about("", "idle voltage", volts=" to ".join(ends))
     if description and description.assumed:
         names = {"base": description.base_name, "reason": description.assumed, "mass": f"{vehicle['m_rov']:.3g} kg"}
-        yield Finding("assumed vehicle", names=names)
+        yield Finding("assumed vehicle", words=names)
 
 
 _REMEDIES = {
@@ -665,24 +560,29 @@ _REMEDIES = {
 """What each cause means, or what takes it into account."""
 
 
+def acting(d: Disturbance) -> str:
+    """Return what a disturbance does in its log as a sentence without the file: `an unknown slow force of ... acts`."""
+    slow, is_turn = KINDS[d.kind].slow, d.axis is not None and d.axis.is_rotation
+    assert slow
+    return slow.sentence.format(
+        unknown="a" if d.cause else "an unknown",
+        push="torque" if is_turn else "force",
+        thrust="torque" if is_turn else "thrust",
+        size=percent(d.value) if d.changes_thrust else size_in_words(d.value, d.unit),
+        share=percent(d.share),
+    )
+
+
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
-    axis, unknown = d.axis.name if d.axis else "", "a" if d.cause else "an unknown"
-    size, share = size_in_words(d.value, d.unit), percent(d.share)
-    push, of = ("torque", "torque") if d.axis and d.axis.is_rotation else ("force", "thrust")
-    where = axis or listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
-    kind, what = {
-        "slow gain": ("change of thrust", f"the thrust changes slowly by {percent(d.value)} (RMS)"),
-        "slow velocity": ("velocity over ground", f"{where}: {unknown} slow velocity over ground of {size} (RMS) acts"),
-        "slow force": ("unknown force", f"{axis}: {unknown} slow {push} of {size} (RMS), {share} of the {of}, acts"),
-    }[d.kind]
-    if d.cause:
-        kind = "explained disturbance"
-    elif d.share < MOST_UNKNOWN:
-        kind = "small disturbance"
+    slow = KINDS[d.kind].slow
+    assert slow
+    kind = "explained disturbance" if d.cause else slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
+    where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
+    what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
     since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"
-    names = {"what": what, "since": since, "cause": d.cause, "remedy": _REMEDIES.get(d.cause, "")}
-    return Finding(kind, axis, file=d.file, names=names)
+    remedy = _REMEDIES.get(d.cause, "")
+    return about(d.file, kind, d.axis.name if d.axis else "", what=what, since=since, cause=d.cause, remedy=remedy)
 
 
 def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
@@ -690,8 +590,8 @@ def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
     for axis in (form.axis for form in own.layout.axes if own.layout.thrusters):
         largest, most = wrench.strongest(axis), own.strongest(axis)
         if largest > _BEYOND * most:
-            names = {"largest": f"{largest:.3g} {axis.load}", "most": f"{most:.3g} {axis.load}"}
-            yield Finding("beyond thrusters", axis.name, names=names)
+            sizes = {"largest": f"{largest:.3g} {axis.load}", "most": f"{most:.3g} {axis.load}"}
+            yield about("", "beyond thrusters", axis.name, **sizes)
 
 
 def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
@@ -702,7 +602,7 @@ def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
         values = np.abs(one.commands.at(one.commands.rows))
         share = float(np.mean(np.any(values >= _FULL, axis=1)))
         if share > _SATURATED:
-            yield Finding("saturation", file=one.file, numbers={"share": share})
+            yield about(one.file, "saturation", share=share)
     layout = identification.vehicle.layout
     if all(map(layout.has, COUPLED_AXES)) and not layout.coupled:
         surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in one.channels) for a in COUPLED_AXES)
@@ -716,7 +616,7 @@ def _structure(one: Structure) -> Finding | None:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
     odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
-    return Finding(one.kind, names={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
+    return Finding(one.kind, words={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
 
 
 def _logging(one: Logging) -> Finding | None:
@@ -728,11 +628,8 @@ def _logging(one: Logging) -> Finding | None:
     if low <= 0.0 <= high:
         return None
     is_usual = high >= -1.5 * one.interval and low <= 0.5 * one.interval
-    names = {"beside": "before" if one.offset < 0.0 else "after"}
-    if is_usual:
-        return Finding("logging", file=one.file, names=names, numbers={"time": _rounded(one.offset)})
-    numbers = {"time": _rounded(one.offset), "interval": _rounded(one.interval)}
-    return Finding("clock", file=one.file, names=names, numbers=numbers)
+    kind, beside = "logging" if is_usual else "clock", "before" if one.offset < 0.0 else "after"
+    return about(one.file, kind, beside=beside, time=_rounded(one.offset), interval=_rounded(one.interval))
 
 
 def _rounded(time: float) -> float:
@@ -743,13 +640,11 @@ def _rounded(time: float) -> float:
 def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]:
     """Yield the fact about an effect that is kept, after the doubt about one of an unusual size."""
     of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
-    names = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name, "note": ""}
-    names["value"] = in_words(effect.value, effect.interval, effect.unit)
+    words = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name}
+    words["value"] = in_words(effect.value, effect.interval, effect.unit)
     if effect.is_unusual:
-        yield Finding("unusual effect", "", "", "", names)
-    if effect.kind != "dead time" or not identification.vehicle.layout.has_dead_time:
-        names["note"] = KINDS[effect.kind].why_not
-    if scale := assumed_scale(identification, effect.unit):
-        names["note"] += f", {scale}"
+        yield Finding("unusual effect", words=words)
+    scale = assumed_scale(identification, effect.unit)
+    words["note"] = KINDS[effect.kind].why_not + (f", {scale}" if scale else "")
     axis = of if of in AXES else ""
-    yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, names)
+    yield Finding("effect", axis, of if is_curve else "", "" if is_curve or axis else of, words)

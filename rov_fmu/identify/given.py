@@ -1,7 +1,7 @@
 """Reduce the vehicle that rov.toml describes to the part that can be identified from the tests."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from rov_fmu.equation.catalogue import (
     ARM,
@@ -14,13 +14,13 @@ from rov_fmu.equation.catalogue import (
     Axis,
 )
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.io.messages import lines_on, listed
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.tank.description import Description, Requests
+from rov_fmu.tank.description import Description
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.readers.tank_tables import Row
-from rov_fmu.vehicle.description import Head
 from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -29,33 +29,14 @@ UNKNOWN = 1.0
 """The value of a coefficient that is yet to be identified."""
 
 
-@dataclass(frozen=True)
-class TestContents:
-    """What the files of a folder test."""
-
-    thrust: Mapping[str, tuple[str, bool]]
-    """By curve: the first file, and whether negative commands count."""
-    steady: Mapping[str, bool]
-    """By axis: whether negative commands count."""
-    time_constants: Collection[str]
-    """The axes with time constants."""
-    logs: Collection[str]
-    """The axes with logs."""
-
-    @property
-    def axes(self) -> set[str]:
-        """The names of all axes that are tested."""
-        return {*self.steady, *self.time_constants, *self.logs}
-
-
 @dataclass(frozen=True, eq=False)
 class Tests:
     """All tests of a folder, and what is known about their vehicle before the identification."""
 
     folder: Folder
-    description: Description
-    """The vehicle as rov.toml describes it."""
-    head: Head
+    """Its findings also tell what was left out of the vehicle and of the files, and its inputs have the base, too."""
+    logged: Collection[str]
+    """The names of the axes that logs test."""
     vehicle: Vehicle
     """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
     their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
@@ -64,15 +45,19 @@ class Tests:
     """The coefficients that are given, not identified."""
     base: Mapping[str, float]
     """The coefficients of the base and those that are known: the centre of the prior."""
-    requests: Requests
-    """The requests that concern the remaining curves."""
     thrusters: Layout | None
     """The thrusters that give the forces of a wrench along these axes; None where rov.toml does not say."""
-    tested: TestContents
-    findings: tuple[Finding, ...]
-    """What was left out of the vehicle and of the files."""
-    inputs: Mapping[str, str] = field(default_factory=dict)
-    """The SHA3-256 of every file that was read, by its name."""
+
+    @property
+    def description(self) -> Description:
+        """The vehicle as rov.toml describes it."""
+        assert self.folder.rov_file.description
+        return self.folder.rov_file.description
+
+    @property
+    def axes(self) -> set[str]:
+        """The names of all axes that are tested."""
+        return axes_of(self.folder, self.logged)
 
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
@@ -82,31 +67,26 @@ class Tests:
             if other == kind and subject in names:
                 yield subject, some
 
-    def counts(self, kind: str, subject: str, command: float) -> bool:
-        """Return True if a command is inside the window of rov.toml."""
-        low, high = window_of(self.description, kind, subject)
-        return low <= command <= high
+
+def axes_of(folder: Folder, logged: Collection[str]) -> set[str]:
+    """Return the names of all axes that are tested, from those that logs test."""
+    return {*folder.astern("steady"), *folder.astern("time_constant"), *logged}
 
 
-def window_of(description: Description | None, kind: str, subject: str) -> tuple[float, float]:
-    """Return the least and the largest command of a table that count by rov.toml."""
-    windows = description.tables.windows if description else {}
-    return windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
-
-
-def narrowed(found: Folder, description: Description, tested: TestContents, useless: Sequence[str]) -> Tests | None:
+def narrowed(folder: Folder, description: Description, logged: Collection[str], useless: Sequence[str]) -> Tests | None:
     """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
 
-    The mistakes are added to those of the folder, and there is no vehicle then. `useless` has a line for each log that
-    tests nothing.
+    The mistakes are added to those of the folder, and there is no vehicle then. `logged` has the axes that logs test,
+    and `useless` a line for each log that tests nothing. What is left out of the vehicle is told first.
     """
-    known = {**_kept_from_base(description, tested), **description.known}
+    known = {**_kept_from_base(folder, description, logged), **description.known}
+    tested = axes_of(folder, logged)
     wide = _without_unknown_options(description.layout, known)
     axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
     layout = with_axes_alone(wide, axes)
     if not layout.axes:
-        line = f"{found.path}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
-        found.mistakes += useless or [line]
+        line = f"{folder.path}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
+        folder.mistakes += useless or [line]
         return None
     hardware = [*check_thruster_places(_with_axes(wide, axes))] or [*check_layout(layout)]
     own = None
@@ -116,51 +96,42 @@ def narrowed(found: Folder, description: Description, tested: TestContents, usel
             hardware += wrong
         else:
             own = with_axes_alone(own, axes)
-            hardware += check_layout(own, tested.axes)
+            hardware += check_layout(own, tested)
     hardware += _missing_hardware(description, layout, known)
-    tests, head = [*_missing_or_doubled_tests(description, tested, layout, known)], description.tables.vehicle
-    if hardware or tests or head is None:
-        found.rov_file_mistakes += lines_on(description.path, hardware)
-        found.mistakes += lines_on(found.path, tests)
+    tests = [*_missing_or_doubled_tests(folder, description, logged, layout, known)]
+    if hardware or tests or description.tables.vehicle is None:
+        folder.rov_file_mistakes += lines_on(description.path, hardware)
+        folder.mistakes += lines_on(folder.path, tests)
         return None
+    folder.findings[:0] = _left_out(folder, description, layout)
     names = layout.coefficients
     return Tests(
-        folder=found,
-        description=description,
-        head=head,
+        folder=folder,
+        logged=logged,
         vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
         known={name: known[name] for name in names if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
-        requests=description.requests.of(layout.curves_by_name),
         thrusters=own,
-        tested=tested,
-        findings=tuple(_left_out(description, tested, layout)),
     )
 
 
-def _kept_from_base(description: Description, tested: TestContents) -> dict[str, Quantity]:
+def _kept_from_base(folder: Folder, description: Description, logged: Collection[str]) -> dict[str, Quantity]:
     """Return the coefficients of the base that no test replaces."""
     replaced: set[str] = set()
+    thrust, steady, times = (folder.astern(kind) for kind in ("thrust", "steady", "time_constant"))
     for curve in description.layout.curves:
         if curve.name in description.requests.lag:
             replaced.add(curve.name_of("T"))
-        if curve.name in tested.thrust:
-            _, backward = tested.thrust[curve.name]
-            whole_curve = backward or f"a_t{REVERSE}" not in curve.keys
+        if curve.name in thrust:
+            whole_curve = thrust[curve.name] or f"a_t{REVERSE}" not in curve.keys
             keys = [key for key in CURVE if key != "T"] if whole_curve else ["a_t", "b_t"]
             replaced |= {*map(curve.name_of, keys)}
     for form in description.layout.axes:
         name = form.axis.name
-        keys = []
-        if name in tested.logs or name in tested.steady:
-            keys += ["a_d", "b_d"]
-        if name in tested.logs or tested.steady.get(name, False):
-            keys += ["a_d_reverse", "b_d_reverse"]
-        if name in tested.logs or name in tested.time_constants:
-            keys += ["beta"]
-        if name in tested.logs:
-            keys += ["F_0"]
-        replaced |= {*map(form.name_of, keys)}
+        tests = {"log": name in logged, "steady": name in steady, "time_constant": name in times}
+        tests["astern"] = steady.get(name, False)
+        told = (kind for kind in KINDS.values() if any(tests[test] for test in kind.told_by))
+        replaced |= {form.name_of(key) for kind in told for key in kind.keys}
     return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
 
 
@@ -173,8 +144,8 @@ def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
     return layout.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
 
 
-def _is_tested_or_known(axis: Axis, tested: TestContents, known: Collection[str]) -> bool:
-    return axis.name in tested.axes or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
+def _is_tested_or_known(axis: Axis, tested: Collection[str], known: Collection[str]) -> bool:
+    return axis.name in tested or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
 
 
 def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
@@ -209,18 +180,18 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, mix=kept, thrusters=thrusters, curves=curves_left)
 
 
-def _left_out(description: Description, tested: TestContents, layout: Layout) -> Iterator[Finding]:
+def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:
     """Yield a finding for each part that is described or tested but not in the layout."""
     for name in description.axes:
         if name not in layout.by_name:
             drag = ", ".join(AXES[name].coefficient(key) for key in ("a_d", "b_d"))
-            yield Finding("axis left out", axis=name, names={"drag": drag})
+            yield Finding("axis left out", axis=name, words={"drag": drag})
     if layout.fins:
-        yield Finding("fins not fitted", names={"fins": listed([fin.name for fin in layout.fins])})
+        yield Finding("fins not fitted", words={"fins": listed([fin.name for fin in layout.fins])})
     if description.layout.coupled and not layout.coupled:
         yield Finding("not coupled")
-    for name, (file, _) in tested.thrust.items():
-        if name not in layout.curves_by_name:
+    for (kind, name), (file, *_) in folder.files.items():
+        if kind == "thrust" and name not in layout.curves_by_name:
             yield Finding("unused curve", curve=name, file=file)
 
 
@@ -240,23 +211,23 @@ def _missing_hardware(description: Description, layout: Layout, known: Collectio
 
 
 def _missing_or_doubled_tests(
-    description: Description, tested: TestContents, layout: Layout, known: Collection[str]
+    folder: Folder, description: Description, logged: Collection[str], layout: Layout, known: Collection[str]
 ) -> Iterator[str]:
     """Yield a line for each coefficient that neither a test nor rov.toml gives, and for each that both give."""
+    thrust, steady = folder.astern("thrust"), folder.astern("steady")
     for curve in layout.curves:
         names = curve.coefficient("a_t"), curve.coefficient("b_t")
-        if curve.name not in tested.thrust:
+        if curve.name not in thrust:
             if not {*names} & {*known, *description.named}:
                 yield f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
             continue
-        file, backward = tested.thrust[curve.name]
         reverse_names = tuple(curve.name_of(f"{key}{REVERSE}") for key in ("a_t", "b_t"))
-        for pair in (names, reverse_names) if backward else (names,):
+        for pair in (names, reverse_names) if thrust[curve.name] else (names,):
             if given := [name for name in pair if name in description.known]:
-                yield f"rov.toml gives {', '.join(given)}, but there is {file} too"
+                yield f"rov.toml gives {', '.join(given)}, but there is {folder.files['thrust', curve.name][0]} too"
     for axis in layout.bare_axes:
         drag = [name for name in (axis.coefficient("a_d"), axis.coefficient("b_d")) if name not in known]
-        if drag and axis.name not in {*tested.steady, *tested.logs}:
+        if drag and axis.name not in {*steady, *logged}:
             yield (
                 f"no steady_{axis.name}*.csv or log of {axis.name} that counts, and [known] in rov.toml does not give "
                 f"{', '.join(drag)}"

@@ -256,7 +256,7 @@ def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: s
             continue
         unit = {"thrust": "N", "time_constant": "s"}.get(kind) or AXES[subject].unit
         out = values.get((one.quantity, subject, row.command), np.nan)
-        counts = tests.counts(kind, subject, row.command)
+        counts = tests.folder.counts(kind, subject, row.command)
         numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
         yield Point(subject, one.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 

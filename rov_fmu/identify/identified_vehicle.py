@@ -13,19 +13,20 @@ from typing import Any
 import numpy as np
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import REVERSE
+from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Part
+from rov_fmu.equation.parts import EVERY_COMMAND, Part, Range
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
-from rov_fmu.identify.result import Coefficient, Interval
+from rov_fmu.identify.result import Coefficient, Identification, Interval
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.description import Provenance
+from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
@@ -33,6 +34,8 @@ from rov_fmu.vehicle.writer import vehicle_text
 
 _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 """The keys of dead bands."""
+_WITHOUT_OUTLIERS = (0.005, 0.995)
+"""The quantiles between which a quantity counts as tested."""
 _DIGITS = (6, 9, 17)
 """The significant digits of the numbers of a result, and the decimals of correlations, which may be very close to 1:
 more than most tests give, and few enough to be equal on every machine. The others are for very exact data."""
@@ -42,8 +45,6 @@ _TOLD = 0.8
 """A coefficient is identified where its standard error is at most this share of that of its prior."""
 _SAME = 0.1
 """The difference of J that makes no other vehicle; 1 is one unit of 2 ln of the likelihood."""
-EXACT_BAND = 0.01
-"""A dead band is never claimed to better than this command: thrust begins gradually."""
 
 
 def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coefficient]]:
@@ -105,10 +106,12 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
                 correlation=others,
             )
     validity = tests.description.tables.validity
-    made = Provenance(tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.inputs))
+    made = Provenance(
+        tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.folder.inputs)
+    )
     vehicle = replace(
         rov,
-        **dict(tests.head),
+        **dict(tests.description.tables.vehicle or ()),
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
@@ -198,9 +201,9 @@ def _given_the_last(covariance: Array, count: int) -> Array:
     """
     first, last = slice(count), slice(count, None)
     regression = covariance[first, last] @ np.linalg.pinv(covariance[last, last], hermitian=True)
-    found = covariance[first, first] - regression @ covariance[last, first]
-    np.fill_diagonal(found, np.maximum(np.diag(found), 0.0))
-    return np.asarray(found)
+    conditional = covariance[first, first] - regression @ covariance[last, first]
+    np.fill_diagonal(conditional, np.maximum(np.diag(conditional), 0.0))
+    return np.asarray(conditional)
 
 
 METHOD = (
@@ -261,14 +264,14 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
         coefficients, misfits = _in_file(posterior, fit, z), [one.misfit for one in measured(z)]
         return np.vstack([*(np.broadcast_to(coefficients[name], z.shape[1]) for name in names), *misfits])
 
-    found, covariance, prior = posterior.numbers(values)
+    means, covariance, prior = posterior.numbers(values)
     first, own = len(names), slice(len(names))
     for one in measured(posterior.z[:, None]):
         here = slice(first, first := first + len(one.misfit))
         places = [names.index(name) for name in one.coefficients]
-        mean_square = float(np.mean(found[here] ** 2 + np.diag(covariance[here, here])))
+        mean_square = float(np.mean(means[here] ** 2 + np.diag(covariance[here, here])))
         covariance[np.ix_(places, places)] += one.covariance(mean_square)
-    return _Numbers(found[own], covariance[own, own], prior[own, own])
+    return _Numbers(means[own], covariance[own, own], prior[own, own])
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
@@ -290,7 +293,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         if name in base or not key.endswith(REVERSE) or key not in EFFECT_OF:
             return True
         effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
-        return (effect, of) in present or (effect == "reverse thrust" and fit.known.measured_curves.get(of, False))
+        return (effect, of) in present
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
@@ -302,8 +305,6 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=tests.vehicle.layout.mix,
-        pulse=tests.vehicle.layout.pulse,
-        has_dead_time=tests.vehicle.layout.has_dead_time,
     )
 
 
@@ -342,3 +343,38 @@ def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Number
     ]
     low, high = hull((vehicle[name], vehicle[name]), *ends)
     return float(max(low, declaration.minimum)), float(min(high, declaration.maximum))
+
+
+# ---- The ranges of the tests -----------------------------------------------------------------------------------------
+
+
+def tested_ranges(identification: Identification) -> Iterator[Range]:
+    """Yield the range of the commands, and those of each velocity, of roll and pitch and of the depth in the tests.
+
+    The ends have three digits, and an end that is next to nothing is no range.
+    """
+    ends_of: dict[str, list[float]] = {}
+    for one in identification.folder.logs:
+        for channel in one.channels:
+            if not channel.unused and (name := _variable(channel.quantity)):
+                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
+                ends_of.setdefault(name, []).extend(ends)
+    for result in identification.axes:
+        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
+        if measured:
+            ends_of.setdefault(result.axis.velocity, []).extend(measured)
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
+    if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
+        yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
+        yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
+
+
+def _variable(quantity: Quantity) -> str:
+    """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
+    if quantity.axis is None:
+        return ""
+    return quantity.axis.velocity if quantity.is_velocity else _POSITIONS.get(quantity.axis, "")
+
+
+_POSITIONS = {HEAVE: "z", ROLL: "phi", PITCH: "theta"}
+"""The variables of the depth and of the angles from the level."""

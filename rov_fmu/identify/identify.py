@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
 
-from rov_fmu.equation.catalogue import AXES, SURGE, SWAY, Axis
+from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
@@ -87,9 +87,8 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         axes.append(one)
     of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
-    found = Identification(
-        folder=replace(tests.folder, findings=[*tests.findings, *beyond_thrusters(vehicle, of_file)]),
-        inputs=tests.inputs,
+    result = Identification(
+        folder=replace(tests.folder, findings=[*tests.folder.findings, *beyond_thrusters(vehicle, of_file)]),
         vehicle=of_file,
         against=against,
         axes=tuple(axes),
@@ -107,7 +106,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         slips=wrong,
         structures=tuple(structures_of(fit)),
     )
-    return told(found)
+    return told(result)
 
 
 def _axis(
@@ -127,16 +126,15 @@ def _axis(
     own, tested = tuple(p for p in predicted if p.axis is axis), fit.tested(axis)
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
-    is_steady = all(d.share <= MOST_GAIN for d in slow if d.kind == "slow gain" and d.kept)
+    is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     if is_told and is_steady:
         answers = assess.answers(
             (*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least
         )
-    unknown = [d for d in slow if d.axis is axis or d.kind == "slow gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
-    misfits = [f.file for f in tests.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
+    misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
     steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
@@ -148,7 +146,7 @@ def _axis(
         answers=answers,
         tested=tested,
         steady=steady,
-        disturbances=unknown,
+        disturbances=[d for d in slow if d.concerns(axis)],
         effects=acting,
         slips=[s for s in wrong if s.file in files],
         misfits=misfits,
@@ -167,7 +165,6 @@ def _axis(
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
         structure=evidence.structure,
-        lagged=assess.time_with_lag(fit.posteriors, axis, vehicle, pushes, fits) if answers else None,
     )
 
 
@@ -180,11 +177,11 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     description = tests.description
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
     shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
-    lacking = [AXES[f.axis] for f in tests.findings if f.kind in ("axis left out", "axis not pushed")]
+    lacking = [AXES[f.axis] for f in tests.folder.findings if f.kind in ("axis left out", "axis not pushed")]
     for axis in (*(one.axis for one in vehicle.layout.axes if one.axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known
         told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
-        if axis.name in tests.tested.axes:
+        if axis.name in tests.axes:
             told = "no test changes it"
         elif axis in shown:
             told = "nothing in the logs drives it"

@@ -55,7 +55,7 @@ def next_test(
     worst = int(np.argmax(now))
     values, vectors = np.linalg.eigh(posterior.covariance / np.outer(posterior.errors, posterior.errors))
     root = posterior.errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-    found = []
+    tests = []
     for strength in _STRENGTHS:
         held = motions(posterior.z, (0.0, strength, -strength)).of.items()
         hold = _hold([AxisAlone.of({key: float(each[n]) for key, each in held}) for n in range(3)], axis, limits)
@@ -69,8 +69,8 @@ def next_test(
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
         then = np.sqrt(_widths(slopes, covariance) ** 2 + rest)
         target = f"the speed at {COMMANDS[worst]:.0%}"
-        found.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
-    return min(found, key=lambda test: test.then, default=None)
+        tests.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
+    return min(tests, key=lambda test: test.then, default=None)
 
 
 def _widths(slopes: Array, covariance: Array) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
@@ -68,6 +68,8 @@ class Answer:
     """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
     stop: tuple[float, Interval]
     """The stopping distance: from it to a tenth of it without thrust, m or rad."""
+    lagged: tuple[float, Interval] | None = None
+    """The time with the lag of the thrusters, s; None without a lag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,6 +220,15 @@ class Disturbance(Effect):
     """When it first exceeds twice its own uncertainty, s after the start of the log."""
     cause: str = ""
     """The channel that explains it in words, such as `the voltage`; empty if none does."""
+
+    @property
+    def changes_thrust(self) -> bool:
+        """True for a change of all thrust."""
+        return self.kind == "slow gain"
+
+    def concerns(self, axis: Axis) -> bool:
+        """Return True if it acts along an axis. Without an axis, it acts along all, or on the horizontal velocity."""
+        return self.axis is axis or (self.axis is None and (self.changes_thrust or axis in (SURGE, SWAY)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,8 +393,6 @@ class AxisResult:
     """Held-out predictions; empty where the axis has only tables or a single short log."""
     points: tuple[Point, ...]
     next_test: NextTest | None
-    lagged: tuple[float, Interval] | None = None
-    """The time to 63 % of the steady velocity at half command with the lag of the thrusters, s; None without a lag."""
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
     structure: float = 0.0
@@ -405,8 +414,6 @@ class Identification:
 
     folder: Folder
     """The tests, with rov.toml."""
-    inputs: Mapping[str, str]
-    """The SHA3-256 of every file that was read, by its name."""
     vehicle: Vehicle
     against: Vehicle | None
     """The vehicle to compare with."""
@@ -439,8 +446,8 @@ class Identification:
     @property
     def verdicts(self) -> dict[Axis, Verdict]:
         """The verdict of every axis of the base and of rov.toml, those that are identified first."""
-        found = {one.axis: one.verdict for one in self.axes}
-        return found | {one.axis: one.verdict for one in self.axes_of_base}
+        verdicts = {one.axis: one.verdict for one in self.axes}
+        return verdicts | {one.axis: one.verdict for one in self.axes_of_base}
 
     @property
     def seconds(self) -> float:

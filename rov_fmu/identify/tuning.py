@@ -151,6 +151,6 @@ def implausible(tuning: Tuning) -> Iterator[Finding]:
         value = tuning.vehicle[name := axis.coefficient(kind)]
         if name in tuning.intervals and not low <= value <= high:
             inertia = f"{1.0 / value:.3g} times {axis.inertia}{' and the added one' if has_added else ''}"
-            names = {kind: name, "push": axis.push, "unit": axis.unit, "inertia": inertia, "mass": axis.inertia}
+            words = {kind: name, "push": axis.push, "unit": axis.unit, "inertia": inertia, "mass": axis.inertia}
             numbers = {"value": value, "low": low, "high": high}
-            yield Finding(f"implausible tuned {kind}", axis=axis.name, names=names, numbers=numbers)
+            yield Finding(f"implausible tuned {kind}", axis.name, words={**words, **numbers})

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.identify.findings import acting
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     LEAST_TESTED,
@@ -101,7 +102,8 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells."""
+    """The reason, with `size`, the value with two digits, `share`, the value in percent, `known`, how well a number is
+    known whose half-width the value is, and what `names` tells."""
     names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
@@ -125,15 +127,10 @@ class Rule:
 
 
 def _largest(e: Evidence) -> dict[str, str]:
-    """Return what the largest unknown disturbance is, as a sentence without its size."""
+    """Return what the largest unknown disturbance does, and its file."""
     largest = max(e.unknown, key=lambda d: d.share)
-    is_turn = largest.axis is not None and largest.axis.is_rotation
-    what = {
-        "slow gain": "The thrust changes for an unknown reason by {}",
-        "slow force": f"An unknown slow {'torque' if is_turn else 'force'} of {{}} of the thrusters' acts",
-        "slow velocity": "An unknown slow velocity over ground of {} of the vehicle's acts",
-    }
-    return {"what": what[largest.kind].format(percent(largest.share)), "file": largest.file}
+    what = acting(largest)
+    return {"what": what[:1].upper() + what[1:], "file": largest.file}
 
 
 def _reach(e: Evidence) -> dict[str, str]:
@@ -142,6 +139,13 @@ def _reach(e: Evidence) -> dict[str, str]:
     if score < 0.0:
         return {"reach": "are worse than no change"}
     return {"reach": f"reach {percent(score)} of the way from no change (0%) to the noise of the sensors (100%)"}
+
+
+def _known(half_width: float) -> str:
+    """Return how well a number is known, as the end of a sentence, by the relative half-width of its interval."""
+    if half_width > 1.0:
+        return "not known: its interval is wider than its value"
+    return f"known to no better than {percent(half_width)}"
 
 
 RULES = (
@@ -217,14 +221,14 @@ RULES = (
         lambda e: e.half_width("steady"),
         0.15,
         0.3,
-        "A steady velocity is known to no better than {share}.",
+        "A steady velocity is {known}.",
     ),
     Rule(
         "the same of times and stopping distances",
         lambda e: e.half_width("rise", "stop"),
         0.3,
         None,
-        "A time or a stopping distance is known to no better than {share}.",
+        "A time or a stopping distance is {known}.",
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
@@ -291,7 +295,7 @@ def verdict(e: Evidence) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
-        rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
+        rule.sentence.format(size=significant(value, 2), share=percent(value), known=_known(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]

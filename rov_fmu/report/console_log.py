@@ -9,8 +9,8 @@ from rov_fmu.identify.inspection.inspected import Inspected
 from rov_fmu.io.messages import first_of, print_message
 from rov_fmu.report.console import console, paragraph, print_table, table, text
 from rov_fmu.tank.columns import in_degrees
-from rov_fmu.tank.findings import SENTENCES, sentences
-from rov_fmu.tank.inspection.inspection import Inspection, Row
+from rov_fmu.tank.findings import sentences
+from rov_fmu.tank.inspection.inspection import Inspection, Signal
 
 _LEVELS = "▁▂▃▄▅▆▇█"
 _ASCII_LEVELS = "_.-~=+*#"
@@ -73,7 +73,7 @@ def unrecognised(inspection: Inspection) -> list[str]:
 
 def notes(inspection: Inspection) -> list[str]:
     """Return what headers are taken for, and what was left out, taken or doubted."""
-    told = (line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings, SENTENCES))
+    told = (line.removeprefix(f"{inspection.name}: ") for line in sentences(inspection.findings))
     return [*(f"{title} is taken as {meant}" for title, meant in inspection.columns.items()), *told]
 
 
@@ -87,7 +87,7 @@ def _rows(inspection: Inspection) -> Table:
     return found
 
 
-def cells(row: Row) -> tuple[str, ...]:
+def cells(row: Signal) -> tuple[str, ...]:
     """Return the cells about a command or a channel: name, unit, samples, rate, least and largest value, gaps. Angles
     are in degrees."""
     factor, unit = in_degrees(row.unit)
@@ -95,7 +95,7 @@ def cells(row: Row) -> tuple[str, ...]:
     return row.name, unit, str(row.samples), *digits, ", ".join(_gaps(row))
 
 
-def _drawn(row: Row) -> str:
+def _drawn(row: Signal) -> str:
     """Draw the course of a signal between its least and its largest value, with blanks in gaps."""
     means = [value for value in row.course if isfinite(value)]
     low, size = min(means, default=0.0), max(means, default=0.0) - min(means, default=0.0)
@@ -104,7 +104,7 @@ def _drawn(row: Row) -> str:
     return "".join(levels[min(int(8 * place), 7)] if isfinite(place) else " " for place in places)
 
 
-def _gaps(row: Row) -> Iterator[str]:
+def _gaps(row: Signal) -> Iterator[str]:
     """Yield the first gaps of a signal, with times from its first sample."""
     for start, end in row.gaps[:_MOST_GAPS]:
         yield f"{end - start:.3g} s at {start - row.start:.4g} s"

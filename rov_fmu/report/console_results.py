@@ -41,10 +41,10 @@ def print_identification(identification: Identification) -> None:
     for axis, verdict in identification.verdicts.items():
         paragraph(out, f"- {verdict.of(axis)}")
     asides = [*with_lag(identification), *driven_aside(identification), *extrapolated(identification)]
-    for found, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
-        if found.rows:
+    for shown, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
+        if shown.rows:
             out.print()
-            print_table(found, out)
+            print_table(shown, out)
         for line in lines:
             paragraph(out, f"- {line}")
     out.print()
@@ -55,14 +55,14 @@ def print_identification(identification: Identification) -> None:
 def _answers(axes: Sequence[AxisResult]) -> Table:
     """Return the table of what an owner asks about each axis."""
     speeds = [f"speed at {share:.0%}" for share in SHARES]
-    found = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "stopping distance"])
+    shown = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "stopping distance"])
     for result in axes:
         axis, half = result.axis, answer_at(result, 0.5)
         cells = [_known(answer_at(result, share), "steady", axis.unit) for share in SHARES]
         cells += [_known(half, "rise", "s"), _known(half, "stop", axis.position_unit)]
-        found.add_row(f"{axis.positive} ({axis.name})", *cells)
-    found.caption = STOPPING
-    return found
+        shown.add_row(f"{axis.positive} ({axis.name})", *cells)
+    shown.caption = STOPPING
+    return shown
 
 
 def _known(answer: Answer | None, part: str, unit: str) -> str:
@@ -71,15 +71,15 @@ def _known(answer: Answer | None, part: str, unit: str) -> str:
 
 def _errors(axes: Sequence[AxisResult]) -> Table:
     """Return the table of the errors of predictions of data that the fit had not seen."""
-    found = table("", "Unseen data, RMS", ("error", "no change", "noise"))
+    shown = table("", "Unseen data, RMS", ("error", "no change", "noise"))
     for result in axes:
         if p := result.main:
-            found.add_row(name_of(p), *(size_in_words(size, p.unit) for size in (p.error, p.unchanged, p.noise)))
+            shown.add_row(name_of(p), *(size_in_words(size, p.unit) for size in (p.error, p.unchanged, p.noise)))
         for quantity in () if result.main else ("V_ss", "Tau"):
             if points := [p for p in result.points if p.quantity == quantity and p.counts]:
                 error = text(relative_error(points, "held_out"), ".1%")
-                found.add_row(f"{result.axis.name} {quantity}, {len(points)} points", error, "-", "-")
-    return found
+                shown.add_row(f"{result.axis.name} {quantity}, {len(points)} points", error, "-", "-")
+    return shown
 
 
 def _conclusions(identification: Identification) -> Iterator[str]:

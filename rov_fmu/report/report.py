@@ -11,6 +11,7 @@ from markupsafe import Markup
 
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.io.output import Output, sealed
@@ -83,6 +84,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         SHARES=findings.SHARES,
         STOPPING=findings.STOPPING,
         KNOTS=KNOTS,
+        KINDS=KINDS,
         answer_at=findings.answer_at,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,

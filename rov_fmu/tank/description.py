@@ -134,10 +134,6 @@ class Requests(Strict):
         """The quantities that every log must have, by the key of [fit] that needs them."""
         return {"voltage": ("voltage",) * self.voltage, "attitude": ("roll angle", "pitch angle") * self.attitude}
 
-    def of(self, curves: Collection[str]) -> "Requests":
-        """Return the requests for some curves."""
-        return self.model_copy(update={"lag": tuple(name for name in self.lag if name in curves)})
-
 
 def _check_files(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ...]:
     """Check that a dive has several files, which are in the folder of rov.toml."""

@@ -94,6 +94,23 @@ class Folder:
         """The samples of the voltage of each log that has one, V."""
         return [c.samples[1] for log in self.logs if (c := log.used("voltage")) and c.count]
 
+    def counts(self, kind: str, subject: str, command: float) -> bool:
+        """Return True if a command in a table is inside the window of rov.toml."""
+        windows = self.rov_file.tables.windows
+        low, high = windows.get(f"thrust_{subject}" if kind == "thrust" else subject, (-1.0, 1.0))
+        return low <= command <= high
+
+    def astern(self, kind: str) -> dict[str, bool]:
+        """Return whether commands astern count in the tables of a kind, by curve or axis."""
+        return {
+            subject: any(
+                row.command < 0.0 and self.counts(kind, subject, row.command)
+                for row in self.rows.get((kind, subject), ())
+            )
+            for other, subject in self.files
+            if other == kind
+        }
+
     def read(self, path: Path) -> None:
         """Read one file."""
         try:
@@ -160,7 +177,7 @@ class Folder:
             commanded = {name for one in largest for name, most in one.items() if most}
             told = [f"{name} = {full[name]:.3g} {loads[name]}" for name in full if name in loads.keys() & commanded]
             inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
-            self.findings.append(Finding("wrench", names={"full": listed(told) or "there is none", "inputs": inputs}))
+            self.findings.append(Finding("wrench", words={"full": listed(told) or "there is none", "inputs": inputs}))
 
     def read_dive(self, dive: Dive) -> None:
         """Read the files of a dive together."""

@@ -2,21 +2,23 @@
 
 import re
 from importlib import import_module
-from inspect import getsource
 from pathlib import Path
 
 import pytest
 import tomlkit
 
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify import assess, held_out
+from rov_fmu.identify.findings import acting
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import hypotheses, objective, records
-from rov_fmu.identify.likelihood.kinds import EFFECTS
+from rov_fmu.identify.likelihood.kinds import EFFECTS, SLOW
 from rov_fmu.identify.result import MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
-from rov_fmu.identify.verdict import RULES, _largest
+from rov_fmu.identify.verdict import RULES
 from tests.commands import ROOT
 from tests.folders import FORCE, RATE, SPEED, TAU, read
+from tests.report import results
 
 DOCS = ROOT / "docs"
 USE, FORMATS, METHOD = (DOCS / f"identify{end}.md" for end in ("", "-formats", "-method"))
@@ -113,7 +115,8 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
 def test_every_reason_of_a_verdict_is_told_with_what_to_do() -> None:
     table = (DOCS / "identify-verdicts.md").read_text("utf-8")
     told = [row.split(" …")[0] for row in re.findall(r"^\| ([A-Z].*?) \|", table, re.MULTILINE)]
-    _, *of_disturbances = re.findall(r'"([A-Z][^"]*)', getsource(_largest))  # without the docstring
+    found = [results.disturbance(kind, HEAVE, "log.csv", 1.0, "N", 0.1, None, 9.0) for kind in SLOW]
+    of_disturbances = [acting(one).capitalize() for one in found]
     reasons = [*(rule.sentence for rule in RULES if rule.sentence[0] != "{"), *of_disturbances]
     assert len(reasons) > len(told) > 0
     assert not [reason for reason in reasons if not reason.startswith(tuple(told))]

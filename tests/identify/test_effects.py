@@ -14,13 +14,19 @@ from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
 from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
+from rov_fmu.identify.findings import findings_of, sentences
 from rov_fmu.identify.held_out import ahead, cautious
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood import kinds
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import KEPT, Identification, Interval
 from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
+from tests.report.results import without_findings
 from tests.vehicles import VIDEORAY
 
 ERROR = 0.004
@@ -87,6 +93,48 @@ def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: given.Te
     plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
     assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2
     assert [form.keys for form in plain.layout.axes] == [("a_d", "b_d")] * 2
+
+
+def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
+    fit: Fit, short: given.Tests, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is declared only: the thrust along heave differs from that along other axes, as by a wake."""
+    wake = kinds.Kind(
+        kinds.Deviation("wake", 0.1, "thrust along an axis", "a made-up reason"),
+        "made-up share of the thrust",
+        ". Nobody knows why",
+        keys=("alpha",),
+        is_coefficient=True,
+        of_axis=lambda _, form: {} if form.axis is HEAVE else None,
+        mean=1.0,
+        null=1.0,
+    )
+    monkeypatch.setitem(kinds.KINDS, "wake", wake)
+    monkeypatch.setitem(kinds.EFFECT_OF, "alpha", "wake")
+    assert wake.prior
+    monkeypatch.setitem(kinds.PRIORS, "wake", wake.prior)
+    known, old = replace(fit.known, deviations={"wake": 0.3}), fit.posterior.table
+    table = table_of(known, fit.objective.logs, [p.of for p in old.parameters if p.kind == "row noise"])
+    place = table.place("wake", "heave")
+    assert place is not None
+    assert table.parameters[place].deviation == 0.3
+    z = np.insert(fit.best.z, place, 1.0)
+    objective = Objective(table, fit.objective.logs, fit.objective.rows, thinned=True)
+    end = minimise(objective, z, most=1, last=False)
+    assert end.value <= objective.value(z, objective.runs(z))
+    assert end.information[place, place] > 2.0 / 0.3**2, "the logs tell something of it"
+    clear = found(replace(fit, known=known, posterior=Posterior(table, z, np.eye(len(z)))), wake=1.2)
+    (effect,) = (one for one in effects_of(clear) if one.kind == "wake")
+    assert (effect.value, effect.of, effect.kept) == (1.2, "heave", True)
+    result = replace(without_findings(), effects=(effect,))
+    (sentence,) = sentences(findings_of(result), "effect")
+    interval = f"({1.2 - HALF:.3f} to {1.2 + HALF:.3f})"
+    assert sentence == f"heave: the made-up share of the thrust is 1.200 {interval}. Nobody knows why"
+    vehicle, numbers = identified_vehicle(short, clear)
+    assert vehicle["alpha_w"] == numbers["alpha_w"].value == 1.2
+    assert vehicle.sources["alpha_w"] == "Identified from the tests, as the method says"
+    plain, _ = identified_vehicle(short, found(clear, wake=1.0))
+    assert plain["alpha_w"] == 1.0
 
 
 def test_effects_are_told_in_their_units(fit: Fit) -> None:

@@ -13,7 +13,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import facts, warnings
+from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification, coverage_of
@@ -129,7 +129,8 @@ def test_the_vehicle_file_is_read_as_it_was_written(of_tables: Identification, t
     }
     assert of_tables.vehicle.provenance
     assert of_tables.vehicle.measured_from == "tank tests"
-    assert (made.warnings, made.facts) == (warnings(of_tables.findings), facts(of_tables.findings))
+    groups = by_heading(of_tables.findings)
+    assert (made.warnings, made.facts) == ((*groups["Warnings"], *groups["Doubts"]), groups["Facts"])
     assert vehicle.command_range == (0.2, 0.8)
 
 
@@ -138,7 +139,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
     tests = read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', responses(TRUTH, YAW))
     assert tests.vehicle.layout == base.layout
-    assert tests.inputs.keys() == {"rov.toml", "videoray_refit", "steady_yaw.csv", "time_constant_yaw.csv"}
+    assert tests.folder.inputs.keys() == {"rov.toml", "videoray_refit", "steady_yaw.csv", "time_constant_yaw.csv"}
     result = identify(tests)
     about = {finding.axis or finding.curve for finding in result.findings}
     assert about == {"yaw", "rear"}, "the untested axes lack nothing"

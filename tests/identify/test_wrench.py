@@ -147,7 +147,7 @@ def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], No
     assert [line.partition(" ")[0] for line in lines] == ["m_rov", "I_r"]
     path.write_text(draft.replace('value = "?"', "value = 20.0"), encoding="utf-8")
     tests = load_tests(tmp_path)
-    assert tests.tested.logs == axes.split()
+    assert tests.logged == axes.split()
     (log,) = tests.folder.logs
     assert log.commands
     places = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]
@@ -203,7 +203,7 @@ def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
     found = identify(load_tests(tmp_path))
     assert not {"beyond thrusters", "saturation"} & {finding.kind for finding in findings_of(found)}
     (wrench,) = (finding for finding in found.findings if finding.kind == "wrench")
-    assert wrench.names["full"].count(" = ") == 2, "only of the forces that the logs command"
+    assert str(wrench.words["full"]).count(" = ") == 2, "only of the forces that the logs command"
     for answer in found.axes[0].answers:
         thrust = (QUADRATIC_THRUST * abs(answer.command) + LINEAR_THRUST) * abs(answer.command)
         force = (2.0 * np.cos(TOE) + np.sin(TILT)) * thrust

@@ -101,7 +101,7 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
     weigh(tmp_path)
     tests = load_tests(tmp_path)
     assert tests.vehicle["m_rov"] == 12.0
-    assert axes <= {*tests.tested.logs}
+    assert axes <= {*tests.logged}
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
     assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
@@ -484,7 +484,7 @@ def test_what_no_fit_can_learn_is_told_with_its_reason(tmp_path: Path, inspect: 
         "yaw: known less well, because it is never commanded alone, only together with surge",
         "speeds beyond the strongest commands, 30% in surge and 30% in yaw, are extrapolated",
         "dive.csv: the log has momentary commands: about 85% of the heave command is lost between its rows (10 per",
-        "forces are relative to an assumed thrust",
+        "t200 thrust: no force was measured, so loads, drag, masses and β are in units of the assumed thrust",
     ):
         assert f"- {words}" in told
     still = [np.where(time < 20.0, 0.3, 0.0) for _ in range(4)] + [np.zeros(400)] * 2
@@ -507,7 +507,7 @@ def test_a_log_of_one_axis_commands_it_alone_and_measured_forces_are_not_assumed
     assert "speeds beyond the strongest commands, 50% in surge, are extrapolated" in told
     assert not re.search("alone|assumed thrust", told)
     (tmp_path / "thrust_top.csv").unlink()
-    assert "unless thrust_top.csv has measured ones" in inspect(option="")[0]
+    assert "write command and force into thrust_top.csv" in inspect(option="")[0]
 
 
 def test_the_page_of_logs_has_a_picture_of_each(tmp_path: Path) -> None:
@@ -547,8 +547,8 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     assert warning.startswith(f"rov-fmu: warning: {name}: left out as unreadable: ")
     weigh(tmp_path)
     tests = load_tests(tmp_path)
-    assert tests.tested.logs == ["heave"]
-    assert f"{name}: left out as unreadable" in by_heading(tests.findings)["Warnings"][0]
+    assert tests.logged == ["heave"]
+    assert f"{name}: left out as unreadable" in by_heading(tests.folder.findings)["Warnings"][0]
     log.unlink()
     for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):
         assert main(["identify", *arguments]) == 2

@@ -147,12 +147,11 @@ def without_findings() -> Identification:
     names = tuple(known.name for result in axes for known in result.known)
     correlation = np.eye(len(names))
     correlation[0, 1] = correlation[1, 0] = -0.9
-    findings = [Finding("rows sorted", file=FILES[0], numbers={"count": 3.0})]
+    findings = [Finding("rows sorted", file=FILES[0], words={"count": 3.0})]
     rows: dict[tuple[str, str], list[Row]] = {("steady", result.axis.name): [] for result in axes}
     inputs = {"rov.toml": "0" * 64, FILES[0]: "1" * 64, FILES[1]: "2" * 64, "thrust_top.csv": "3" * 64}
     return Identification(
         folder=Folder(Path("pond"), NO_ROV_FILE, logs=[*map(log, FILES)], inputs=inputs, findings=findings, rows=rows),
-        inputs=inputs,
         vehicle=vehicle,
         against=None,
         axes=axes,

@@ -162,6 +162,6 @@ def test_columns_of_one_axis_are_corrected(
     assert [float(text) for text in one.corrected.split()[:1]] == pytest.approx(expected, abs=0.11)
     assert one.corrected.split()[1:] == words.split()[1:]
     assert one.values == pytest.approx(velocity if words else velocity - offset, abs=0.003)
-    assert [f.names["velocity"] for f in found.findings if f.kind == "velocity corrected"] == [quantities[1]] * bool(
+    assert [f.words["velocity"] for f in found.findings if f.kind == "velocity corrected"] == [quantities[1]] * bool(
         words
     )

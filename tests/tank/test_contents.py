@@ -10,7 +10,7 @@ from scipy.io import savemat
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.readers.tables import open_matlab
@@ -136,7 +136,7 @@ def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
     down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
     quantity = "heading" if "heading" in told else "depth"
     found = checked(log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values)))
-    assert sentences(found.findings, SENTENCES) == ((f"a.csv: {told}",) if told else ())
+    assert sentences(found.findings) == ((f"a.csv: {told}",) if told else ())
 
 
 TOE = """[vehicle]
@@ -173,7 +173,7 @@ def test_thrusters_with_a_toe_in_and_a_log_with_sway(axes: str, tmp_path: Path) 
     left, right = np.where(TIME > 2.0, 0.5, 0.0), np.where(TIME > 5.0, 0.3, 0.0)
     table(tmp_path / "dive.csv", titles, TIME, left, right, motion.U, motion.V, motion.HEADING)
     tests = load_tests(tmp_path)
-    assert [*tests.vehicle.layout.by_name] == tests.tested.logs == ["surge", "yaw"]
+    assert [*tests.vehicle.layout.by_name] == tests.logged == ["surge", "yaw"]
     assert "dive.csv: the motion in sway is left out, because the thrusters drive it only together with" in (
-        "\n".join(sentences(tests.findings, SENTENCES))
+        "\n".join(sentences(tests.folder.findings))
     )

@@ -97,7 +97,7 @@ def test_the_coupling_of_the_base_can_be_changed(base: str, coupling: bool | Non
     tests = read(tmp_path, f'base = "{base}"\n{HEAD}{own}', responses(vehicle, HEAVE))
     wanted = vehicle.layout.coupled if coupling is None else coupling
     assert tests.vehicle.layout.coupled == (wanted and base != "videoray")
-    assert ("not coupled" in [finding.kind for finding in tests.findings]) == (wanted and base == "videoray")
+    assert ("not coupled" in [finding.kind for finding in tests.folder.findings]) == (wanted and base == "videoray")
 
 
 @pytest.mark.parametrize("own", ["", 'base = "videoray"\n', 'base = "../of/mine.toml"\n'])
@@ -114,7 +114,7 @@ def test_the_base_of_the_command_line_may_lie_anywhere(
     inputs: list[Path] = []
     tests = load_tests(folder, inputs.extend, elsewhere)
     assert elsewhere in inputs
-    assert [*tests.inputs][:2] == [ROV_FILE, "mine.toml"]
+    assert [*tests.folder.inputs][:2] == [ROV_FILE, "mine.toml"]
     assert not tests.vehicle.layout.coupled
     assert load_tests(folder, base=SHIPPED["bluerov2"]).description.base_name == "bluerov2"
     for given, target, message in (
@@ -146,11 +146,11 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     header = ",".join([*names, "surge distance [m]", "depth [m]"])
     tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
     tests = read(tmp_path, f"{rov}[axes.heave]\n", tables)
-    assert [*tests.vehicle.layout.by_name] == tests.tested.logs == ["surge"]
-    assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.findings
+    assert [*tests.vehicle.layout.by_name] == tests.logged == ["surge"]
+    assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.folder.findings
     assert any(
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line
-        for line in by_heading(tests.findings)["Warnings"]
+        for line in by_heading(tests.folder.findings)["Warnings"]
     )
 
 
@@ -162,7 +162,7 @@ def test_lag_to_be_found(lag: str, curves: tuple[str, ...], tmp_path: Path) -> N
     tests = Path(shutil.copytree(TESTS, tmp_path / "tests"))
     with (tests / ROV_FILE).open("a", encoding="utf-8") as file:
         file.write(f"\n[fit]\nlag = {lag}\n")
-    assert load_tests(tests).requests.lag == curves
+    assert load_tests(tests).description.requests.lag == curves
 
 
 GIVEN = {"a_d_w": 40.0, "F_0_w": -1.0, "T_t200": 0.3, "c_0_t200": 0.02}
@@ -186,5 +186,6 @@ def test_a_number_of_rov_toml_is_in_the_vehicle_as_it_is(names: tuple[str, ...],
 def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
     (text,) = re.findall(r"```toml\n(base = .*?)```", (DOCS / "identify.md").read_text(encoding="utf-8"), re.DOTALL)
     given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"})
-    assert given.head.name == "Our BlueROV2"
+    assert given.description.tables.vehicle
+    assert given.description.tables.vehicle.name == "Our BlueROV2"
     assert given.vehicle.layout == load_vehicle(SHIPPED["bluerov2"]).layout

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from rov_fmu.identify.findings import heading, sentences
+from rov_fmu.identify.findings import SEVERITY, sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
 from rov_fmu.tank.quality import checked
@@ -41,7 +41,7 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
         f"a.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
         "log or the sensor stop? Their later values are left out",
     )
-    assert {heading(finding) for finding in found.findings} == {"Warnings"}
+    assert {SEVERITY[finding.kind] for finding in found.findings} == {"Warnings"}
     for quantity in ("depth", "heading"):
         assert used(found, quantity).samples[0][-1] == pytest.approx(float(start) - 0.1)
     assert used(found, "voltage").values.tolist() == voltage.values.tolist()
@@ -75,7 +75,7 @@ def check(told: list[list[float]], *measured: Array) -> None:
     """Check the numbers of the findings about frozen sensors, and that sensors that may be right stay as they are."""
     given = channels(*measured)
     found = checked(log(None, *given))
-    assert [pytest.approx([finding.numbers["start"]]) for finding in found.findings] == told
+    assert [pytest.approx([finding.words["start"]]) for finding in found.findings] == told
     assert told or [*found.channels] == given
 
 

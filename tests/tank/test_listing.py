@@ -64,7 +64,7 @@ def folder(tmp_path: Path) -> Path:
 
 
 def _told(folder: Path) -> dict[str, list[str]]:
-    return {heading: [*lines] for heading, lines in by_heading(load_tests(folder).findings).items()}
+    return {heading: [*lines] for heading, lines in by_heading(load_tests(folder).folder.findings).items()}
 
 
 def test_each_file_that_is_not_read_is_named_with_the_reason(folder: Path, capsys: Capsys) -> None:

@@ -12,7 +12,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from tests.tank.logs import Read, commanded, measured, read_log, used
 from tests.vehicles import VIDEORAY, thruster
 
@@ -47,7 +47,7 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
     rows[21:21] = ["2.05,,5", "2.06,on,5", "2.07,-,5", "2.08,30,x", "2.09,3,4,5"]
     rows[20:20] = ["1.9,30,", "1.9,25,77", ",30,5", "nan,30,5"]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [(finding.kind, finding.numbers["count"]) for finding in log.findings] == [
+    assert [(finding.kind, finding.words["count"]) for finding in log.findings] == [
         ("rows sorted", 1),
         ("time stamps merged", 2),
         ("rows without time", 2),
@@ -56,7 +56,7 @@ def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> No
         ("unread cells", 1),
     ]
     assert {finding.file for finding in log.findings} == {"log.csv"}
-    assert [one.names for one in log.findings[-2:]] == [{"column": "command [%]"}, {"column": "depth [cm]"}]
+    assert [one.words["column"] for one in log.findings[-2:]] == ["command [%]", "depth [cm]"]
     depth = used(log.log, "depth")
     in_order = 0.01 * np.arange(N)
     in_order[19] = 0.77
@@ -75,7 +75,7 @@ def test_a_measurement_without_a_unit_is_told(tmp_path: Path) -> None:
     )
     (finding,) = log.findings
     assert finding.kind == "column without unit"
-    assert sentences([finding], SENTENCES) == (
+    assert sentences([finding]) == (
         "log.csv: 'heave speed' is not read, because its header has no unit. Write for example 'heave speed [m/s]'",
     )
 
@@ -89,7 +89,7 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     assert [len(depth) for depth in depths] == [600, 600]
     assert depths[1][0] == pytest.approx(6.0)
     assert [one.file for one in log.logs] == ["log.csv", "log.csv (from 29.95 s)"]
-    assert [finding.names for finding in log.findings] == [{"at": "29.95"}]
+    assert [finding.words for finding in log.findings] == [{"at": "29.95"}]
 
 
 def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
@@ -99,7 +99,7 @@ def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
     del times[20:60]
     rows = [f"{time},{30 * (time > 1)},{10 * time}" for time in [*times[:100], *moved, *times[100:]]]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [(found.kind, found.numbers["count"]) for found in log.findings] == [("rows sorted", len(moved))]
+    assert [(found.kind, found.words["count"]) for found in log.findings] == [("rows sorted", len(moved))]
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_pulses_that_are_none_or_too_wide_are_told(tmp_path: Path) -> None:
     pulses = [0, 65535, *[1500] * 8, 2000, 900, *[1700] * 26, 1900, 1100]
     log = read(tmp_path, "time [s],u_t [us],depth [m]", [f"{n},{p},{n}" for n, p in enumerate(pulses)])
     assert commanded(log.log, "t")[[0, 1, 2, 10, 11, 12]] == pytest.approx([0, 0, 0, 1, -1, 0.5])
-    assert sentences(log.findings, SENTENCES) == (
+    assert sentences(log.findings) == (
         "log.csv: 2 pulses of u_t [us] of 0 or 65535 us taken as no command",
         "log.csv: 2 commands of u_t [us] beyond full thrust taken as full thrust",
         "log.csv: there is no column of u_l. Its command is taken as 0. Add the column if this is wrong",

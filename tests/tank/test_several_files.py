@@ -10,7 +10,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.page.recording import recording_of
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import SENTENCES, Finding, sentences
+from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -44,10 +44,10 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def read(folder: Path) -> tuple[tuple[Finding, ...], Log]:
+def read(folder: Path) -> tuple[list[Finding], Log]:
     tests = load_tests(folder)
     (log,) = tests.folder.logs
-    return tests.findings, log
+    return tests.folder.findings, log
 
 
 def mistakes(folder: Path) -> list[str]:
@@ -67,7 +67,13 @@ def test_files_of_one_clock_are_joined_by_their_times(folder: Path) -> None:
         assert channel.count == count
         assert channel.values == pytest.approx(start + rate * (channel.time - 1000.0), abs=1e-6)
     assert commanded(log, "5", 1000.0 + TIME) == pytest.approx(np.where(TIME > 0.999, 0.5, 0.0))
-    assert load_tests(folder).inputs.keys() == {"rov.toml", "bluerov2", "commands.csv", "depth.csv", "heading.csv"}
+    assert load_tests(folder).folder.inputs.keys() == {
+        "rov.toml",
+        "bluerov2",
+        "commands.csv",
+        "depth.csv",
+        "heading.csv",
+    }
 
 
 def test_the_page_that_flies_joins_the_files_of_a_dive(folder: Path) -> None:
@@ -90,21 +96,19 @@ def test_a_dive_of_the_same_files_counts_once(folder: Path) -> None:
     again = FILES.replace(".csv", "_2.csv")
     (folder / "rov.toml").write_text(f"{ROV}[dives.june]\n{again}\n[dives.may]\n{FILES}\n", encoding="utf-8")
     findings, _ = read(folder)
-    (line,) = (line for line in sentences(findings, SENTENCES) if "copy" in line)
+    (line,) = (line for line in sentences(findings) if "copy" in line)
     assert line.startswith("commands.csv, depth.csv, heading.csv: left out as a copy of commands_2.csv, depth_2.csv, h")
 
 
 def test_a_sentence_about_several_files_has_the_range_of_their_numbers() -> None:
     counts = {"a": 1, "b": 3, "c": 3}
-    found = [Finding(kind, file=file, numbers={"count": n}) for kind in KINDS for file, n in counts.items()]
-    assert sentences(found, SENTENCES) == (
+    found = [Finding(kind, file=file, words={"count": n}) for kind in KINDS for file, n in counts.items()]
+    assert sentences(found) == (
         "a, b and c: 1 ... 3 rows out of order sorted",
         "a, b and c: 1 ... 3 velocities left out, because the filter marks them as unknown",
     )
-    assert sentences(found[:1], SENTENCES) == ("a: 1 row out of order sorted",)
-    assert sentences(found[4:], SENTENCES) == (
-        "b and c: 3 velocities left out, because the filter marks them as unknown",
-    )
+    assert sentences(found[:1]) == ("a: 1 row out of order sorted",)
+    assert sentences(found[4:]) == ("b and c: 3 velocities left out, because the filter marks them as unknown",)
 
 
 @pytest.mark.parametrize("declared", [False, True])
@@ -120,7 +124,7 @@ def test_a_file_of_another_clock_is_told_and_aligned(folder: Path, declared: boo
     late = 2.0 if declared else 0.0
     since = used(log, "heading").time - 1000.0 - late
     assert measured(log, "heading") == pytest.approx(2.0 + 0.3 * since, abs=1e-5)
-    (line,) = (line for line in sentences(findings, SENTENCES) if "clock" in line)
+    (line,) = (line for line in sentences(findings) if "clock" in line)
     assert line == (
         "heading.csv: it has another clock than the commands. Its times are used as they are, as if both clocks "
         "agreed. Correct them if they do not"

@@ -96,7 +96,7 @@ def test_sensors_of_other_scales_are_told(scale: float, is_told: bool) -> None:
     findings = scales_differ("a.csv", channels[0], channels)
     assert [f.kind for f in findings] == ["scales differ"] * is_told
     for finding in findings:
-        assert finding.numbers["factor"] == pytest.approx(scale, abs=0.003)
+        assert finding.words["factor"] == pytest.approx(scale, abs=0.003)
     assert not scales_differ("a.csv", channels[0], (*channels, channel("pitch angle", time, 0.1 * time)))
     told = {f.kind for f in checked(Log("a.csv", None, channels)).findings}
     assert ("scales differ" in told) is is_told

@@ -11,7 +11,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import heading, sentences
+from rov_fmu.identify.findings import SEVERITY, sentences
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.published import load_tables
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
@@ -49,7 +49,7 @@ def test_the_folder_of_the_videoray_holds_tables_3_to_7_and_the_numbers_of_table
         name: vehicle[name] for name in ("m_rov", "I_r", "R", "gamma", "a_t_rear", "b_t_rear", "a_t_top", "b_t_top")
     }
     assert all("Table 9" in q.source for q in known.values())
-    assert found.inputs == {
+    assert found.folder.inputs == {
         path.name: hashlib.sha3_256(path.read_bytes()).hexdigest()
         for path in TESTS.iterdir()
         if path.suffix == ".csv" or path.name == "rov.toml"
@@ -114,7 +114,7 @@ def test_names_in_any_case(folder: Path) -> None:
         now, then = (rows_of(tests, kind)[axis] for tests in (found, before))
         assert [row.value for row in now] == [row.value for row in then]
     assert [(one.file, one.axis) for one in found.folder.logs] == [("Log_Heave.csv", HEAVE)]
-    assert {"time_constant_heave.CSV", "Steady_YAW.Csv", "Log_Heave.csv"} <= set(found.inputs)
+    assert {"time_constant_heave.CSV", "Steady_YAW.Csv", "Log_Heave.csv"} <= set(found.folder.inputs)
 
 
 def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
@@ -129,9 +129,9 @@ def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
     steady = rows_of(found, "steady")
     assert {row.file for row in steady["surge"]} == {"steady_surge.csv"}
     assert "steady_heave.csv" in {row.file for row in steady["heave"]}
-    assert not {"log_heave_2.csv", "steady_surge_copy.csv"} & found.inputs.keys()
-    copies = [finding for finding in found.findings if finding.kind == "copy"]
-    assert {heading(finding) for finding in copies} == {"Warnings"}
+    assert not {"log_heave_2.csv", "steady_surge_copy.csv"} & found.folder.inputs.keys()
+    copies = [finding for finding in found.folder.findings if finding.kind == "copy"]
+    assert {SEVERITY[finding.kind] for finding in copies} == {"Warnings"}
     assert sentences(copies) == (
         "log_heave_2.csv: left out as a copy of log_heave_1.csv, because the same data must not count twice",
         "steady_surge_copy.csv: left out as a copy of steady_surge.csv, because the same data must not count twice",

@@ -17,7 +17,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.objective import TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.toml_file import read_toml
@@ -174,7 +174,7 @@ class Split:
     name: str
     tests: Tests
     """The folder of the training, as `rov-fmu identify` reads it."""
-    known: Beginning
+    known: Prior
     """What is known before any recording of the training is fitted."""
     rows: Sequence[TableRow]
     training: Sequence[Recording]
@@ -206,7 +206,7 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     return Split(one.name, tests, known, rows, training, test, one.truth, edits)
 
 
-def _recording(known: Beginning, log: SampledLog) -> Recording:
+def _recording(known: Prior, log: SampledLog) -> Recording:
     vehicle, names = log.vehicle(known.coefficients), [*log.layout.inputs]
     axes = [form.axis for form in log.layout.axes]
     rows = log.record.inputs.tolist()

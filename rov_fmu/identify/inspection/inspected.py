@@ -13,7 +13,7 @@ from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, has_wrench, read_description
-from rov_fmu.tank.findings import SENTENCES, Finding, about, sentences
+from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
 from rov_fmu.tank.inspection.draft import LikelyVehicle, completed, dives, draft, lacking, likely_vehicle
 from rov_fmu.tank.inspection.headers import TableHeaders, headers_of_tables
@@ -71,11 +71,11 @@ class Inspected:
         """The logs with commands, each with the channels of the files without commands that belong to it."""
         by_name = {one.path.name: one.log for one in self.logs if one.log}
         joined = {files[0]: files for files in dives(self.logs)}
-        found = []
+        logs = []
         for one in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
             parts = [by_name[name] for name in joined.get(one.file, ()) if by_name.get(name)]
-            found.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
-        return found
+            logs.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
+        return logs
 
     @property
     def undetermined(self) -> list[str]:
@@ -148,8 +148,8 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     warnings = [finding for finding in findings if finding not in notes]
     inspected = Inspected(
         logs=inspections,
-        warnings=[*sentences(warnings, SENTENCES), *described.mistakes],
-        notes=sentences(notes, SENTENCES),
+        warnings=[*sentences(warnings), *described.mistakes],
+        notes=sentences(notes),
         path=place,
         own=own,
         text=lacks,

@@ -7,7 +7,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
-from rov_fmu.identify.findings import how_to_measure, how_to_record
+from rov_fmu.identify.findings import how_to_measure, how_to_record, sentences
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words
 from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
 from rov_fmu.io.messages import listed
@@ -44,8 +44,8 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
     driven: dict[Log, list[Axis]] = {}
     findings: list[Finding] = []
     for log in logs:
-        driven[log], found = driven_axes(log, layout_of(log, layout if not log.axis else description.layout))
-        findings += found
+        driven[log], of_log = driven_axes(log, layout_of(log, layout if not log.axis else description.layout))
+        findings += of_log
     tested = {axis for axes in driven.values() for axis in axes}
     groups: dict[tuple[str, str], list[Axis]] = {}
     for axis in (axis for axis in layout.bare_axes if axis not in tested):
@@ -72,11 +72,8 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
                 words = lost_in_words(lost, log.commands.interval)
                 yield HYPOTHESES["momentary commands"].sentence.format(of=log.file, **words)
         known = {c.name for c in layout.curves if c.coefficient("a_t") in description.known}
-        if curves := [c.name for c in layout.curves if c.name not in known.union(measured)]:
-            yield (
-                "forces are relative to an assumed thrust, and so are loads, drag, masses and β, unless "
-                f"thrust_{curves[0]}.csv has measured ones"
-            )
+        assumed = (c.name for c in layout.curves if c.name not in known.union(measured))
+        yield from sentences(Finding("assumed thrust", curve=name) for name in assumed)
 
 
 def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> tuple[str, str]:

@@ -102,11 +102,11 @@ class Shapes:
             place = names.index(f"u_{name}")
             changed[place] = self.commands(curve.name, inputs[..., place].T).T
         sets = np.broadcast_shapes(*(some.shape[:-1] for some in changed.values()))
-        found = np.empty((*sets, *inputs.shape[-2:]))
-        found[...] = inputs
+        rows = np.empty((*sets, *inputs.shape[-2:]))
+        rows[...] = inputs
         for place, commands in changed.items():
-            found[..., place] = commands
-        return found
+            rows[..., place] = commands
+        return rows
 
     def forces(self, vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
         """Return the steady thrust of all thrusters that a curve describes together, for m commands, N.
@@ -130,9 +130,9 @@ class Shapes:
             inputs[name] = _column(acting, vehicle)
         if layout.has_dead_time:
             inputs |= {delayed_name(name): inputs[name] for name in layout.commands}
-        found = _alone_of(layout, axis)({**vehicle.coefficients, **inputs})
+        numbers = _alone_of(layout, axis)({**vehicle.coefficients, **inputs})
         shape = np.broadcast_shapes(np.shape(_column(commands, vehicle)), *map(np.shape, vehicle.coefficients.values()))
-        return Motions({key: np.broadcast_to(found[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")})
+        return Motions({key: np.broadcast_to(numbers[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")})
 
 
 def _column(commands: Array, vehicle: Vehicle) -> Array:
@@ -183,8 +183,8 @@ class Motions:
 
     def response(self) -> tuple[Array, Array]:
         """Return V_ss, and Tau of (17), from rest."""
-        found = self._closed_form(self.of["C"])
-        return found["V_ss"], found["Tau"]
+        numbers = self._closed_form(self.of["C"])
+        return numbers["V_ss"], numbers["Tau"]
 
     def stopping_distance(self, v: Array, share: float) -> Array:
         """Return the distance from v until `share` of it without any force, m or rad."""
@@ -225,7 +225,7 @@ def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Arra
     def slope(t: Array, w: Array) -> Array:
         return np.asarray(h * (rate(t, w) - lacking(t)))
 
-    w, found, waits = -ahead(0.0 * h), np.full(goal.shape, inf), np.isfinite(Tau)
+    w, times, waits = -ahead(0.0 * h), np.full(goal.shape, inf), np.isfinite(Tau)
     for n in range(1000):
         t = n * h
         k_1 = rate(t, w)
@@ -236,12 +236,12 @@ def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Arra
         reached = waits & (np.abs(v) >= np.abs(goal)) & (v * goal > 0.0)
         if reached.any():
             ends = w + ahead(t), v, slope(t, w), slope(t + h, after), goal
-            found[reached] = t[reached] + h[reached] * _crossing(*(x[reached] for x in ends))
+            times[reached] = t[reached] + h[reached] * _crossing(*(x[reached] for x in ends))
         waits &= ~reached
         w = after
         if not waits.any():
             break
-    return found
+    return times
 
 
 def _crossing(low: Array, high: Array, before: Array, after: Array, goal: Array) -> Array:

@@ -13,8 +13,9 @@ from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, structure, with_shared
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning, Table
+from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import KEPT
@@ -45,7 +46,7 @@ _CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inert
 class Fit:
     """The objective at its minimum."""
 
-    known: Beginning
+    known: Prior
     objective: Objective
     best: Minimum
     posterior: Posterior
@@ -96,7 +97,7 @@ class Fit:
 
 
 def fit_all(
-    folder: Path, known: Beginning, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
+    folder: Path, known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 

@@ -19,8 +19,9 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Beginning, Table, table_of
+from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import ALARM, least_error
@@ -47,7 +48,7 @@ _FINEST = 0.05
 
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
-Change = Callable[[Beginning, Logs, Of], tuple[Beginning, Logs]]
+Change = Callable[[Prior, Logs, Of], tuple[Prior, Logs]]
 Search = Callable[[Objective, Mapping[int, float]], Minimum]
 """A function that minimises J of thinned logs from a start in which some parameters, by their places, have numbers."""
 
@@ -58,7 +59,7 @@ class Hypothesis:
 
     probability: float
     """The prior probability of all its variants together: how many folders have it."""
-    variants: Callable[[Beginning, Logs], Iterator[Of]]
+    variants: Callable[[Prior, Logs], Iterator[Of]]
     """What may have it: thrusters, or files."""
     change: Change
     """The model with it."""
@@ -88,7 +89,7 @@ class Variant:
         """The kind of its parameter, and what has it."""
         return self.kind, self.of[0] if self.of else ""
 
-    def applied(self, known: Beginning, logs: Logs) -> tuple[Beginning, Logs]:
+    def applied(self, known: Prior, logs: Logs) -> tuple[Prior, Logs]:
         """Return what is known before the fit, and the logs, if this is so."""
         return HYPOTHESES[self.kind].change(known, logs, self.of)
 
@@ -97,20 +98,20 @@ class Variant:
 
 
 def _with_parameter(kind: str) -> Change:
-    def change(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+    def change(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
         return replace(known, assumed=(*known.assumed, (kind, of[0] if of else ""))), logs
 
     return change
 
 
-def _momentary(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+def _momentary(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
     return known, [replace(one, is_momentary=one.is_momentary or one.log.file in of) for one in logs]
 
 
 def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
     """Return the change of the commands of some thrusters to those of others, with a sign."""
 
-    def change(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+    def change(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
         others, sign = places(of)
         found = []
         for one in logs:
@@ -124,7 +125,7 @@ def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
     return change
 
 
-def _with_rotors(known: Beginning, logs: Logs, _: Of) -> tuple[Beginning, Logs]:
+def _with_rotors(known: Prior, logs: Logs, _: Of) -> tuple[Prior, Logs]:
     def lagging(layout: Layout) -> Layout:
         return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
 
@@ -134,7 +135,7 @@ def _with_rotors(known: Beginning, logs: Logs, _: Of) -> tuple[Beginning, Logs]:
     )
 
 
-def _slewing(known: Beginning, logs: Logs, of: Of) -> tuple[Beginning, Logs]:
+def _slewing(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
     known, logs = _with_parameter("slew limit")(known, logs, of)
     return known, [one if one.log.follows_axis else one.refined(_FINEST) for one in logs]
 
@@ -153,7 +154,7 @@ def commands_of(one: SampledLog) -> dict[str, Array]:
     return {t.name: one.record.inputs[:, names.index(f"u_{t.name}")] for t in one.layout.thrusters}
 
 
-def _momentary_files(_: Beginning, logs: Logs) -> Iterator[Of]:
+def _momentary_files(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield the files with momentary commands."""
     files = [one.log.file for one in logs if one.lost and not one.is_momentary]
     if files:
@@ -166,7 +167,7 @@ def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
     return {"share": percent(lost[axis]), "axis": axis, "rate": significant(1.0 / interval, 2)}
 
 
-def _thrusters(known: Beginning, logs: Logs) -> Iterator[Of]:
+def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that the logs command, one of those that no log tells apart."""
     seen = list[Array]()
     for thruster in known.layout.thrusters:
@@ -176,7 +177,7 @@ def _thrusters(known: Beginning, logs: Logs) -> Iterator[Of]:
             yield (thruster.name,)
 
 
-def _signature(known: Beginning, logs: Logs, name: str) -> Array | None:
+def _signature(known: Prior, logs: Logs, name: str) -> Array | None:
     """Return the effects of a thruster along the axes times its commands in the logs; None if nothing commands it."""
     effects = [t.effect(form.axis) for t in known.layout.thrusters if t.name == name for form in known.layout.axes]
     values = [c[name] for one in logs if name in (c := commands_of(one))]
@@ -187,14 +188,14 @@ def _signature(known: Beginning, logs: Logs, name: str) -> Array | None:
     return np.outer(np.round(np.multiply(effects, sign), 9), sign * commands)
 
 
-def twins(known: Beginning, logs: Logs, name: str) -> list[str]:
+def twins(known: Prior, logs: Logs, name: str) -> list[str]:
     """Return the thrusters that no log tells from one of them, with its name."""
     shown = {t.name: _signature(known, logs, t.name) for t in known.layout.thrusters}
     own = shown[name]
     return [other for other, one in shown.items() if one is not None and own is not None and np.array_equal(own, one)]
 
 
-def _pairs(known: Beginning, logs: Logs) -> Iterator[Of]:
+def _pairs(known: Prior, logs: Logs) -> Iterator[Of]:
     alone = [of[0] for of in _thrusters(known, logs)]
     for pair in combinations(alone, 2):
         commands = [[commands_of(one).get(name, np.zeros(1)) for name in pair] for one in logs]
@@ -202,12 +203,12 @@ def _pairs(known: Beginning, logs: Logs) -> Iterator[Of]:
             yield pair
 
 
-def _commanded(known: Beginning, logs: Logs) -> Iterator[Of]:
+def _commanded(known: Prior, logs: Logs) -> Iterator[Of]:
     if [*_thrusters(known, logs)]:
         yield ()
 
 
-def _lagging(known: Beginning, logs: Logs) -> Iterator[Of]:
+def _lagging(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield one variant, about all thrusters, if all forces may lag, and no curve is a table or a wrench's force."""
     curves = known.layout.curves
     if (
@@ -363,7 +364,7 @@ def probability(odds: float) -> float:
 class Model:
     """What is fitted: what is known before, the logs, and the rows of tables."""
 
-    known: Beginning
+    known: Prior
     logs: Logs
     rows: Sequence[TableRow]
 

@@ -5,10 +5,14 @@ deviations are those that an engineer would accept, with their reasons; [priors]
 deviation is estimated from one effect.
 """
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, log
+from typing import Any
 
-from rov_fmu.equation.catalogue import CURVE
+from rov_fmu.equation.catalogue import CURVE, REVERSE
+from rov_fmu.equation.parts import VehicleAxis
+from rov_fmu.identify.likelihood.prior import Prior
 
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
@@ -16,14 +20,12 @@ USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage, of thrusters whose speed nothing regulates."""
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
-SLOW = {"slow force": 8.0, "slow gain": 60.0, "slow velocity": 8.0}
-"""The time constants of the slow processes, s."""
-SIZES = (*SLOW, "short force")
-"""The kinds of the sizes of all processes."""
+EXACT_BAND = 0.01
+"""A dead band is never claimed to better than this command: thrust begins gradually."""
 
 
 @dataclass(frozen=True)
-class Prior:
+class Deviation:
     """A deviation that priors use, with its reason."""
 
     key: str
@@ -34,15 +36,33 @@ class Prior:
     reason: str
 
 
+@dataclass(frozen=True)
+class Process:
+    """A slow process."""
+
+    time_constant: float
+    """s."""
+    title: str
+    """Its name in a table."""
+    sentence: str
+    """What it does, with `unknown` (`an unknown` or, with a cause, `a`), `push` (`force` or `torque`), its `size`, and
+    the `share` of the `thrust` (or `torque`) that this is."""
+    finding: str
+    """The kind of the finding about one without a cause."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class Coordinate:
-    """The coordinate z of a parameter, with its prior and its bounds."""
+    """The coordinate z of a parameter, with its prior and its bounds, and the number that it stands for."""
 
     mean: float = 0.0
     deviation: float = 1.0
     """The prior of z."""
     is_log: bool = False
     """True if the number is exp(z)."""
+    factor: float = 1.0
+    offset: float = 0.0
+    """The number is z times the factor plus the offset, if it is not exp(z)."""
     low: float = -inf
     high: float = inf
     """The bounds of z."""
@@ -57,7 +77,7 @@ class Coordinate:
 class Kind(Coordinate):
     """What the parameters of a kind are, if nothing else is known of them."""
 
-    prior: Prior | None = None
+    prior: Deviation | None = None
     """None where `deviation` is always the same, or follows from the log."""
     words: str = ""
     """What an effect is."""
@@ -67,34 +87,92 @@ class Kind(Coordinate):
     """True if the coordinate of the effect is the logarithm of a ratio."""
     keys: tuple[str, ...] = ()
     """The keys of the coefficients that only a vehicle with the effect has."""
+    is_coefficient: bool = False
+    """True if its number is the coefficient with the first of these keys."""
+    of_axis: Callable[[Prior, VehicleAxis], Mapping[str, Any] | None] = lambda *_: None
+    """What its parameter of an axis has in place of the fields above; None where the axis has no such parameter."""
+    told_by: tuple[str, ...] = ()
+    """The tests of an axis that tell it, which replace a coefficient of the base: `log`, `steady`, `astern` (steady
+    velocities of negative commands) and `time_constant`."""
     adds_input: bool = False
     """True if a vehicle with the effect has an input more."""
+    is_lag: bool = False
+    """True for a time constant, which the samples of sensors must be close enough to show."""
+    finest: float = 0.0
+    """The half-width that no interval is narrower than."""
+    is_size: bool = False
+    """True for the size of a slow or short process."""
+    slow: Process | None = None
+    """The slow process whose size it is."""
 
 
-def _slow(prior: Prior, usual: float, least: float, largest: float) -> Kind:
+def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: float) -> Kind:
     """Return the kind of the size of a slow process by its usual, its least and its largest size."""
-    low = log(least)
-    return Kind(prior, is_log=True, of_motion=False, mean=log(usual), low=low, high=log(largest), null=low)
+    low, high = log(least), log(largest)
+    return Kind(
+        prior,
+        mean=log(usual),
+        is_log=True,
+        low=low,
+        high=high,
+        null=low,
+        of_motion=False,
+        is_size=True,
+        slow=slow,
+    )
 
 
-_SHAPE = Prior("thrust_shape", 0.10, "the shape of a curve, relative to its force", "published curves differ so")
-_PLACE = Prior(
+# ---- What the parameters of an axis have -----------------------------------------------------------------------------
+
+
+def _free(prior: Prior, form: VehicleAxis, key: str) -> bool:
+    """Return True if the fit may change a coefficient of an axis."""
+    name = form.axis.coefficient(key)
+    return name in prior.layout.coefficients and name not in prior.exact
+
+
+def _inertia(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+    return {} if _free(prior, form, "beta") else None
+
+
+def _drag(key: str) -> Callable[[Prior, VehicleAxis], Mapping[str, Any] | None]:
+    def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+        free = _free(prior, form, key)
+        return {"mean": log(max(prior.coefficients[form.axis.coefficient(key)], 1e-9))} if free else None
+
+    return of_axis
+
+
+def _drag_astern(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+    return {} if form.axis in prior.fitted and _free(prior, form, f"a_d{REVERSE}") else None
+
+
+def _load(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+    full = prior.full[form.axis.name]
+    if not (full and _free(prior, form, "F_0")):
+        return None
+    given = prior.coefficients[form.axis.coefficient("F_0")]
+    return {"null": -given / full, "factor": full, "offset": given, "unit": form.axis.load}
+
+
+_SHAPE = Deviation("thrust_shape", 0.10, "the shape of a curve, relative to its force", "published curves differ so")
+_PLACE = Deviation(
     "sensor_place", 0.3, "the place of a sensor of velocity or position, m", "it is near the vehicle's origin"
 )
-_COLOURED = Prior(
+_COLOURED = Deviation(
     "coloured_noise", 1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"
 )
 _WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
 
 KINDS = {
     "thrust scale": Kind(
-        Prior("thrust", 0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
+        Deviation("thrust", 0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
         is_log=True,
     ),
     "thrust shape": Kind(_SHAPE),
     "linear thrust": Kind(_SHAPE),
     "reverse thrust": Kind(
-        Prior(
+        Deviation(
             "thrust_reverse", 0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"
         ),
         "thrust astern relative to thrust ahead",
@@ -103,15 +181,17 @@ KINDS = {
         null=0.0,
     ),
     "dead band": Kind(
-        Prior("dead_band", 0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
+        Deviation("dead_band", 0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
         "dead band",
         keys=("c_0",),
+        is_coefficient=True,
+        finest=EXACT_BAND,
         low=0.0,
         high=0.5,
         null=0.0,
     ),
     "dead band astern": Kind(
-        Prior(
+        Deviation(
             "dead_band_astern", 0.3, "ln of the dead band astern to that ahead", "propellers are made for one direction"
         ),
         "dead band astern relative to dead band ahead",
@@ -120,7 +200,7 @@ KINDS = {
         null=0.0,
     ),
     "advance": Kind(
-        Prior(
+        Deviation(
             "advance", 0.2, "the share of full thrust lost per m/s ahead", "propellers give no thrust at 3 to 10 m/s"
         ),
         "loss of thrust with the speed of advance, relative to full thrust",
@@ -130,16 +210,17 @@ KINDS = {
         unit="s/m",
     ),
     "lag": Kind(
-        Prior("lag", 0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
+        Deviation("lag", 0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
         "time constant of the thrusters",
         keys=("T",),
+        is_lag=True,
         mean=0.05,
         low=LEAST_LAG,
         null=LEAST_LAG,
         unit="s",
     ),
     "dead time": Kind(
-        Prior("dead_time", 0.05, "the time from a command to its effect, s", "links of one or two control periods"),
+        Deviation("dead_time", 0.05, "the time from a command to its effect, s", "links of one or two control periods"),
         "dead time of the commands",
         ". The vehicle file does not have it; T_d in [commands] would add it",
         low=0.0,
@@ -147,25 +228,43 @@ KINDS = {
         unit="s",
     ),
     "inertia": Kind(
-        Prior("inertia", 0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"), is_log=True
+        Deviation("inertia", 0.5, "ln of the effective inertia", "added mass is 0.3 to 2 times the mass"),
+        is_log=True,
+        keys=("beta",),
+        told_by=("log", "time_constant"),
+        of_axis=_inertia,
     ),
     "quadratic drag": Kind(
-        Prior("quadratic_drag", 1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"),
+        Deviation(
+            "quadratic_drag", 1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"
+        ),
+        keys=("a_d",),
+        is_coefficient=True,
+        told_by=("log", "steady"),
+        of_axis=_drag("a_d"),
         is_log=True,
     ),
     "linear drag": Kind(
-        Prior("linear_drag", 1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"),
+        Deviation(
+            "linear_drag", 1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"
+        ),
+        keys=("b_d",),
+        is_coefficient=True,
+        told_by=("log", "steady"),
+        of_axis=_drag("b_d"),
         is_log=True,
     ),
     "drag astern": Kind(
-        Prior("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
+        Deviation("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
         "drag astern relative to drag ahead",
         keys=("a_d_reverse", "b_d_reverse"),
+        told_by=("log", "astern"),
+        of_axis=_drag_astern,
         is_ratio=True,
         null=0.0,
     ),
     "centre of buoyancy": Kind(
-        Prior(
+        Deviation(
             "buoyancy", 0.005, "each coordinate of the centre of buoyancy, m", "trimmed vehicles tilt by a few degrees"
         ),
         "centre of buoyancy",
@@ -173,31 +272,36 @@ KINDS = {
         unit="m",
     ),
     "load": Kind(
-        Prior("load", 0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
+        Deviation("load", 0.05, "a constant load relative to full thrust", "vehicles are trimmed to a few per cent"),
         "constant load",
         keys=("F_0",),
+        is_coefficient=True,
+        told_by=("log",),
+        of_axis=_load,
         null=0.0,
     ),
     "current": Kind(
-        Prior("current", 0.1, "the current, m/s", "tests are made in calm water"),
+        Deviation("current", 0.1, "the current, m/s", "tests are made in calm water"),
         "current",
         ". It belongs to the water, so the vehicle file does not have it",
         null=0.0,
         unit="m/s",
     ),
     "sensor lag": Kind(
-        Prior("sensor_lag", 0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
+        Deviation("sensor_lag", 0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
         "time constant",
         ". The vehicle file does not have it, because it describes the vehicle without its sensors",
+        is_lag=True,
         low=0.0,
         null=0.0,
         unit="s",
     ),
     **{kind: Kind(_PLACE, f"place of the {kind}", _WITHOUT_PLACES, null=0.0, unit="m") for kind in PLACED.values()},
     "voltage": Kind(
-        Prior("voltage", 0.75, "the exponent of thrust over voltage", "0 if regulated, else 1 to 2"),
+        Deviation("voltage", 0.75, "the exponent of thrust over voltage", "0 if regulated, else 1 to 2"),
         "exponent of thrust over voltage",
         keys=("n_V",),
+        is_coefficient=True,
         adds_input=True,
         mean=0.75,
         low=CURVE["n_V"].minimum,
@@ -205,30 +309,45 @@ KINDS = {
         null=0.0,
     ),
     "slow force": _slow(
-        Prior("slow_force", 2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
+        Deviation("slow_force", 2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
+        Process(
+            8.0, "Slow force", "{unknown} slow {push} of {size} (RMS), {share} of the {thrust}, acts", "unknown force"
+        ),
         0.001,
         1e-7,
         0.1,
     ),
     "short force": Kind(
-        Prior("short_force", 2.5, "ln of the force that momentary commands lack", "seen in the changes between rows"),
+        Deviation(
+            "short_force", 2.5, "ln of the force that momentary commands lack", "seen in the changes between rows"
+        ),
+        is_size=True,
         is_log=True,
         of_motion=False,
         low=log(1e-6),
     ),
     "slow gain": _slow(
-        Prior(
+        Deviation(
             "slow_gain",
             0.35,
             "ln of the size of a slow change of thrust",
             "1 %, to a factor of 2, or it acts as thrust",
         ),
+        Process(60.0, "Change of thrust", "the thrust changes slowly by {size} (RMS)", "change of thrust"),
         0.01,
         1e-6,
         0.2,
     ),
     "slow velocity": _slow(
-        Prior("slow_velocity", 2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"),
+        Deviation(
+            "slow_velocity", 2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"
+        ),
+        Process(
+            8.0,
+            "Velocity over ground",
+            "{unknown} slow velocity over ground of {size} (RMS) acts",
+            "velocity over ground",
+        ),
         0.001,
         1e-7,
         0.3,
@@ -237,6 +356,7 @@ KINDS = {
         None,
         "force of the thruster relative to a whole one",
         keys=("health",),
+        is_coefficient=True,
         mean=0.75,
         deviation=0.5,
         low=0.0,
@@ -266,7 +386,7 @@ KINDS = {
         unit="1/s",
     ),
     "white noise": Kind(
-        Prior("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
+        Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
         is_log=True,
         of_motion=False,
     ),
@@ -278,6 +398,8 @@ KINDS = {
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative
 to white noise."""
+SLOW = {name: kind.slow.time_constant for name, kind in KINDS.items() if kind.slow}
+"""The time constants of the slow processes, s."""
 EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is

@@ -1,7 +1,7 @@
 """The parameters of the likelihood: their priors, of the kinds of kinds.py, and how they enter the model."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import log
 from typing import Any
@@ -10,10 +10,11 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, VehicleAxis
+from rov_fmu.equation.parts import Curve, Part, Thruster, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
-from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SIZES, SLOW, Coordinate
+from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SLOW, Coordinate
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -30,8 +31,6 @@ _PLACES = ("forward", "to starboard", "down")
 """The parts of the place of a sensor."""
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
-DRAG = {"quadratic drag": "a_d", "linear drag": "b_d"}
-"""The kinds of drag, and the keys of their coefficients."""
 _MOTION_STEP = 3e-6
 """The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
 less than a per cent."""
@@ -49,6 +48,8 @@ class Parameter(Coordinate):
     """Which of several, such as `north` or a quantity."""
     log: int | None = None
     """The index of the log that alone has it."""
+    sets: tuple[str, ...] = ()
+    """The names of the coefficients that are its number."""
 
     @property
     def key(self) -> tuple[str, str, str]:
@@ -63,7 +64,11 @@ class Parameter(Coordinate):
     @property
     def is_slow_size(self) -> bool:
         """True for the size of a slow or short process."""
-        return self.kind in SIZES
+        return KINDS[self.kind].is_size
+
+    def number(self, z: Any) -> Any:
+        """Return the number that a coordinate stands for."""
+        return np.exp(z) if self.is_log else self.offset + self.factor * z
 
     @property
     def step(self) -> float:
@@ -115,72 +120,61 @@ class Table:
     def get(self, z: Array, kind: str, of: str = "", part: str = "", default: Any = 0.0) -> Any:
         """Return the number that a coordinate stands for, or a default where there is no such parameter."""
         place = self.place(kind, of, part)
-        if place is None:
-            return default
-        return np.exp(z[place]) if self.parameters[place].is_log else z[place]
+        return default if place is None else self.parameters[place].number(z[place])
 
     def coefficients(self, z: Array) -> dict[str, Any]:
         """Return all coefficients of the layout for the coordinates of the parameters."""
-        found: dict[str, Any] = dict(self.base)
+        values: dict[str, Any] = dict(self.base)
+        for p, coordinate in zip(self.parameters, z, strict=True):
+            for name in p.sets:
+                values[name] = p.number(coordinate)
         for form in self.layout.axes:
-            self._axis(found, z, form)
+            self._axis(values, z, form)
         for curve in self.layout.curves:
-            self._curve(found, z, curve)
-        for thruster, name in self.layout.health.items():
-            found[name] = self.get(z, "health", thruster, default=found[name])
-        for part, key in CENTRE.items():
-            if key in found:
-                found[key] = found[key] + self.get(z, "centre of buoyancy", "", part)
-        return found | {name: self.base[name] for name in self.exact}
+            self._curve(values, z, curve)
+        return values | {name: self.base[name] for name in self.exact}
 
-    def _axis(self, found: dict[str, Any], z: Array, form: VehicleAxis) -> None:
+    def _axis(self, values: dict[str, Any], z: Array, form: VehicleAxis) -> None:
         axis = form.axis
-        for kind, key in DRAG.items():
-            name = axis.coefficient(key)
-            found[name] = self.get(z, kind, axis.name, default=found[name])
-            astern = f"{key}{REVERSE}"
-            if (reverse := axis.coefficient(astern)) in self.layout.coefficients:
+        for key in ("a_d", "b_d"):
+            name, reverse = axis.coefficient(key), axis.coefficient(f"{key}{REVERSE}")
+            if reverse in self.layout.coefficients:
                 ratio = self._ratio(reverse, name) * np.exp(self.get(z, "drag astern", axis.name))
-                found[reverse] = found[name] * ratio
+                values[reverse] = values[name] * ratio
         beta = axis.coefficient("beta")
-        found[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
-        if (load := form.coefficient("F_0")) in self.layout.coefficients:
-            found[load] = self.base[load] + self.full.get(axis.name, 0.0) * self.get(z, "load", axis.name)
+        values[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
 
     def _ratio(self, astern: str, ahead: str) -> float:
         """Return a coefficient astern of the base relative to that ahead; 1 if that ahead is 0."""
         return self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
 
-    def _curve(self, found: dict[str, Any], z: Array, curve: Curve) -> None:
+    def _curve(self, values: dict[str, Any], z: Array, curve: Curve) -> None:
         scale = self.get(z, "thrust scale", curve.name, default=1.0)
         reverse = np.exp(self.get(z, "reverse thrust", curve.name))
         if "k_t" in curve.keys:
-            found[curve.coefficient("k_t")] *= scale
+            values[curve.coefficient("k_t")] *= scale
         linear = self.get(z, "linear thrust", curve.name)
         astern = self.get(z, "linear thrust", curve.name, "astern", default=linear)
         for end, ratio, moved in (("", 1.0, linear), (REVERSE, reverse, astern)):
             names = [curve.name_of(f"{key}{end}") for key in ("a_t", "b_t")]
-            if names[0] in found:
+            if names[0] in values:
                 a, b = (self.base[name] for name in names)
-                found[names[0]] = scale * ratio * (a - moved * (a + b))
-                found[names[1]] = scale * ratio * (b + moved * (a + b))
+                values[names[0]] = scale * ratio * (a - moved * (a + b))
+                values[names[1]] = scale * ratio * (b + moved * (a + b))
         if "c_0" in curve.keys:
             band, other = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
-            found[band] = self.get(z, "dead band", curve.name, default=found[band])
             if other != band:
                 ratio = self._ratio(other, band) * np.exp(self.get(z, "dead band astern", curve.name))
-                found[other] = found[band] * ratio
+                values[other] = values[band] * ratio
         if "d" in curve.keys and not curve.tables:
             lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
-            full = found[curve.coefficient("a_t")] + found[curve.coefficient("b_t")]
+            full = values[curve.coefficient("a_t")] + values[curve.coefficient("b_t")]
             ahead = curve.coefficient("d")
             for name in (ahead, curve.coefficient(f"d{REVERSE}")):
-                found[name] = self._ratio(name, ahead) * lost * full
+                values[name] = self._ratio(name, ahead) * lost * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
-            found[lag] = np.maximum(self.get(z, "lag", default=found[lag]), LEAST_LAG)
-        if "n_V" in curve.keys:
-            found[curve.coefficient("n_V")] = self.get(z, "voltage", default=found[curve.coefficient("n_V")])
+            values[lag] = np.maximum(self.get(z, "lag", default=values[lag]), LEAST_LAG)
 
     def force_unit(self, z: Array, axis: Axis) -> Any:
         """Return what the size of a slow force is relative to, N or N m: full thrust, in proportion to the inertia.
@@ -195,14 +189,14 @@ class Table:
         return Vehicle(self.layout, coefficients), self._shapes(z, coefficients)
 
     def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
-        found, bands = {}, {}
+        deviations, bands = {}, {}
         for curve in self.layout.curves:
             if (first := self.place("thrust shape", curve.name, "1")) is not None:
-                found[curve.name] = self.shape_deviation * z[first : first + COUNT]
+                deviations[curve.name] = self.shape_deviation * z[first : first + COUNT]
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
-        return Shapes(found, bands, frozenset(reverse))
+        return Shapes(deviations, bands, frozenset(reverse))
 
     def of_vehicle(self, vehicle: Vehicle) -> "Table":
         """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
@@ -218,10 +212,10 @@ class Table:
     def of_log(self, z: Array, one: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
         file, layout = one.log.file, one.layout
-        found = self.coefficients(z)
-        shapes = self._shapes(z, found)
+        coefficients = self.coefficients(z)
+        shapes = self._shapes(z, coefficients)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
-            found[name] = self.get(z, "current", file, part)
+            coefficients[name] = self.get(z, "current", file, part)
         whole = self.get(z, "slow gain")
         axes = layout.bare_axes
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
@@ -244,7 +238,7 @@ class Table:
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         is_inside = HEAVE.name in layout.by_name
         return Parameters(
-            coefficients=found,
+            coefficients=coefficients,
             forces=tuple(Slow(units[a.name] * self.get(z, "slow force", a.name), SLOW["slow force"]) for a in axes),
             units=units,
             short=tuple(Slow(units[a.name] * self.get(z, "short force", a.name), 0.5 * one.interval) for a in axes)
@@ -269,8 +263,8 @@ class Table:
         if one.log.follows_axis or (limit is None and slew is None):
             return inputs
         places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
-        found = np.array(np.broadcast_to(inputs, (*np.shape(z)[1:], *inputs.shape)))
-        values = found[..., places]
+        limited = np.array(np.broadcast_to(inputs, (*np.shape(z)[1:], *inputs.shape)))
+        values = limited[..., places]
         if limit is not None:
             most = np.reshape(limit, (*np.shape(limit), 1, 1))
             values = np.clip(values, -most, most)
@@ -281,8 +275,8 @@ class Table:
                 most = np.reshape(slew, (*np.shape(slew), 1)) * step
                 before, now = now, now + np.clip(values[..., row, :] - now, -most, most)
                 values[..., row, :] = 0.5 * (before + now)
-        found[..., places] = values
-        return found
+        limited[..., places] = values
+        return limited
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
@@ -290,52 +284,18 @@ class Table:
         return None if place is None else z[place]
 
 
-@dataclass(frozen=True)
-class Beginning:
-    """What is known before any test is fitted, from which the priors are made."""
-
-    layout: Layout
-    coefficients: Mapping[str, float]
-    """All coefficients of the layout. Those of axes that nothing gives are guesses from the data."""
-    fitted: Sequence[Axis]
-    """The axes whose motion is tested."""
-    curves: Sequence[Curve]
-    """The curves that drive these axes."""
-    measured_curves: Mapping[str, bool]
-    """The curves whose forces were measured, and whether astern, too. Their scale and shape are those of the rows."""
-    with_lag: bool
-    """True if the base or the file gives a lag."""
-    guessed: Sequence[str]
-    """The names of the axes whose drag is guessed from the data."""
-    full: Mapping[str, float]
-    deviations: Mapping[str, float]
-    """The table [priors] of rov.toml."""
-    exact: frozenset[str] = frozenset()
-    """The names of the coefficients that no fit changes."""
-    thrust_errors: Mapping[str, float] = field(default_factory=dict)
-    """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
-    unseen: Sequence[Axis] = ()
-    """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
-    has_times: bool = False
-    """True if there are tables of time constants, which contain the lag."""
-    assumed: tuple[tuple[str, str], ...] = ()
-    """The kinds of the parameters of hypotheses about the structure, and what has each of them."""
-    bent: frozenset[str] = frozenset()
-    """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""
-
-
-def table_of(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
+def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
     shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
-    found = tuple(_parameters(known, logs, row_noises))
-    return Table(known.layout, known.coefficients, known.full, found, shape, known.exact)
+    parameters = tuple(_parameters(known, logs, row_noises))
+    return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact)
 
 
 Make = Callable[..., Iterator[Parameter]]
 """A function that yields a parameter of a kind, unless its prior is exact."""
 
 
-def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
+def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
     def prior(key: str) -> float:
         """Return a deviation. Where the thrust is exact, so is its shape."""
         is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
@@ -357,10 +317,10 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
     if logs:
         for part, key in CENTRE.items():
             if key in {*known.layout.restoring} - known.exact:
-                yield from make("centre of buoyancy", "", part)
+                yield from make("centre of buoyancy", "", part, offset=known.coefficients[key], sets=(key,))
         yield from make("dead time")
         if any("n_V" in c.keys for c in known.curves):
-            yield from make("voltage")
+            yield from make("voltage", sets=_set(known, "voltage", known.layout.curves))
         yield from _of_sensors(logs, make)
     yield from _of_curves(known, make, prior("thrust_shape"))
     yield from _advance(known, make)
@@ -369,12 +329,12 @@ def _parameters(known: Beginning, logs: Sequence[SampledLog], row_noises: Sequen
         yield from _of_one_log(one, number, make)
     yield from _of_noise(known, logs, make)
     for kind, of in known.assumed:
-        yield from make(kind, of)
+        yield from make(kind, of, sets=_set(known, kind, [t for t in known.layout.thrusters if t.name == of]))
     for name in row_noises:
         yield from make("row noise", name)
 
 
-def _of_curves(known: Beginning, make: Make, shape: float) -> Iterator[Parameter]:
+def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
     for curve in known.curves:
         name = curve.name
         is_measured = name in known.measured_curves
@@ -404,13 +364,14 @@ def _of_curves(known: Beginning, make: Make, shape: float) -> Iterator[Parameter
             null = {"null": None} if is_told_astern else {}
             yield from make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
-            yield from make("dead band", name, mean=known.coefficients[curve.coefficient("c_0")])
+            band = curve.coefficient("c_0")
+            yield from make("dead band", name, mean=known.coefficients[band], sets=_set(known, "dead band", [curve]))
             astern = curve.coefficient(f"c_0{REVERSE}")
             if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
                 yield from make("dead band astern", name)
 
 
-def _advance(known: Beginning, make: Make) -> Iterator[Parameter]:
+def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
     for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
@@ -436,19 +397,19 @@ def _held(p: Parameter) -> Parameter:
     return replace(p, deviation=1e-3, low=0.0, high=0.0)
 
 
-def _of_axes(known: Beginning, make: Make) -> Iterator[Parameter]:
-    c, free = known.coefficients, {*known.layout.coefficients} - known.exact
+def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
     for axis in (*known.fitted, *known.unseen):
-        name = axis.name
-        if axis.coefficient("beta") not in known.exact:
-            yield from make("inertia", name)
-        for kind, key in DRAG.items():
-            if axis.coefficient(key) not in known.exact:
-                yield from make(kind, name, mean=log(max(c[axis.coefficient(key)], 1e-9)))
-        if axis in known.fitted and axis.coefficient(f"a_d{REVERSE}") in free:
-            yield from make("drag astern", name)
-        if (load := known.layout.by_name[name].coefficient("F_0")) in free and known.full[name]:
-            yield from make("load", name, null=-c[load] / known.full[name])
+        form = known.layout.by_name[axis.name]
+        for name, kind in KINDS.items():
+            if (own := kind.of_axis(known, form)) is not None:
+                yield from make(name, axis.name, sets=_set(known, name, [form]), **own)
+
+
+def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str, ...]:
+    """Return the names of the coefficients of some parts that are the number of a parameter of a kind."""
+    declared = KINDS[kind]
+    names = (part.coefficient(declared.keys[0]) for part in parts if declared.is_coefficient)
+    return tuple(name for name in names if name in known.layout.coefficients)
 
 
 def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
@@ -479,7 +440,7 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
         yield from make("sensor lag", "", part)
 
 
-def _of_noise(known: Beginning, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
+def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable

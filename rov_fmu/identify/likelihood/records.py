@@ -167,10 +167,10 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     slowing: dict[Axis, bool] = {}
     findings = []
     for axis, channel in _channels(log, layout):
-        found = Finding("gaps", axis.name, file=channel.file or log.file, names={"quantity": channel.quantity.name})
+        found = Finding("gaps", axis.name, file=channel.file or log.file, words={"quantity": channel.quantity.name})
         if kind := _why_left_out(channel):
             numbers = {"count": channel.count, "least": LEAST_SAMPLES} if kind == "too few samples" else {}
-            findings.append(replace(found, kind=kind, numbers=numbers))
+            findings.append(replace(found, kind=kind, words={**found.words, **numbers}))
             continue
         measured.setdefault(axis, found.file)
         slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
@@ -178,8 +178,8 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
             assert log.commands
             begin = float(log.commands.rows[0])
             told = [f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in places]
-            names = {**found.names, "gaps": ", ".join(first_of(told, MOST))}
-            findings.append(replace(found, names=names, numbers={"count": len(places)}))
+            words = {**found.words, "gaps": ", ".join(first_of(told, MOST)), "count": len(places)}
+            findings.append(replace(found, words=words))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
     return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings

@@ -58,12 +58,12 @@ def cause_of(
         return ""
     common = set.intersection(*(set(piece.causes) for piece in pieces))
     effective = sum(piece.constants(time_constant) for piece in pieces)
-    found = {name: _evidence(pieces, name, time_constant, effective) for name in sorted(common)}
-    if not found:
+    evidence = {name: _evidence(pieces, name, time_constant, effective) for name in sorted(common)}
+    if not evidence:
         return ""
-    best = max(found, key=lambda name: found[name])
-    others = [value for name, value in found.items() if name != best]
-    is_clear = found[best] > ENOUGH and found[best] > max(others, default=0.0) + AHEAD
+    best = max(evidence, key=lambda name: evidence[name])
+    others = [value for name, value in evidence.items() if name != best]
+    is_clear = evidence[best] > ENOUGH and evidence[best] > max(others, default=0.0) + AHEAD
     return best if is_clear else ""
 
 

@@ -35,8 +35,8 @@ def disturbances(
     for place, p in enumerate(objective.table.parameters):
         if p.kind in SLOW:
             evidence, error = _evidence(objective, best, posterior, place), float(posterior.errors[place])
-            found = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
-            present = [one for one in found if one]
+            in_logs = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
+            present = [one for one in in_logs if one]
             if present:
                 largest = max(present, key=lambda one: one.share)
                 yield replace(largest, cause=_cause(objective, best.z, p, runs, largest)) if largest.kept else largest

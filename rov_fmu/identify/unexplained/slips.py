@@ -31,7 +31,7 @@ from rov_fmu.identify.likelihood.filter import DivergedError, Slow
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
 from rov_fmu.identify.likelihood.hypotheses import Adopted, Model
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import Beginning
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
@@ -90,7 +90,7 @@ Scaling = frozenset[tuple[_Match, float]]
 
 def slips(
     tests: Tests,
-    known: Beginning,
+    known: Prior,
     objective: Objective,
     best: Array,
     errors: Array,
@@ -129,7 +129,7 @@ def slips(
     )
 
 
-def _inertias(known: Beginning, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:
+def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:
     """Yield the translations that are fitted, with ln of their inertia relative to the mass, and its error."""
     vehicle, _ = objective.table.model(z)
     for axis in known.fitted:
@@ -224,12 +224,12 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
         at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
         channel = next(c for c in one.log.channels if not c.unused and (c.quantity, c.source) == used)
         time, raw = channel.time[channel.there], channel.values[channel.there]
-        found = {}
+        likenesses = {}
         for scale in (1.0, -1.0, *(_ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS)):
             values = np.unwrap(raw / scale) if channel.quantity.wraps else raw / scale
-            found[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
-        most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in found.values())
-        ratios = {k: ratio for k, (ratio, unexplained) in found.items() if ratio > 0.0 and unexplained < min(most)}
+            likenesses[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
+        most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in likenesses.values())
+        ratios = {k: ratio for k, (ratio, unexplained) in likenesses.items() if ratio > 0.0 and unexplained < min(most)}
         yield _Match(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
 
 

@@ -33,7 +33,7 @@ PARTS = 32
 
 
 @dataclass(frozen=True)
-class Row:
+class Signal:
     """What one command or one channel of a log contains."""
 
     name: str
@@ -58,9 +58,9 @@ class Inspection:
     path: Path
     name: str
     """The name of the log, or of the piece between two restarts of its clock."""
-    commands: tuple[Row, ...]
+    commands: tuple[Signal, ...]
     """The commands of the thrusters in order, or the single command of an axis."""
-    channels: tuple[Row, ...]
+    channels: tuple[Signal, ...]
     """The channels that are used."""
     unread: Mapping[str, str]
     """A description of everything that is not recognised, by name. For a column it is the range of its values."""
@@ -133,7 +133,7 @@ def _quantity(meant: str) -> str:
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
     """Return what a log contains; `unread` has the columns that are not recognised."""
     channels = tuple(
-        _row(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
+        _signal(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
         for channel in log.channels
         if not channel.unused
     )
@@ -158,7 +158,7 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     numbers = zip(*((row.command, row.value) for row in rows), strict=True)
     no_times = np.full(len(rows), nan)
     channels = (
-        _row(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
+        _signal(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
         for (name, column), own in zip(of_table.items(), numbers, strict=True)
     )
     return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
@@ -181,12 +181,12 @@ def logs_among(tests: Sequence[Path], columns: Mapping[str, str] = {}) -> Sequen
     return [file for file in tests if not kind_of_table(file, columns)] or tests
 
 
-def _row(name: str, unit: str, time: Array, values: Array) -> Row:
+def _signal(name: str, unit: str, time: Array, values: Array) -> Signal:
     there = np.isfinite(values)
     at, found = time[there], values[there]
     ends = (at[0], at[-1], found.min(), found.max()) if len(found) else (np.nan,) * 4
     start, end, low, high = map(float, ends)
-    return Row(name, unit, start, end, len(found), rate(at), low, high, gaps(time, values), _course(at, found))
+    return Signal(name, unit, start, end, len(found), rate(at), low, high, gaps(time, values), _course(at, found))
 
 
 def _course(time: Array, values: Array) -> list[float]:
@@ -198,14 +198,14 @@ def _course(time: Array, values: Array) -> list[float]:
     return [float(part.mean()) if len(part) else nan for part in parts]
 
 
-def _commands(log: Log) -> Iterator[Row]:
+def _commands(log: Log) -> Iterator[Signal]:
     if not log.commands:
         return
     rows = log.commands.rows
     loads = {axis.external: axis.load for axis in AXES.values()}
     for name, values in zip(log.commands.thrusters, log.commands.at(rows).T, strict=True):
         is_named = log.follows_axis or name in loads
-        yield _row(name if is_named else f"thruster {name}", loads.get(name, "1"), rows, values)
+        yield _signal(name if is_named else f"thruster {name}", loads.get(name, "1"), rows, values)
 
 
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ from rov_fmu.io.messages import lines_on
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, RovFile, read_description
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.folder import joined_dive
 from rov_fmu.tank.inspection.headers import axis_in_name
 from rov_fmu.tank.log import Log
@@ -41,6 +41,6 @@ def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = Fa
     else:
         log, *others = read_logs(path, layout, names, axis_in_name(path), is_part=is_part)
     told = [f"{path}: only the part before the clock restarts is used"] * bool(others)
-    for sentence in (*told, *sentences((f for f in log.findings if f.kind not in _NOT_TOLD), SENTENCES)):
+    for sentence in (*told, *sentences(f for f in log.findings if f.kind not in _NOT_TOLD)):
         warnings.warn(sentence, UserWarning, stacklevel=4)
     return log

@@ -46,7 +46,7 @@ class Listing:
 
     def lines(self, *kinds: str) -> list[str]:
         """Return a line for each finding of these kinds."""
-        return [f"{self.folder / one.file}: {one.names['reason']}" for one in self.findings if one.kind in kinds]
+        return [f"{self.folder / one.file}: {one.words['reason']}" for one in self.findings if one.kind in kinds]
 
     def no_tests(self) -> list[str]:
         """Return the lines about a folder without logs and tables."""

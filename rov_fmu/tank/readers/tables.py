@@ -54,7 +54,7 @@ from rov_fmu.tank.columns import (
     known_columns,
     refuse_slips,
 )
-from rov_fmu.tank.findings import SENTENCES, Finding, about, refusals
+from rov_fmu.tank.findings import Finding, about, refusal
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
@@ -135,7 +135,7 @@ def read_table(
     values |= {name: pulses[name] for name in unstated}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
-        raise DataFileError(*refusals([unlikely], path.parent, SENTENCES))
+        raise DataFileError(refusal(unlikely, path.parent))
     content = Content(path.name, [], names=frozenset(table.header), without_thruster=_without_thruster(table))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, pulses, names.keys.neutral)

@@ -81,7 +81,7 @@ def test_drag_relative_to_inertia_follows_from_logs_without_thrust(quantity: str
     """The velocity at the start is free. Drag alone and inertia alone stay open, as a free decay does not tell them."""
     write(tmp_path, HEAD + THRUSTER, quantity, [(1.2, 0.0), (-1.0, 0.0)])
     tests = load_tests(tmp_path)
-    assert [finding.kind for finding in tests.findings] == ["free decay"] * 2
+    assert [finding.kind for finding in tests.folder.findings] == ["free decay"] * 2
     known, logs, rows = begin(tests)
     posterior = fit_all(tmp_path, known, logs, rows).file.posterior
     table, S = posterior.table, posterior.covariance

@@ -125,7 +125,7 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
             ratio = exp(of("drag astern", axis))
             assert [c[name], c[f"{name}_reverse"]] == pytest.approx([of(kind, axis), ratio * of(kind, axis)])
         assert c[f"beta_{v}"] == pytest.approx(base[f"beta_{v}"] / of("inertia", axis))
-        assert c[f"F_0_{v}"] == pytest.approx(of("load", axis) * table.full[axis])
+        assert c[f"F_0_{v}"] == of("load", axis)
     one, other = (table.of_log(z, log) for log in (heave, surge))
     assert one.offset == of("logging offset", "log_heave_0.csv") + of("dead time")
     assert one.width == of("logging width", "log_heave_0.csv")

@@ -11,7 +11,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.likelihood.records import driven_axes, recorded, typical
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Channel, Log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -118,7 +118,7 @@ def test_a_log_tests_the_axes_that_it_pushes_and_measures(case: str) -> None:
     one, axes, told = CASES[case]
     tested, findings = driven_axes(one, VIDEORAY.layout)
     assert [axis.name for axis in tested] == axes
-    assert [line.removeprefix("a.csv: ") for line in sentences(findings, SENTENCES)] == told
+    assert [line.removeprefix("a.csv: ") for line in sentences(findings)] == told
     assert (recorded(one, VIDEORAY.layout) is None) is (not axes)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE
-from rov_fmu.identify.assess import answers, answers_of_file, time_with_lag
+from rov_fmu.identify.assess import answers, answers_of_file
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.result import half_width
@@ -18,7 +18,7 @@ from tests.vehicles import VIDEORAY, extended
 
 def of_drag(deviation: float, gain: float) -> Posterior:
     """Return the posterior of the drag in surge, and of a slow change of thrust of a known size."""
-    drag = Parameter("quadratic drag", "surge", is_log=True)
+    drag = Parameter("quadratic drag", "surge", is_log=True, sets=("a_d_u",))
     slow = Parameter("slow gain", "", is_log=True, of_motion=False)
     table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, (drag, slow))
     return Posterior(table, np.log([VIDEORAY["a_d_u"], gain]), np.diag([deviation**2, 0.0]))
@@ -62,10 +62,10 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     z = np.array([0.2, np.log(rov.effective_inertia(rov.layout.by_name["surge"]))])
 
     def half(posterior: Posterior) -> float:
-        found = time_with_lag([posterior], SURGE, rov)
-        assert found
-        assert found[1][0] < found[0] < found[1][1]
-        return half_width(found)
+        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov) if one.command == 0.5)
+        assert lagged
+        assert lagged[1][0] < lagged[0] < lagged[1][1]
+        return half_width(lagged)
 
     alone, opposed, equal = (
         half(Posterior(table, z, np.array([[0.03**2, r * 0.03 * 0.1], [r * 0.03 * 0.1, 0.1**2]])))
@@ -73,7 +73,7 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     )
     assert opposed < alone < equal
     assert alone**2 == pytest.approx(0.5 * (opposed**2 + equal**2), rel=0.05), "as variances add"
-    assert time_with_lag([of_drag(0.04, 0.05)], SURGE, VIDEORAY) is None, "it has no lag"
+    assert not any(one.lagged for one in answers([of_drag(0.04, 0.05)], SURGE, VIDEORAY)), "it has no lag"
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:

@@ -17,7 +17,7 @@ from rov_fmu.equation.parts import Thruster
 from rov_fmu.io.messages import InputError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import MISFITS as KINDS
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, config_of, fitting_frames, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -274,7 +274,7 @@ def test_motors_of_a_log_that_are_not_the_thrusters_are_named(case: str, name: s
         told = [packed("PARM", 10**6, key.encode(), value, 0.0) for key, value in parameters.items()]
         dataflash(path, [*told, *(rcou(2.0 + 0.1 * n, *row) for n, row in enumerate(rows))])
     found = [finding for finding in read_log(path, layout).findings if finding.kind in KINDS]
-    said = sentences(found, SENTENCES)
+    said = sentences(found)
     assert len(said) == bool(words)
     assert all(line.startswith(f"{path.name}: ") and words in line for line in said)
     if axes != "*":
@@ -287,7 +287,7 @@ def test_columns_of_numbered_thrusters_that_the_vehicle_lacks_are_named(tmp_path
     np.savetxt(path, _rows(), "%.4g", ",", header=header, comments="")
     for layout, words in ((BLUEROV2, f"'u_7 [%]' and 'u_8 [%]'{BEYOND}: {FITS_1}"), (HEAVY, "")):
         found = [finding for finding in read_log(path, layout).findings if finding.kind in KINDS]
-        (said,) = sentences(found, SENTENCES) or ("",)
+        (said,) = sentences(found) or ("",)
         assert said.endswith(words)
         assert len(found) == (len(layout.axes) if words else 0)
 

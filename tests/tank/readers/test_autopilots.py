@@ -58,7 +58,7 @@ def test_the_filter_tells_which_velocities_it_knows() -> None:
     own, other = content.pieces[0].topics
     np.testing.assert_equal([own.fields["vx"], own.fields["vy"]], [[nan] * 3 + [1.0], [nan] * 3 + [2.0]])
     assert (own.fields["vz"].tolist(), other.fields["vx"].tolist()) == ([3.0] * 4, [1.0] * 4)
-    assert content.findings == [Finding("unknown velocity", file="a.tlog", numbers={"count": 3})]
+    assert content.findings == [Finding("unknown velocity", file="a.tlog", words={"count": 3})]
 
 
 def test_the_primary_core_of_the_filter_is_used_while_it_is_primary() -> None:
@@ -87,10 +87,10 @@ def test_another_vehicle_another_port_and_outputs_that_are_none(tmp_path: Path) 
     assert not commanded(log.log, "1").any()
     assert commanded(log.log, "5")[0] == 0.0
     names = {"vehicles": "1 and 2", "vehicle": "1"}
-    assert Finding("several vehicles", file="dive.tlog", names=names) in log.findings
+    assert Finding("several vehicles", file="dive.tlog", words=names) in log.findings
     assert log.log.commands
     assert log.log.commands.source.part == "component 1"
-    assert Finding("no servo pulse", file="dive.tlog", numbers={"count": 6}) in log.findings
+    assert Finding("no servo pulse", file="dive.tlog", words={"count": 6}) in log.findings
 
 
 # ---- .bin ------------------------------------------------------------------------------------------------------------
@@ -180,4 +180,4 @@ def test_velocities_that_the_filter_does_not_know_are_left_out(tmp_path: Path) -
     read = read_log(log.write(tmp_path / "a.ulg"), BLUEROV2)
     assert measured(read.log, "depth") == pytest.approx(0.5 * motion.DEPTH)
     assert measured(read.log, "surge velocity")[:100] == pytest.approx(motion.U, abs=1e-5)
-    assert Finding("dropouts", file="a.ulg", numbers={"count": 3, "longest": 1.5}) in read.findings
+    assert Finding("dropouts", file="a.ulg", words={"count": 3, "longest": 1.5}) in read.findings

@@ -9,7 +9,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode
 
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.readers.listing import list_files
 from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
@@ -18,7 +18,7 @@ from tests.tank.readers.writers import Ros, messages_of, outputs
 
 
 def told(log: Read) -> tuple[str, ...]:
-    return sentences(log.findings, SENTENCES)
+    return sentences(log.findings)
 
 
 def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) -> None:

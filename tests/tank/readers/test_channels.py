@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.channels import Topic, channels_of, frames_of, of_scalar
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Channel, Log, Source
 from rov_fmu.tank.quality import checked
 from tests.tank.logs import used
@@ -172,13 +172,13 @@ def test_of_several_barometers_the_one_in_the_water_tells_the_depth() -> None:
         "its pressure changes by only 3 mm of water and is that of the air, so the barometer seems to be inside the "
     )
     reason += "hull"
-    assert sentences(alone.findings, SENTENCES) == (
+    assert sentences(alone.findings) == (
         f"a: /hull is left out for depth: {reason}",
         "a: pressure from /hull, 10 Hz",
     )
     both = checked(Log("a", None, tuple(channels_of([hull, water], None))))
     assert used(both, "depth").values == pytest.approx(motion.DEPTH)
-    assert sentences(both.findings, SENTENCES) == (
+    assert sentences(both.findings) == (
         "a: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water the true depth is 2.5 "
         "% smaller",
         "a: pressure from /bar30, 10 Hz; also in /hull, not used",

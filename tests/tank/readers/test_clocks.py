@@ -39,9 +39,7 @@ def test_a_simulation_that_is_reset_is_two_pieces() -> None:
         for topic, late in zip(piece.topics, (0.0, 0.1), strict=True):
             assert topic.fields["x"].tolist() == numbers.tolist()
             assert topic.time == pytest.approx(100.0 + late + np.arange(len(numbers)))
-    assert content.findings == [
-        Finding("time of arrival", file="a", names={"topics": "/untimed"}, numbers={"count": 50})
-    ]
+    assert content.findings == [Finding("time of arrival", file="a", words={"topics": "/untimed", "count": 50})]
 
 
 @pytest.mark.parametrize(
@@ -138,7 +136,7 @@ def test_in_every_format_a_stray_time_is_left_out_and_a_clock_that_is_set_splits
     read = read_log(SEEDS[name](tmp_path / "set", replace(DIVE, time=later)), BLUEROV2, names=names)
     assert [len(log.commands.rows) for log in read.logs if log.commands] == [50, 50]
     (told,) = (finding for finding in read.findings if finding.kind == "clock restarts")
-    assert float(told.names["at"]) == pytest.approx(4.9, abs=1e-2)
+    assert float(told.words["at"]) == pytest.approx(4.9, abs=1e-2)
 
 
 def test_work_grows_with_the_rows_and_not_with_the_time_between_them() -> None:

@@ -12,7 +12,7 @@ from rov_fmu.equation.parts import BodyForce, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.commands import Commanded, LogKeys, Parameters, commands_of, wrench_of
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Source
 
 SERVOS = "SERVO_OUTPUT_RAW SERVO_OUTPUT_RAW"
@@ -238,7 +238,7 @@ def test_outputs_beside_those_of_the_thrusters() -> None:
 def told(found: Commanded) -> str:
     """Return the source, the commands and the findings in words."""
     series = (" ".join([name, *(f"{value:g}" for value in values)]) for name, (_, values) in found.series.items())
-    return f"{found.sender}: {', '.join(series)}: {sentences(found.findings, SENTENCES)}"
+    return f"{found.sender}: {', '.join(series)}: {sentences(found.findings)}"
 
 
 @pytest.mark.parametrize("case", COMMANDS)

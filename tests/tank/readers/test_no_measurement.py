@@ -12,7 +12,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
@@ -127,7 +127,7 @@ def read(path: Path, **tables: object) -> Log:
 
 
 def told(log: Log) -> list[str]:
-    return [one for one in sentences(log.findings, SENTENCES) if " left out, because " in one]
+    return [one for one in sentences(log.findings) if " left out, because " in one]
 
 
 HELD = np.where(BURSTS, np.roll(SPEED, 9), SPEED)

@@ -9,7 +9,7 @@ import pytest
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.description import RovTables
-from rov_fmu.tank.findings import SENTENCES, sentences
+from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
@@ -27,7 +27,7 @@ def one(path: Path, keys: LogKeys = LogKeys(), topics: dict[str, str] | None = N
 
 
 def told(log: Log) -> str:
-    return "\n".join(sentences(log.findings, SENTENCES))
+    return "\n".join(sentences(log.findings))
 
 
 def told_at(time: float, **values: float) -> list[tuple[float, Any]]:
