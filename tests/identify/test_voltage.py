@@ -35,7 +35,7 @@ def without_column(folder: Path, to: Path) -> Identification:
 
 
 def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) -> None:
-    """The voltage is told to act on nothing, and moves no answer by more than a quarter of its interval's half-width."""
+    """The voltage is told to act on nothing. No answer moves by more than a quarter of its interval's half-width."""
     found = identified(folder / "with", battery, seed, dive)
     other = without_column(folder / "with", folder / "without")
     assert found.vehicle.layout.voltage is None
