@@ -1,29 +1,47 @@
-"""Whole results: what is written for vehicles of every kind, and what commands print, each in a file of results/."""
+"""Whole results: what is written for vehicles of every kind, pages, and what commands print, each in a file of results/."""
 
 import os
 import re
-from collections.abc import Callable
-from contextlib import redirect_stdout
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from datetime import date
 from difflib import unified_diff
 from functools import partial
 from io import StringIO
 from math import isclose
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 from unittest.mock import patch
+
+from markupsafe import Markup
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
+from rov_fmu.identify.result import Identification
+from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.report import report_page
+from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.test_sdf import IN_GAZEBO, LOADED
-from tests.vehicles import EVERYTHING, OUTSIDE, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, pulsed
+from tests.commands import without_progress
+from tests.report.pages import lines_of
+from tests.report.results import bare, compared_with, doubtful, example
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, pulsed
 
-FOLDER = Path(__file__).parent / "results"
+HERE = Path(__file__).parent
+FOLDER = HERE / "results"
+TANK_TESTS = {path.name: path for path in (HERE / "tank_tests").iterdir()}
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-_VARIES = re.compile(r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?')
-"""What changes with every version, although nothing else does."""
+_VARIES = re.compile(
+    r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?|(?<=rov-fmu )\d+\.\d+\.\d+|\b[0-9a-f]{64}\b'
+)
+"""What changes with every version or with a source, although nothing else does."""
 
 
 def _described(vehicle: Vehicle, fmi: int) -> str:
@@ -31,7 +49,7 @@ def _described(vehicle: Vehicle, fmi: int) -> str:
     files = native_content(vehicle, fmi=fmi).files
     parts = [files["modelDescription.xml"], files["terminalsAndIcons/terminalsAndIcons.xml"]]
     text = b"\n".join([*parts, osp_model_description(vehicle.layout)]).decode()
-    return _VARIES.sub("", text).replace("&#10;", "\n")
+    return text.replace("&#10;", "\n")
 
 
 def _in_gazebo(vehicle: Vehicle, explicit: bool) -> str:
@@ -42,14 +60,79 @@ def _in_ros(vehicle: Vehicle) -> str:
     return urdf_model(vehicle).text
 
 
-def _printed(command: str) -> str:
-    """Return what a command prints without colours."""
+# ---- Pages -----------------------------------------------------------------------------------------------------------
+
+
+def _label(label: str, *_: Any, **__: Any) -> Markup:
+    """Return what stands for a plot, because drawing takes most of the time."""
+    return Markup('<svg aria-label="{}"></svg>').format(label)
+
+
+@contextmanager
+def _without_plots() -> Iterator[None]:
+    """Replace the plots of pages by their labels, and pictures by nothing."""
+    with ExitStack() as patches:
+        for module in ("report.report", "report.inspection_page", "report.page.fmu_page", "study.results.plots"):
+            patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _label))
+        patches.enter_context(patch("rov_fmu.report.page.fmu_page.pictures", lambda _: {}))
+        yield
+
+
+def _text(page: str) -> str:
+    return "\n".join(lines_of(page))
+
+
+def _report(result: Callable[[], Identification]) -> str:
+    """Return what the terminal and the report tell of an identification."""
+    with _without_plots():
+        page = _text(report_page(result(), made=date(2026, 11, 23)))
+    return f"{_said(lambda: print_identification(result()))}\n{page}"
+
+
+def _page(vehicle: Vehicle, **how: Any) -> str:
+    with _without_plots():
+        return _text(documentation_page(vehicle, **how))
+
+
+# ---- Commands --------------------------------------------------------------------------------------------------------
+
+
+def _said(run: Callable[[], object]) -> str:
+    """Return what is printed without colours."""
     said = StringIO()
-    with redirect_stdout(said), patch.dict(os.environ):
+    with redirect_stdout(said), redirect_stderr(said), patch.dict(os.environ, SOURCE_DATE_EPOCH="0"):
         for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
             os.environ.pop(name, None)
-        assert main(command.split()) == 0
-    return said.getvalue()
+        run()
+    return without_progress(said.getvalue())
+
+
+def _printed(command: str, *more: str) -> str:
+    return _said(lambda: main([*command.split(), *more]))
+
+
+def _study() -> str:
+    """Return the page and the summary of a study that an earlier version did."""
+    from rov_fmu.study import Results
+    from rov_fmu.study.results.page import study_page
+    from rov_fmu.study.results.summary import print_summary
+    from rov_fmu.study.run.cluster import Spent
+
+    results = Results(HERE / "studies" / "kinds")
+    with _without_plots():
+        page = _text(study_page(results))
+    return f"{_said(lambda: print_summary(results, Spent(runs=24, elapsed=2.0)))}\n{page}".replace(f"{HERE}/", "")
+
+
+def _in_copy(folder: Path, options: str) -> str:
+    """Return what a command prints about a copy of a folder, and what it writes beside it."""
+    with TemporaryDirectory() as temporary, _without_plots():
+        place = Path(temporary)
+        shutil.copytree(folder, place / folder.name)
+        said = _said(lambda: main([part.format(f=place / folder.name) for part in options.split()]))
+        written = (path.read_text(encoding="utf-8") for path in sorted(place.glob("*.*")))
+        parts = [said, *(_text(text) if text.startswith("<!") else text for text in written)]
+    return "\n".join(parts).replace(f"{temporary}/", "")
 
 
 _VEHICLES = {
@@ -66,21 +149,57 @@ RESULTS: dict[str, Callable[[], str]] = {
     **{f"{name}.urdf": partial(_in_ros, LOADED[name]) for name in ("everything", "bluerov2_heavy", "remus100")},
     "tables.txt": partial(_printed, "tables videoray"),
     "simulate.txt": partial(_printed, "simulate videoray --set u_l=0.3 --set u_r=0.3 --set a_d_u=10 --set z=2"),
+    "tune.txt": partial(_printed, "tune bluerov2_heavy --axis heave --command 0.5 --v-ss 0.4 --tau 0.3"),
+    "tune_points.txt": partial(_printed, "tune videoray --axis heave --points", str(HERE / "csv" / "points.csv")),
+    "study_kinds.txt": _study,
+    "page_videoray.txt": partial(_page, load_vehicle(VIDEORAY_FILE)),
+    "page_heavy.txt": partial(_page, HEAVY, native=False),
+    "page_pair.txt": partial(_page, a_vehicle(VEHICLES["lag without coupling"])),
+    "page_six_axes.txt": partial(_page, a_vehicle(SIX), fmi=3),
+    "report.txt": partial(_report, example),
+    "report_of_little.txt": partial(_report, bare),
+    "report_of_doubts.txt": partial(_report, doubtful),
+    "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
+    **{
+        f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}" + " --report {f}.html" * (path.name == "dives"))
+        for path in (HERE / "logs").iterdir()
+    },
+    **{
+        f"identify_{name}.txt": partial(_in_copy, path, "identify {f} -o {f}.toml --report {f}.html")
+        for name, path in TANK_TESTS.items()
+    },
 }
 """A function that makes each result anew, by the name of its file."""
+LONG = {f"identify_{name}.txt" for name in ("harbour", "otter", "videoray_refit")}
+"""Those that take more than a few seconds."""
 
 
-def difference(name: str) -> list[str]:
+def now(name: str) -> str:
+    """Return a result of today without what varies."""
+    return _VARIES.sub("", RESULTS[name]())
+
+
+def difference(name: str, made: str) -> list[str]:
     """Return the lines in which a result differs from the one that is kept. Numbers may differ by rounding."""
-    path, now = FOLDER / name, RESULTS[name]().splitlines()
+    path, lines = FOLDER / name, made.splitlines()
     kept = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    as_kept = [old if _same(old, new) else new for old, new in zip(kept, now, strict=False)] + now[len(kept) :]
+    by = _one_of_last_digit if name.startswith("identify") else _rounding
+    as_kept = [old if _same(old, new, by) else new for old, new in zip(kept, lines, strict=False)] + lines[len(kept) :]
     return [*unified_diff(kept, as_kept, "kept", "now", n=1, lineterm="")]
 
 
-def _same(old: str, new: str) -> bool:
-    """Return True if two lines have the same words, and numbers that differ by rounding."""
+def _same(old: str, new: str, is_close: Callable[[str, str], bool]) -> bool:
+    """Return True if two lines have the same words, and numbers that are close."""
     if _NUMBER.sub("0", old) != _NUMBER.sub("0", new):
         return False
-    pairs = zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
-    return all(isclose(float(a), float(b), rel_tol=1e-9, abs_tol=1e-12) for a, b in pairs)
+    return all(map(is_close, _NUMBER.findall(old), _NUMBER.findall(new)))
+
+
+def _rounding(old: str, new: str) -> bool:
+    return isclose(float(old), float(new), rel_tol=1e-9, abs_tol=1e-12)
+
+
+def _one_of_last_digit(old: str, new: str) -> bool:
+    """Return True for numbers of a fit that another processor rounds to the next digit."""
+    digits = len(old.partition("e")[0].partition(".")[2])
+    return isclose(float(old), float(new), rel_tol=1e-5, abs_tol=1.01 * 10.0**-digits)

@@ -64,6 +64,32 @@ def text_of(page: str) -> str:
     return " ".join(html.fromstring(page).text_content().split())
 
 
+_BLOCKS = "div p h1 h2 h3 h4 li tr pre figure figcaption details summary section header footer dt dd".split()
+"""The elements of our pages that begin a line."""
+
+
+def lines_of(page: str) -> list[str]:
+    """Return the text of a page as it is read: a line for each block and for each row, and the labels of plots.
+
+    A heading begins with # and its level, and with + where what follows is folded.
+    """
+    root = html.fromstring(page)
+    for element in root.xpath("//script | //style | //head | //svg/*"):
+        element.drop_tree()
+    for element in root.iter("svg"):
+        element.text = f"\n[{element.get('aria-label', '')}]\n"
+    for element in root.xpath("//td | //th"):
+        element.tail = "|"
+    for element in root.xpath("//td//span"):
+        element.text = f" {element.text or ''}"
+    for element in root.iter(*_BLOCKS):
+        mark = f"{'#' * int(element.tag[1])} " if element.tag[1:].isdigit() else ""
+        mark += "+ " * (element.getparent().tag == "summary" or (element.tag == "summary" and not len(element)))
+        element.text, element.tail = f"\n{mark}{(element.text or '').lstrip()}", f"\n{element.tail or ''}"
+    rows = (" ".join(line.replace("|", " | ").split()) for line in root.text_content().split("\n"))
+    return [line for line in rows if line]
+
+
 def unfolded(page: str) -> str:
     """The text of a page that is not folded, without plots."""
     root = html.fromstring(page)
