@@ -1,4 +1,4 @@
-"""Whole results: what is written for vehicles of every kind, pages, and what commands print, each in a file of results/."""
+"""Whole results: what is written for vehicles of every kind, pages, and what commands print, in files of results/."""
 
 import os
 import re
@@ -15,7 +15,10 @@ from tempfile import TemporaryDirectory
 from typing import Any
 from unittest.mock import patch
 
+import numpy as np
 from markupsafe import Markup
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
@@ -30,7 +33,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.test_sdf import IN_GAZEBO, LOADED
 from tests.commands import without_progress
-from tests.report.pages import lines_of
+from tests.report.pages import check_is_whole, lines_of
 from tests.report.results import bare, compared_with, doubtful, example
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, pulsed
 
@@ -39,7 +42,8 @@ FOLDER = HERE / "results"
 TANK_TESTS = {path.name: path for path in (HERE / "tank_tests").iterdir()}
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _VARIES = re.compile(
-    r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?|(?<=rov-fmu )\d+\.\d+\.\d+|\b[0-9a-f]{64}\b'
+    r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?'
+    r"|(?<=rov-fmu )\d+\.\d+\.\d+|\b[0-9a-f]{64}\b"
 )
 """What changes with every version or with a source, although nothing else does."""
 
@@ -63,22 +67,51 @@ def _in_ros(vehicle: Vehicle) -> str:
 # ---- Pages -----------------------------------------------------------------------------------------------------------
 
 
-def _label(label: str, *_: Any, **__: Any) -> Markup:
-    """Return what stands for a plot, because drawing takes most of the time."""
-    return Markup('<svg aria-label="{}"></svg>').format(label)
+def _plot(label: str, draw: Callable[[Figure], None], *_: Any, **__: Any) -> Markup:
+    """Return what a plot shows, in words, because rendering takes most of the time."""
+    draw(figure := Figure())
+    lines = [label]
+    for ax in figure.axes:
+        scales = (scale.get_ylabel() for scale in ax.child_axes)
+        lines.append("; ".join([ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), *scales]))
+        for line in ax.lines:
+            x, y = (np.asarray(part, float) for part in line.get_data())
+            name = re.sub("^_.*", "line", str(line.get_label()))
+            lines.append(f"{name}: {len(x)} from {_point(x, y, 0)} to {_point(x, y, -1)}, {_ends(y)}")
+        for shape in (*ax.collections, *ax.patches):
+            for x, y in [path.vertices.T for path in _paths(shape)]:
+                lines.append(f"{type(shape).__name__}: {_ends(x)}, {_ends(y)}")
+        lines.append(" ".join(text.get_text() for text in ax.texts))
+    return Markup('<svg aria-label="{}"></svg>').format("\n".join(lines))
+
+
+def _paths(shape: Any) -> list[Any]:
+    """Return the outlines of a shape or a collection of shapes, in the coordinates of the data."""
+    if isinstance(shape, Patch):
+        return [shape.get_patch_transform().transform_path(shape.get_path())]
+    return [*shape.get_paths()]
+
+
+def _point(x: Any, y: Any, place: int) -> str:
+    return f"({x[place]:.4g}, {y[place]:.4g})" if len(x) else "()"
+
+
+def _ends(values: Any) -> str:
+    return f"{np.nanmin(values):.4g} ... {np.nanmax(values):.4g}" if np.isfinite(values).any() else "nothing"
 
 
 @contextmanager
 def _without_plots() -> Iterator[None]:
-    """Replace the plots of pages by their labels, and pictures by nothing."""
+    """Replace the plots of pages by what they show, and pictures by nothing."""
     with ExitStack() as patches:
         for module in ("report.report", "report.inspection_page", "report.page.fmu_page", "study.results.plots"):
-            patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _label))
+            patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _plot))
         patches.enter_context(patch("rov_fmu.report.page.fmu_page.pictures", lambda _: {}))
         yield
 
 
 def _text(page: str) -> str:
+    check_is_whole(page)
     return "\n".join(lines_of(page))
 
 
@@ -131,7 +164,8 @@ def _in_copy(folder: Path, options: str) -> str:
         shutil.copytree(folder, place / folder.name)
         said = _said(lambda: main([part.format(f=place / folder.name) for part in options.split()]))
         written = (path.read_text(encoding="utf-8") for path in sorted(place.glob("*.*")))
-        parts = [said, *(_text(text) if text.startswith("<!") else text for text in written)]
+        parts = [said, *(_text(text.partition("\n")[2]) if text.startswith("<!") else text for text in written)]
+        parts += [_text(documentation_page(load_vehicle(path))) for path in place.glob("*.toml")]
     return "\n".join(parts).replace(f"{temporary}/", "")
 
 
@@ -161,7 +195,9 @@ RESULTS: dict[str, Callable[[], str]] = {
     "report_of_doubts.txt": partial(_report, doubtful),
     "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
     **{
-        f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}" + " --report {f}.html" * (path.name == "dives"))
+        f"inspect_{path.name}.txt": partial(
+            _in_copy, path, "inspect {f}" + " --report {f}.html" * (path.name == "dives")
+        )
         for path in (HERE / "logs").iterdir()
     },
     **{

@@ -64,14 +64,14 @@ def text_of(page: str) -> str:
     return " ".join(html.fromstring(page).text_content().split())
 
 
-_BLOCKS = "div p h1 h2 h3 h4 li tr pre figure figcaption details summary section header footer dt dd".split()
+_BLOCKS = [*"h1 h2 h3 h4 p li tr dt dd div pre figure figcaption details summary section header footer".split()]
 """The elements of our pages that begin a line."""
 
 
 def lines_of(page: str) -> list[str]:
     """Return the text of a page as it is read: a line for each block and for each row, and the labels of plots.
 
-    A heading begins with # and its level, and with + where what follows is folded.
+    A heading begins with # and its level, and with + where what follows is folded; ! marks a cell that stands out.
     """
     root = html.fromstring(page)
     for element in root.xpath("//script | //style | //head | //svg/*"):
@@ -80,8 +80,8 @@ def lines_of(page: str) -> list[str]:
         element.text = f"\n[{element.get('aria-label', '')}]\n"
     for element in root.xpath("//td | //th"):
         element.tail = "|"
-    for element in root.xpath("//td//span"):
-        element.text = f" {element.text or ''}"
+    for element in root.xpath("//td//span | //td[contains(@class, 'off')]"):
+        element.text = f"{'! ' if element.tag == 'td' else ' '}{element.text or ''}"
     for element in root.iter(*_BLOCKS):
         mark = f"{'#' * int(element.tag[1])} " if element.tag[1:].isdigit() else ""
         mark += "+ " * (element.getparent().tag == "summary" or (element.tag == "summary" and not len(element)))
@@ -117,7 +117,7 @@ def check_is_whole(page: str) -> None:
     assert root.get("lang") == "en"
     ids = [element.get("id") for element in root.iter() if isinstance(element.tag, str) and element.get("id")]
     assert len(ids) == len(set(ids))
-    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
+    assert {a[1:] for a in root.xpath("//a/@href") if a.startswith("#")} <= set(ids)
     assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
     for tag in re.findall(r"\w+", "table tbody tr td th div p ul li figure math mrow msub msubsup mfrac svg text"):
         assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag
