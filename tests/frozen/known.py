@@ -26,6 +26,7 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.result import Identification
+from rov_fmu.interface.model import Result, VehicleModel, load
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
@@ -39,6 +40,7 @@ from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, VEHI
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "results"
+SAVED = HERE / "saved"
 TANK_TESTS = {path.name: path for path in (HERE / "tank_tests").iterdir()}
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _VARIES = re.compile(
@@ -122,6 +124,10 @@ def _report(result: Callable[[], Identification]) -> str:
     return f"{_said(lambda: print_identification(result()))}\n{page}"
 
 
+def _plots(*runs: Result) -> str:
+    return "\n".join(lines_of("".join(_plot("", lambda figure, run=run: run.plot(figure=figure)) for run in runs)))
+
+
 def _page(vehicle: Vehicle, **how: Any) -> str:
     with _without_plots():
         return _text(documentation_page(vehicle, **how))
@@ -144,17 +150,19 @@ def _printed(command: str, *more: str) -> str:
     return _said(lambda: main([*command.split(), *more]))
 
 
-def _study() -> str:
-    """Return the page and the summary of a study that an earlier version did."""
+def _study(folder: Path) -> str:
+    """Return the page and the summary of a saved study."""
     from rov_fmu.study import Results
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.summary import print_summary
     from rov_fmu.study.run.cluster import Spent
 
-    results = Results(HERE / "studies" / "kinds")
+    results = Results(folder)
     with _without_plots():
         page = _text(study_page(results))
-    return f"{_said(lambda: print_summary(results, Spent(runs=24, elapsed=2.0)))}\n{page}".replace(f"{HERE}/", "")
+    return f"{_said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))}\n{page}".replace(
+        f"{HERE}/", ""
+    )
 
 
 def _in_copy(folder: Path, options: str) -> str:
@@ -185,7 +193,11 @@ RESULTS: dict[str, Callable[[], str]] = {
     "simulate.txt": partial(_printed, "simulate videoray --set u_l=0.3 --set u_r=0.3 --set a_d_u=10 --set z=2"),
     "tune.txt": partial(_printed, "tune bluerov2_heavy --axis heave --command 0.5 --v-ss 0.4 --tau 0.3"),
     "tune_points.txt": partial(_printed, "tune videoray --axis heave --points", str(HERE / "csv" / "points.csv")),
-    "study_kinds.txt": _study,
+    "plots.txt": lambda: _plots(
+        load(VIDEORAY_FILE).simulate([0.0, 1.0, 2.0]),
+        VehicleModel(**vars(a_vehicle(SIX))).simulate([0.0, 1.0, 2.0], {"N_ext": 1.0, "u_a": 0.2}),
+        VehicleModel(**vars(a_vehicle(SIX))).simulate_many([0.0, 1.0], coefficients={"a_d_u": [8.0, 10.0]}),
+    ),
     "page_videoray.txt": partial(_page, load_vehicle(VIDEORAY_FILE)),
     "page_heavy.txt": partial(_page, HEAVY, native=False),
     "page_pair.txt": partial(_page, a_vehicle(VEHICLES["lag without coupling"])),
@@ -199,6 +211,10 @@ RESULTS: dict[str, Callable[[], str]] = {
             _in_copy, path, "inspect {f}" + " --report {f}.html" * (path.name == "dives")
         )
         for path in (HERE / "logs").iterdir()
+    },
+    **{
+        f"study_{path.name}.txt": partial(_study, path)
+        for path in [HERE / "studies" / "kinds", *(HERE / "saved").iterdir()]
     },
     **{
         f"identify_{name}.txt": partial(_in_copy, path, "identify {f} -o {f}.toml --report {f}.html")

@@ -64,7 +64,7 @@ def text_of(page: str) -> str:
     return " ".join(html.fromstring(page).text_content().split())
 
 
-_BLOCKS = [*"h1 h2 h3 h4 p li tr dt dd div pre figure figcaption details summary section header footer".split()]
+_BLOCKS = "h1 h2 h3 h4 p li tr dt dd div pre figure figcaption details summary section header footer"
 """The elements of our pages that begin a line."""
 
 
@@ -82,7 +82,7 @@ def lines_of(page: str) -> list[str]:
         element.tail = "|"
     for element in root.xpath("//td//span | //td[contains(@class, 'off')]"):
         element.text = f"{'! ' if element.tag == 'td' else ' '}{element.text or ''}"
-    for element in root.iter(*_BLOCKS):
+    for element in root.iter(*_BLOCKS.split()):
         mark = f"{'#' * int(element.tag[1])} " if element.tag[1:].isdigit() else ""
         mark += "+ " * (element.getparent().tag == "summary" or (element.tag == "summary" and not len(element)))
         element.text, element.tail = f"\n{mark}{(element.text or '').lstrip()}", f"\n{element.tail or ''}"
