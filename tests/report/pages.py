@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from lxml import html
 
-from rov_fmu.fmu.variables import Variable
-from rov_fmu.report.templates import number, pretty_unit
 from tests.report.conftest import Visit
 from tests.report.fly.boxes import problems
 
@@ -101,13 +99,6 @@ def unfolded(page: str) -> str:
 def rows(page: str) -> list[list[str]]:
     """Return the text of the cells of all rows of all tables."""
     return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
-
-
-def row_of(v: Variable) -> list[str]:
-    """Return the cells of a variable in the table of variables."""
-    unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
-    limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
-    return [v.name, v.description, v.causality, v.variability, unit, *limits]
 
 
 def check_is_whole(page: str) -> None:

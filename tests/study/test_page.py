@@ -1,6 +1,6 @@
 """The page about a study shows what is in its data frames."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -17,10 +17,6 @@ from tests.frozen.known import SAVED
 from tests.report.conftest import Visit
 from tests.report.fly.boxes import SCREENS
 from tests.report.pages import check_fits_and_is_accessible
-
-
-def numbers_of(cells: Iterable[str]) -> list[float]:
-    return [float(cell.replace("−", "-")) for cell in cells]
 
 
 def made(folder: Path, fmu: Path, scheduler: str, plan: str, code: int = 0) -> Path:
