@@ -32,11 +32,21 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.bridges.test_sdf import IN_GAZEBO, LOADED
+from tests.bridges.test_sdf import IN_GAZEBO, LOADED, with_cross
 from tests.commands import without_progress
 from tests.report.pages import check_is_whole, lines_of
 from tests.report.results import bare, compared_with, doubtful, example
-from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, pulsed
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    OUTSIDE,
+    SIX,
+    THRUST_EFFECTS,
+    VEHICLES,
+    VIDEORAY,
+    a_vehicle,
+    pulsed,
+)
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "results"
@@ -189,6 +199,7 @@ RESULTS: dict[str, Callable[[], str]] = {
     "six_axes.fmi3.xml": partial(_described, OUTSIDE, 3),
     **{f"{name}.sdf": partial(_in_gazebo, *of) for name, of in IN_GAZEBO.items()},
     **{f"{name}.urdf": partial(_in_ros, LOADED[name]) for name in ("everything", "bluerov2_heavy", "remus100")},
+    "cross_drag.urdf": partial(_in_ros, with_cross(LOADED["bluerov2"], b_d_uw=0.3)),
     "tables.txt": partial(_printed, "tables videoray"),
     "simulate.txt": partial(_printed, "simulate videoray --set u_l=0.3 --set u_r=0.3 --set a_d_u=10 --set z=2"),
     "tune.txt": partial(_printed, "tune bluerov2_heavy --axis heave --command 0.5 --v-ss 0.4 --tau 0.3"),
