@@ -447,10 +447,9 @@ _LOST = ("killed", "survived")
 @click.option(
     "--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, help="Tests at once (default: processors)."
 )
-@click.option("--keep", is_flag=True, help="Write the sample to verification/mutants.csv, and run nothing.")
 @click.option("--kept", "is_kept", is_flag=True, help="Run the kept mutants that have no verdict yet.")
 @click.option("--results", type=click.Path(path_type=Path), default=KEPT, help="Where --kept writes its verdicts.")
-def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, results: Path) -> None:
+def main(sample: int, seed: int | None, jobs: int, is_kept: bool, results: Path) -> None:
     """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants.
 
     With --kept, exit with 1 when a mutant survives that was killed before.
@@ -462,9 +461,6 @@ def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, re
     seed = 100 * year + week if seed is None else seed
     click.echo(f"{sample} mutants with seed {seed}")
     rows = sorted(map(kept, islice(draw(seed), sample)), key=lambda row: (row["file"], int(row["line"])))
-    if keep:
-        _write_rows(KEPT, rows)
-        return
     run(rows, jobs)
     left = [row for row in rows if row["verdict"] == "survived"]
     for row in left:

@@ -26,7 +26,8 @@ from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.identify.result import Identification
-from rov_fmu.interface.model import Result, VehicleModel, load
+from rov_fmu.interface.model import VehicleModel, load
+from rov_fmu.interface.result import Result
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
@@ -79,7 +80,7 @@ def _in_ros(vehicle: Vehicle) -> str:
 # ---- Pages -----------------------------------------------------------------------------------------------------------
 
 
-def _plot(label: str, draw: Callable[[Figure], None], *_: Any, **__: Any) -> Markup:
+def _plot(label: str, draw: Callable[[Figure], object], *_: Any, **__: Any) -> Markup:
     """Return what a plot shows, in words, because rendering takes most of the time."""
     draw(figure := Figure())
     lines = [label]
@@ -135,7 +136,7 @@ def _report(result: Callable[[], Identification]) -> str:
 
 
 def _plots(*runs: Result) -> str:
-    return "\n".join(lines_of("".join(_plot("", lambda figure, run=run: run.plot(figure=figure)) for run in runs)))
+    return "\n".join(line for run in runs for line in lines_of(_plot("", partial(run.plot, None))))
 
 
 def _page(vehicle: Vehicle, **how: Any) -> str:
