@@ -1,6 +1,6 @@
 """What a wheel has compiled is used for the sources that it was compiled from, and for no others."""
 
-import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -11,6 +11,8 @@ from rov_fmu.c.compile import BuildError, compile_engine, host_platform
 from rov_fmu.fmu import content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE
+from tests.conftest import without_page
 
 HOST = host_platform(fmi=3) or ""
 
@@ -35,6 +37,12 @@ def no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(content, "compile_module", missing)
 
 
+@pytest.fixture(name="without_page")
+def _without_page() -> Iterator[None]:
+    with without_page():
+        yield
+
+
 @pytest.mark.usefixtures("no_compiler")
 def test_an_engine_is_taken_for_its_sources_alone(folder: Path) -> None:
     rov, other = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["bluerov2"])
@@ -54,12 +62,10 @@ def test_the_module_of_a_page_is_taken_for_its_sources_alone(folder: Path) -> No
         content.web_module(other)
 
 
-def test_binaries_are_taken_for_their_guid_alone(
-    folder: Path, videoray_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rov = load_vehicle(VIDEORAY)
-    shutil.copy(videoray_fmu, folder / "videoray.fmu")
-    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: b"")
+@pytest.mark.usefixtures("without_page")
+def test_binaries_are_taken_for_their_guid_alone(folder: Path, tmp_path: Path) -> None:
+    rov = load_vehicle(BARE)
+    build(rov, folder / "bare.fmu", platforms="host")
     same = build(rov, tmp_path / "same.fmu", platforms="host")
     assert not same.seconds
     assert same.was_run

@@ -30,6 +30,7 @@ from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.plots.geometry import scenes
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -139,6 +140,13 @@ def _plots(*runs: Result) -> str:
     return "\n".join(line for run in runs for line in lines_of(_plot("", partial(run.plot, None))))
 
 
+def _drawn(*vehicles: Vehicle) -> str:
+    """Return where the labels of the thrusters stand in the drawings of some vehicles."""
+    views = ((rov.name, view, scene.labels) for rov in vehicles for view, scene in scenes(rov).items())
+    rows = ((name, view, *label) for name, view, labels in views for label in labels)
+    return "\n".join(f"{name} {view}: {words} at {x:.4f}, {y:.4f}" for name, view, words, (x, y), _ in rows)
+
+
 def _page(vehicle: Vehicle, **how: Any) -> str:
     with _without_plots():
         return _text(documentation_page(vehicle, **how))
@@ -210,6 +218,7 @@ RESULTS: dict[str, Callable[[], str]] = {
         VehicleModel(**vars(a_vehicle(SIX))).simulate([0.0, 1.0, 2.0], {"N_ext": 1.0, "u_a": 0.2}),
         VehicleModel(**vars(a_vehicle(SIX))).simulate_many([0.0, 1.0], coefficients={"a_d_u": [8.0, 10.0]}),
     ),
+    "drawings.txt": partial(_drawn, VIDEORAY, HEAVY, SIX),
     "page_videoray.txt": partial(_page, load_vehicle(VIDEORAY_FILE)),
     "page_heavy.txt": partial(_page, HEAVY, native=False),
     "page_pair.txt": partial(_page, a_vehicle(VEHICLES["lag without coupling"])),
