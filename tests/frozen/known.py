@@ -52,8 +52,9 @@ from tests.vehicles import (
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "results"
-SAVED = HERE / "saved"
-TANK_TESTS = {path.name: path for path in (HERE / "tank_tests").iterdir()}
+LOGS = HERE / "logs"
+STUDIES = (HERE / "studies" / "kinds", *(HERE / "saved").iterdir())
+_IDENTIFY = "identify {f} -o {f}.toml --report {f}.html"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 _VARIES = re.compile(
     r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?'
@@ -179,9 +180,8 @@ def _study(folder: Path) -> str:
     results = Results(folder)
     with _without_plots():
         page = _text(study_page(results))
-    return f"{_said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))}\n{page}".replace(
-        f"{HERE}/", ""
-    )
+    summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
+    return f"{summary}\n{page}".replace(f"{HERE}/", "")
 
 
 def _in_copy(folder: Path, options: str) -> str:
@@ -227,20 +227,10 @@ RESULTS: dict[str, Callable[[], str]] = {
     "report_of_little.txt": partial(_report, bare),
     "report_of_doubts.txt": partial(_report, doubtful),
     "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
-    **{
-        f"inspect_{path.name}.txt": partial(
-            _in_copy, path, "inspect {f}" + " --report {f}.html" * (path.name == "dives")
-        )
-        for path in (HERE / "logs").iterdir()
-    },
-    **{
-        f"study_{path.name}.txt": partial(_study, path)
-        for path in [HERE / "studies" / "kinds", *(HERE / "saved").iterdir()]
-    },
-    **{
-        f"identify_{name}.txt": partial(_in_copy, path, "identify {f} -o {f}.toml --report {f}.html")
-        for name, path in TANK_TESTS.items()
-    },
+    **{f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}") for path in LOGS.iterdir()},
+    "inspection_page.txt": partial(_in_copy, LOGS / "dives", "inspect {f} --report {f}.html"),
+    **{f"study_{path.name}.txt": partial(_study, path) for path in STUDIES},
+    **{f"identify_{path.name}.txt": partial(_in_copy, path, _IDENTIFY) for path in (HERE / "tank_tests").iterdir()},
 }
 """A function that makes each result anew, by the name of its file."""
 LONG = {f"identify_{name}.txt" for name in ("harbour", "otter", "videoray_refit")}

@@ -13,7 +13,6 @@ from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.results import statistics
 from tests.folders import beside
-from tests.frozen.known import SAVED
 from tests.report.conftest import Visit
 from tests.report.fly.boxes import SCREENS
 from tests.report.pages import check_fits_and_is_accessible
@@ -27,7 +26,7 @@ def made(folder: Path, fmu: Path, scheduler: str, plan: str, code: int = 0) -> P
     return folder / "results"
 
 
-SOBOL = SAVED / "sobol"
+SOBOL = Path(__file__).parents[1] / "frozen" / "saved" / "sobol"
 """A study of which some runs failed, and the others lack a figure."""
 
 
