@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.study import study
+from rov_fmu.study import Results, study
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.model import Variable
 from rov_fmu.study.plan.plan import Plan
@@ -17,7 +18,7 @@ from rov_fmu.study.plan.sampling import Design
 from rov_fmu.vehicle.schema import Estimated
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import FROZEN_REFIT
+from tests.commands import FROZEN_REFIT, without_progress
 from tests.folders import beside
 
 REFITTED = load_vehicle(FROZEN_REFIT)
@@ -129,19 +130,14 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
 # ---- Done ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.long
-def test_sobol_indices_are_those_of_groups_in_closed_form(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
-    """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
-
-    If a_d_u and b_d_u were independent, they would have 0.60 of it.
-    """
-    write_vehicle(MADE, tmp_path / "made.toml")
-    plan = tmp_path / "plan.toml"
-    plan.write_text(f"""fmu = "{beside(videoray_fmu, tmp_path)}"
+def planned(folder: Path, fmu: Path, runs: int) -> Path:
+    """Write the plan of a study beside the vehicle file from which it varies."""
+    write_vehicle(MADE, folder / "made.toml")
+    (folder / "plan.toml").write_text(f"""fmu = "{beside(fmu, folder)}"
 vary_from = "made.toml"
 stop_time = 0.1
 step = 0.1
-runs = 2560
+runs = {runs}
 sampler = "saltelli"
 [vary]
 m_rov.normal = {{ mean = 6.572, sd = 0.05 }}
@@ -149,7 +145,30 @@ m_rov.normal = {{ mean = 6.572, sd = 0.05 }}
 mixed = "a_d_u + 2*b_d_u + a_d_w + 4*m_rov"
 same = "0*a_d_u"
 """)
-    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    return folder / "plan.toml"
+
+
+def test_the_command_tells_the_warnings_and_the_results_keep_the_estimates(
+    videoray_fmu: Path, tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = str(planned(tmp_path, videoray_fmu, 10))
+    assert main(["study", plan, "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
+    results = Results(tmp_path / "results")
+    assert results.warnings
+    lines = without_progress(capsys.readouterr().err).splitlines()
+    assert lines == [f"rov-fmu: warning: {warning}" for warning in results.warnings]
+    assert results.plan["vary_from"]["estimates"] == {
+        name: {"value": value, "error": error} for name, (value, error, _) in ROWS.items()
+    }
+
+
+@pytest.mark.long
+def test_sobol_indices_are_those_of_groups_in_closed_form(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
+    """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
+
+    If a_d_u and b_d_u were independent, they would have 0.60 of it.
+    """
+    results = study(planned(tmp_path, videoray_fmu, 2560), tmp_path / "results", scheduler=scheduler)
     assert results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])
