@@ -1,6 +1,5 @@
 """What a wheel has compiled is used for the sources that it was compiled from, and for no others."""
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -37,12 +36,6 @@ def no_compiler(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(content, "compile_module", missing)
 
 
-@pytest.fixture(name="without_page")
-def _without_page() -> Iterator[None]:
-    with without_page():
-        yield
-
-
 @pytest.mark.usefixtures("no_compiler")
 def test_an_engine_is_taken_for_its_sources_alone(folder: Path) -> None:
     rov, other = load_vehicle(VIDEORAY), load_vehicle(SHIPPED["bluerov2"])
@@ -62,13 +55,13 @@ def test_the_module_of_a_page_is_taken_for_its_sources_alone(folder: Path) -> No
         content.web_module(other)
 
 
-@pytest.mark.usefixtures("without_page")
 def test_binaries_are_taken_for_their_guid_alone(folder: Path, tmp_path: Path) -> None:
     rov = load_vehicle(BARE)
-    build(rov, folder / "bare.fmu", platforms="host")
-    same = build(rov, tmp_path / "same.fmu", platforms="host")
+    with without_page():
+        build(rov, folder / "bare.fmu", platforms="host")
+        same = build(rov, tmp_path / "same.fmu", platforms="host")
+        changed = build(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
     assert not same.seconds
     assert same.was_run
-    changed = build(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
     assert changed.seconds.keys() == changed.binaries.keys()
     assert changed.guid != same.guid
