@@ -30,6 +30,7 @@ from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import scenes
 from rov_fmu.report.report import report_page
 from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
@@ -142,10 +143,14 @@ def _plots(*runs: Result) -> str:
 
 
 def _drawn(*vehicles: Vehicle) -> str:
-    """Return where the labels of the thrusters stand in the drawings of some vehicles."""
-    views = ((rov.name, view, scene.labels) for rov in vehicles for view, scene in scenes(rov).items())
-    rows = ((name, view, *label) for name, view, labels in views for label in labels)
-    return "\n".join(f"{name} {view}: {words} at {x:.4f}, {y:.4f}" for name, view, words, (x, y), _ in rows)
+    """Return where the texts and the ends of the arrows stand in the drawings of the thrusters of some vehicles."""
+    lines = []
+    for rov, (view, scene) in ((one, view) for one in vehicles for view in scenes(one).items()):
+        draw_thrusters(ax := Figure(figsize=scene.inches).subplots(), rov, scene)
+        for text in ax.texts:
+            places = (*text.get_position(), *getattr(text, "xy", ()))
+            lines.append(f"{rov.name} {view}: {text.get_text()} at {', '.join(f'{x:.4f}' for x in places)}")
+    return "\n".join(lines)
 
 
 def _page(vehicle: Vehicle, **how: Any) -> str:
