@@ -83,7 +83,7 @@ TESTS = {
     "rov_fmu/identify/likelihood/*": "identify/likelihood docs/test_identify_pages.py identify",
     "rov_fmu/identify/given.py": "tank/test_description_mistakes.py tank/test_description.py identify",
     "rov_fmu/identify/beginning.py": "tank/test_description_mistakes.py tank/test_tank_tests.py tank identify",
-    "rov_fmu/identify/findings.py": "identify/test_findings.py report/test_report.py report/test_console.py identify",
+    "rov_fmu/identify/findings.py": "identify/test_findings.py frozen/test_known_results.py identify",
     "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
     "rov_fmu/fmu/card.py": "frozen/test_known_results.py fmu/results/test_card.py report/test_card.py fmu",
     "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
@@ -95,20 +95,21 @@ TESTS = {
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
-    "rov_fmu/tank/*": "tank interface/test_inspect_command.py identify/test_wrench.py identify/test_identify.py",
+    "rov_fmu/tank/*": "tank frozen/test_known_results.py interface/test_inspect_command.py "
+    "identify/test_wrench.py identify/test_identify.py",
     "rov_fmu/report/plots/proof.py": "prove",
-    "rov_fmu/report/plots/*": "report/plots report/test_pictures.py report",
+    "rov_fmu/report/plots/*": "frozen/test_known_results.py report/plots report/test_pictures.py report",
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
     "rov_fmu/report/page/recording.py": "tank/test_several_files.py report/fly",
-    "rov_fmu/report/page/*": "report/test_equations.py report/test_fmu_page.py report",
+    "rov_fmu/report/page/*": "frozen/test_known_results.py report/test_equations.py report/test_fmu_page.py report",
     "rov_fmu/report/proof_page.py": "prove",
-    "rov_fmu/report/console_log.py": "interface/test_inspect_command.py",
-    "rov_fmu/report/console_results.py": "report/test_report.py identify/test_tuning.py",
+    "rov_fmu/report/console_log.py": "frozen/test_known_results.py interface/test_inspect_command.py",
+    "rov_fmu/report/console_results.py": "frozen/test_known_results.py identify/test_tuning.py",
     "rov_fmu/report/console.py": "report/test_console.py cli/test_prove.py fmu/results/test_evidence.py",
     "rov_fmu/report/progress.py": "report/test_console.py cli/test_terminal.py",
-    "rov_fmu/report/*": "report/test_report.py report",
+    "rov_fmu/report/*": "frozen/test_known_results.py report/test_report.py report",
     "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
-    "rov_fmu/study/*": "study/test_study.py study/test_page.py study/test_figures.py study",
+    "rov_fmu/study/*": "frozen/test_known_results.py study/test_study.py study/test_figures.py study",
     "rov_fmu/interface/sitl_command.py": "bridges/test_sitl.py cli/test_targets.py",
     "rov_fmu/interface/export_command.py": "interface/test_export_command.py bridges",
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
@@ -446,10 +447,9 @@ _LOST = ("killed", "survived")
 @click.option(
     "--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, help="Tests at once (default: processors)."
 )
-@click.option("--keep", is_flag=True, help="Write the sample to verification/mutants.csv, and run nothing.")
 @click.option("--kept", "is_kept", is_flag=True, help="Run the kept mutants that have no verdict yet.")
 @click.option("--results", type=click.Path(path_type=Path), default=KEPT, help="Where --kept writes its verdicts.")
-def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, results: Path) -> None:
+def main(sample: int, seed: int | None, jobs: int, is_kept: bool, results: Path) -> None:
     """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants.
 
     With --kept, exit with 1 when a mutant survives that was killed before.
@@ -461,9 +461,6 @@ def main(sample: int, seed: int | None, jobs: int, keep: bool, is_kept: bool, re
     seed = 100 * year + week if seed is None else seed
     click.echo(f"{sample} mutants with seed {seed}")
     rows = sorted(map(kept, islice(draw(seed), sample)), key=lambda row: (row["file"], int(row["line"])))
-    if keep:
-        _write_rows(KEPT, rows)
-        return
     run(rows, jobs)
     left = [row for row in rows if row["verdict"] == "survived"]
     for row in left:

@@ -11,8 +11,9 @@ from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from tempfile import mkdtemp
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
@@ -20,7 +21,8 @@ from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.gym import RovVectorEnv
-from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.bridges.mujoco import load, mujoco_files
+from rov_fmu.bridges.mujoco_plugin import show
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.interface.model import VehicleModel
@@ -512,6 +514,19 @@ def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path) -> None
     picture = (tmp_path / "rov.png").read_bytes()
     assert picture.startswith(b"\x89PNG\r\n\x1a\n")
     assert int.from_bytes(picture[16:20]) == 1280
+
+
+def test_a_window_shows_steps_until_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    viewer = MagicMock()
+    viewer.is_running.side_effect = [True, True, False]
+    window = SimpleNamespace(launch_passive=lambda *_: viewer)
+    monkeypatch.setitem(sys.modules, "mujoco.viewer", window)
+    monkeypatch.setattr(mujoco, "viewer", window, raising=False)
+    monkeypatch.setenv("DISPLAY", ":0")
+    rov = load(rov_fmu.load(BARE))
+    show(rov)
+    assert rov.data.time == pytest.approx(2.0 * rov.model.opt.timestep)
+    assert viewer.sync.call_count == 2
 
 
 @pytest.fixture(scope="module")

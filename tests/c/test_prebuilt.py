@@ -1,6 +1,5 @@
 """What a wheel has compiled is used for the sources that it was compiled from, and for no others."""
 
-import shutil
 from pathlib import Path
 
 import pytest
@@ -11,6 +10,8 @@ from rov_fmu.c.compile import BuildError, compile_engine, host_platform
 from rov_fmu.fmu import content
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import BARE
+from tests.conftest import without_page
 
 HOST = host_platform(fmi=3) or ""
 
@@ -54,15 +55,13 @@ def test_the_module_of_a_page_is_taken_for_its_sources_alone(folder: Path) -> No
         content.web_module(other)
 
 
-def test_binaries_are_taken_for_their_guid_alone(
-    folder: Path, videoray_fmu: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    rov = load_vehicle(VIDEORAY)
-    shutil.copy(videoray_fmu, folder / "videoray.fmu")
-    monkeypatch.setattr("rov_fmu.build.web_module", lambda _: b"")
-    same = build(rov, tmp_path / "same.fmu", platforms="host")
+def test_binaries_are_taken_for_their_guid_alone(folder: Path, tmp_path: Path) -> None:
+    rov = load_vehicle(BARE)
+    with without_page():
+        build(rov, folder / "bare.fmu", platforms="host")
+        same = build(rov, tmp_path / "same.fmu", platforms="host")
+        changed = build(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
     assert not same.seconds
     assert same.was_run
-    changed = build(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
     assert changed.seconds.keys() == changed.binaries.keys()
     assert changed.guid != same.guid

@@ -33,19 +33,6 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def test_the_values_at_the_end_are_printed(capsys: Capsys) -> None:
-    assert main(["simulate", "--set", "u_l=0.3", "--set", "u_r = 0.3", "--set", "a_d_u=10", "--set", "z=2"]) == 0
-    out, err = capsys.readouterr()
-    assert err == ""
-    expected = rov_fmu.load("videoray").with_(a_d_u=10).simulate([0, 10], {"u_l": 0.3, "u_r": 0.3}, start={"z": 2})
-    lines = [line.split() for line in out.splitlines()]
-    assert lines[0] == ["VideoRay", "Pro", "4", "after", "10", "s"]
-    assert lines[3:] == [
-        [name, f"{expected[name][-1]:.6g}", expected.units[name]]
-        for name in (*VIDEORAY.layout.state, *VIDEORAY.layout.calculated)
-    ]
-
-
 @pytest.mark.parametrize("name", SHIPPED)
 def test_every_state_and_angle_can_be_set_at_the_start(name: str) -> None:
     """Those of the attitude under the names that the results have; the quaternion as a whole."""

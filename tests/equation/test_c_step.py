@@ -19,7 +19,7 @@ def vehicle(request: pytest.FixtureRequest) -> tuple[Vehicle, Step]:
     return rov, partial(in_fmu, Fmu(request.getfixturevalue(f"{request.param}_dir")))
 
 
-@often("cases", 15, 100, 1000)
+@often("cases", 8, 100, 1000)
 def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Vehicle, Step], cases: int) -> None:
     rov, step = vehicle
     rng = random.Random(cases)

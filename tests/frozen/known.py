@@ -1,29 +1,67 @@
-"""Whole results: what is written for vehicles of every kind, and what commands print, each in a file of results/."""
+"""Whole results: what is written for vehicles of every kind, pages, and what commands print, in files of results/."""
 
 import os
 import re
-from collections.abc import Callable
-from contextlib import redirect_stdout
+import shutil
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from datetime import date
 from difflib import unified_diff
 from functools import partial
 from io import StringIO
 from math import isclose
 from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
 from unittest.mock import patch
+
+import numpy as np
+from markupsafe import Markup
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
+from rov_fmu.identify.result import Identification
+from rov_fmu.interface.model import VehicleModel, load
+from rov_fmu.interface.result import Result
+from rov_fmu.report.console_results import print_identification
+from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.plots.drawing import draw_thrusters
+from rov_fmu.report.plots.geometry import scenes
+from rov_fmu.report.report import report_page
+from rov_fmu.vehicle.shipped import VIDEORAY as VIDEORAY_FILE
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.bridges.test_sdf import IN_GAZEBO, LOADED
-from tests.vehicles import EVERYTHING, OUTSIDE, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, pulsed
+from tests.bridges.test_sdf import IN_GAZEBO, LOADED, with_cross
+from tests.commands import without_progress
+from tests.report.pages import check_is_whole, lines_of
+from tests.report.results import bare, compared_with, doubtful, example
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    OUTSIDE,
+    SIX,
+    THRUST_EFFECTS,
+    VEHICLES,
+    VIDEORAY,
+    a_vehicle,
+    pulsed,
+)
 
-FOLDER = Path(__file__).parent / "results"
+HERE = Path(__file__).parent
+FOLDER = HERE / "results"
+LOGS = HERE / "logs"
+STUDIES = (HERE / "studies" / "kinds", *(HERE / "saved").iterdir())
+_IDENTIFY = "identify {f} -o {f}.toml --report {f}.html"
 _NUMBER = re.compile(r"-?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
-_VARIES = re.compile(r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?')
-"""What changes with every version, although nothing else does."""
+_VARIES = re.compile(
+    r'(?<= )(?:guid|instantiationToken|generationTool|generationDateAndTime)="[^"]*" ?'
+    r"|(?<=rov-fmu )\d+\.\d+\.\d+|\b[0-9a-f]{64}\b"
+)
+"""What changes with every version or with a source, although nothing else does."""
 
 
 def _described(vehicle: Vehicle, fmi: int) -> str:
@@ -31,7 +69,7 @@ def _described(vehicle: Vehicle, fmi: int) -> str:
     files = native_content(vehicle, fmi=fmi).files
     parts = [files["modelDescription.xml"], files["terminalsAndIcons/terminalsAndIcons.xml"]]
     text = b"\n".join([*parts, osp_model_description(vehicle.layout)]).decode()
-    return _VARIES.sub("", text).replace("&#10;", "\n")
+    return text.replace("&#10;", "\n")
 
 
 def _in_gazebo(vehicle: Vehicle, explicit: bool) -> str:
@@ -42,14 +80,125 @@ def _in_ros(vehicle: Vehicle) -> str:
     return urdf_model(vehicle).text
 
 
-def _printed(command: str) -> str:
-    """Return what a command prints without colours."""
+# ---- Pages -----------------------------------------------------------------------------------------------------------
+
+
+def _plot(label: str, draw: Callable[[Figure], object], *_: Any, **__: Any) -> Markup:
+    """Return what a plot shows, in words, because rendering takes most of the time."""
+    draw(figure := Figure())
+    lines = [label]
+    for ax in figure.axes:
+        scales = (scale.get_ylabel() for scale in ax.child_axes)
+        lines.append("; ".join([ax.get_title(loc="left"), ax.get_xlabel(), ax.get_ylabel(), *scales]))
+        for line in ax.lines:
+            x, y = (np.asarray(part, float) for part in line.get_data())
+            name = re.sub("^_.*", "line", str(line.get_label()))
+            lines.append(f"{name}: {len(x)} from {_point(x, y, 0)} to {_point(x, y, -1)}, {_ends(y)}")
+        for shape in (*ax.collections, *ax.patches):
+            for x, y in [path.vertices.T for path in _paths(shape)]:
+                lines.append(f"{type(shape).__name__}: {_ends(x)}, {_ends(y)}")
+        lines.append(" ".join(text.get_text() for text in ax.texts))
+    return Markup('<svg aria-label="{}"></svg>').format("\n".join(lines))
+
+
+def _paths(shape: Any) -> list[Any]:
+    """Return the outlines of a shape or a collection of shapes, in the coordinates of the data."""
+    if isinstance(shape, Patch):
+        return [shape.get_patch_transform().transform_path(shape.get_path())]
+    return [*shape.get_paths()]
+
+
+def _point(x: Any, y: Any, place: int) -> str:
+    return f"({x[place]:.4g}, {y[place]:.4g})" if len(x) else "()"
+
+
+def _ends(values: Any) -> str:
+    return f"{np.nanmin(values):.4g} ... {np.nanmax(values):.4g}" if np.isfinite(values).any() else "nothing"
+
+
+@contextmanager
+def _without_plots() -> Iterator[None]:
+    """Replace the plots of pages by what they show, and pictures by nothing."""
+    with ExitStack() as patches:
+        for module in ("report.report", "report.inspection_page", "report.page.fmu_page", "study.results.plots"):
+            patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _plot))
+        patches.enter_context(patch("rov_fmu.report.page.fmu_page.pictures", lambda _: {}))
+        yield
+
+
+def _text(page: str) -> str:
+    check_is_whole(page)
+    return "\n".join(lines_of(page))
+
+
+def _report(result: Callable[[], Identification]) -> str:
+    """Return what the terminal and the report tell of an identification."""
+    with _without_plots():
+        page = _text(report_page(result(), made=date(2026, 11, 23)))
+    return f"{_said(lambda: print_identification(result()))}\n{page}"
+
+
+def _plots(*runs: Result) -> str:
+    return "\n".join(line for run in runs for line in lines_of(_plot("", partial(run.plot, None))))
+
+
+def _drawn(*vehicles: Vehicle) -> str:
+    """Return where the texts and the ends of the arrows stand in the drawings of the thrusters of some vehicles."""
+    lines = []
+    for rov, (view, scene) in ((one, view) for one in vehicles for view in scenes(one).items()):
+        draw_thrusters(ax := Figure(figsize=scene.inches).subplots(), rov, scene)
+        for text in ax.texts:
+            places = (*text.get_position(), *getattr(text, "xy", ()))
+            lines.append(f"{rov.name} {view}: {text.get_text()} at {', '.join(f'{x:.4f}' for x in places)}")
+    return "\n".join(lines)
+
+
+def _page(vehicle: Vehicle, **how: Any) -> str:
+    with _without_plots():
+        return _text(documentation_page(vehicle, **how))
+
+
+# ---- Commands --------------------------------------------------------------------------------------------------------
+
+
+def _said(run: Callable[[], object]) -> str:
+    """Return what is printed without colours."""
     said = StringIO()
-    with redirect_stdout(said), patch.dict(os.environ):
+    with redirect_stdout(said), redirect_stderr(said), patch.dict(os.environ, SOURCE_DATE_EPOCH="0"):
         for name in ("FORCE_COLOR", "TTY_COMPATIBLE"):
             os.environ.pop(name, None)
-        assert main(command.split()) == 0
-    return said.getvalue()
+        run()
+    return without_progress(said.getvalue())
+
+
+def _printed(command: str, *more: str) -> str:
+    return _said(lambda: main([*command.split(), *more]))
+
+
+def _study(folder: Path) -> str:
+    """Return the page and the summary of a saved study."""
+    from rov_fmu.study import Results
+    from rov_fmu.study.results.page import study_page
+    from rov_fmu.study.results.summary import print_summary
+    from rov_fmu.study.run.cluster import Spent
+
+    results = Results(folder)
+    with _without_plots():
+        page = _text(study_page(results))
+    summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
+    return f"{summary}\n{page}".replace(f"{HERE}/", "")
+
+
+def _in_copy(folder: Path, options: str) -> str:
+    """Return what a command prints about a copy of a folder, and what it writes beside it."""
+    with TemporaryDirectory() as temporary, _without_plots():
+        place = Path(temporary)
+        shutil.copytree(folder, place / folder.name)
+        said = _said(lambda: main([part.format(f=place / folder.name) for part in options.split()]))
+        written = (path.read_text(encoding="utf-8") for path in sorted(place.glob("*.*")))
+        parts = [said, *(_text(text.partition("\n")[2]) if text.startswith("<!") else text for text in written)]
+        parts += [_text(documentation_page(load_vehicle(path))) for path in place.glob("*.toml")]
+    return "\n".join(parts).replace(f"{temporary}/", "")
 
 
 _VEHICLES = {
@@ -64,23 +213,61 @@ RESULTS: dict[str, Callable[[], str]] = {
     "six_axes.fmi3.xml": partial(_described, OUTSIDE, 3),
     **{f"{name}.sdf": partial(_in_gazebo, *of) for name, of in IN_GAZEBO.items()},
     **{f"{name}.urdf": partial(_in_ros, LOADED[name]) for name in ("everything", "bluerov2_heavy", "remus100")},
+    "cross_drag.urdf": partial(_in_ros, with_cross(LOADED["bluerov2"], b_d_uw=0.3)),
     "tables.txt": partial(_printed, "tables videoray"),
     "simulate.txt": partial(_printed, "simulate videoray --set u_l=0.3 --set u_r=0.3 --set a_d_u=10 --set z=2"),
+    "tune.txt": partial(_printed, "tune bluerov2_heavy --axis heave --command 0.5 --v-ss 0.4 --tau 0.3"),
+    "tune_points.txt": partial(_printed, "tune videoray --axis heave --points", str(HERE / "csv" / "points.csv")),
+    "plots.txt": lambda: _plots(
+        load(VIDEORAY_FILE).simulate([0.0, 1.0, 2.0]),
+        VehicleModel(**vars(a_vehicle(SIX))).simulate([0.0, 1.0, 2.0], {"N_ext": 1.0, "u_a": 0.2}),
+        VehicleModel(**vars(a_vehicle(SIX))).simulate_many([0.0, 1.0], coefficients={"a_d_u": [8.0, 10.0]}),
+    ),
+    "drawings.txt": partial(_drawn, VIDEORAY, HEAVY, SIX),
+    "page_videoray.txt": partial(_page, load_vehicle(VIDEORAY_FILE)),
+    "page_heavy.txt": partial(_page, HEAVY, native=False),
+    "page_pair.txt": partial(_page, a_vehicle(VEHICLES["lag without coupling"])),
+    "page_six_axes.txt": partial(_page, a_vehicle(SIX), fmi=3),
+    "report.txt": partial(_report, example),
+    "report_of_little.txt": partial(_report, bare),
+    "report_of_doubts.txt": partial(_report, doubtful),
+    "report_compared.txt": partial(_report, lambda: compared_with(load_vehicle(VIDEORAY_FILE))),
+    **{f"inspect_{path.name}.txt": partial(_in_copy, path, "inspect {f}") for path in LOGS.iterdir()},
+    "inspection_page.txt": partial(_in_copy, LOGS / "dives", "inspect {f} --report {f}.html"),
+    **{f"study_{path.name}.txt": partial(_study, path) for path in STUDIES},
+    **{f"identify_{path.name}.txt": partial(_in_copy, path, _IDENTIFY) for path in (HERE / "tank_tests").iterdir()},
 }
 """A function that makes each result anew, by the name of its file."""
+LONG = {f"identify_{name}.txt" for name in ("harbour", "otter", "videoray_refit")}
+"""Those that take more than a few seconds."""
 
 
-def difference(name: str) -> list[str]:
+def now(name: str) -> str:
+    """Return a result of today without what varies."""
+    return _VARIES.sub("", RESULTS[name]())
+
+
+def difference(name: str, made: str) -> list[str]:
     """Return the lines in which a result differs from the one that is kept. Numbers may differ by rounding."""
-    path, now = FOLDER / name, RESULTS[name]().splitlines()
+    path, lines = FOLDER / name, made.splitlines()
     kept = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
-    as_kept = [old if _same(old, new) else new for old, new in zip(kept, now, strict=False)] + now[len(kept) :]
+    by = _one_of_last_digit if name.startswith("identify") else _rounding
+    as_kept = [old if _same(old, new, by) else new for old, new in zip(kept, lines, strict=False)] + lines[len(kept) :]
     return [*unified_diff(kept, as_kept, "kept", "now", n=1, lineterm="")]
 
 
-def _same(old: str, new: str) -> bool:
-    """Return True if two lines have the same words, and numbers that differ by rounding."""
+def _same(old: str, new: str, is_close: Callable[[str, str], bool]) -> bool:
+    """Return True if two lines have the same words, and numbers that are close."""
     if _NUMBER.sub("0", old) != _NUMBER.sub("0", new):
         return False
-    pairs = zip(_NUMBER.findall(old), _NUMBER.findall(new), strict=True)
-    return all(isclose(float(a), float(b), rel_tol=1e-9, abs_tol=1e-12) for a, b in pairs)
+    return all(map(is_close, _NUMBER.findall(old), _NUMBER.findall(new)))
+
+
+def _rounding(old: str, new: str) -> bool:
+    return isclose(float(old), float(new), rel_tol=1e-9, abs_tol=1e-12)
+
+
+def _one_of_last_digit(old: str, new: str) -> bool:
+    """Return True for numbers of a fit that another processor rounds to the next digit."""
+    digits = len(old.partition("e")[0].partition(".")[2])
+    return isclose(float(old), float(new), rel_tol=1e-5, abs_tol=1.01 * 10.0**-digits)

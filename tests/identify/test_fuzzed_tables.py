@@ -79,7 +79,7 @@ def output_or_one_line(arguments: list[str], out: Path, folder: Path, capsys: Ca
     return ""
 
 
-@often("examples", 10, 100, 2000)
+@often("examples", 6, 100, 2000)
 def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_path: Path) -> None:
     folder = tmp_path / "changed"
 

@@ -106,8 +106,12 @@ def test_independent_values_are_those_of_the_whole_correlation() -> None:
     assert apart[21:] == pytest.approx(expected[21:], rel=1e-4)
 
 
-def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective) -> None:
-    """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more."""
+def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more.
+
+    Two steps show that the other parameters are fitted again.
+    """
+    monkeypatch.setattr("rov_fmu.identify.unexplained.disturbances._STEPS", 2)
     z, filter_of = objective.mean, objective.filters[0]
     since: Array = np.where(TIME >= 30.0, 1.0, 0.0)
     slow = {

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import pytest
-from matplotlib.figure import Figure
 
 import rov_fmu
 from rov_fmu.build import build
@@ -88,33 +87,6 @@ def test_a_data_frame_has_a_column_for_each_variable(videoray: VehicleModel, mon
     monkeypatch.setitem(sys.modules, "pandas", None)
     with pytest.raises(ImportError, match=r"^to_dataframe\(\) needs pandas: pip install pandas$"):
         many.to_dataframe()
-
-
-def test_a_plot_has_words_degrees_and_the_commands_and_nothing_that_stays_0(
-    six: VehicleModel, videoray: VehicleModel
-) -> None:
-    command = next(iter(six.layout.commands))
-    result = six.simulate(np.linspace(0.0, 2.0, 5), {"N_ext": 1.0, command: 0.2})
-    drawn = result.plot(figure=Figure())
-    titles = [axes.get_title(loc="left") for axes in drawn.axes]
-    assert {"Rate of turn (°/s)", "Angle (°)", "Thrust (N)", "Commands (%)"} <= {*titles}
-    labels = {line.get_label(): np.asarray(line.get_ydata()) for axes in drawn.axes for line in axes.lines}
-    assert labels["heading (psi)"][-1] == pytest.approx(np.degrees(result["psi"][-1]))
-    assert labels[command].max() == 20.0
-    assert not {*QUATERNION} & {*labels}
-    assert all(map(np.any, labels.values()))
-    forces = {name: np.full(3, value) for name, value in (("F_l", 100.0), ("F_r", 100.4), ("F_t", 101.2))}
-    both = replace(videoray.simulate(TIMES), arrays=forces).plot([*forces], Figure()).axes[0]
-    assert [line.get_linestyle() for line in both.lines] == ["-", "--", "-"], "the second one lies on the first one"
-    assert [axes.get_title(loc="left") for axes in videoray.simulate(TIMES).plot(figure=Figure()).axes] == [
-        "Velocity (m/s)"
-    ]
-    many = six.simulate_many([0.0, 1.0], coefficients={"a_d_u": [8.0, 10.0]}, start={"u": 1.0})
-    panels = many.plot(["u", "x", "u"], Figure()).axes
-    assert [(axes.get_title(loc="left"), len(axes.lines)) for axes in panels] == [
-        ("Velocity (m/s)", 2),
-        ("Position (m)", 2),
-    ]
 
 
 def test_many_vehicles_are_each_like_one(videoray: VehicleModel) -> None:

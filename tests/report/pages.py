@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 from lxml import html
 
-from rov_fmu.fmu.variables import Variable
-from rov_fmu.report.templates import number, pretty_unit
 from tests.report.conftest import Visit
 from tests.report.fly.boxes import problems
 
@@ -64,6 +62,32 @@ def text_of(page: str) -> str:
     return " ".join(html.fromstring(page).text_content().split())
 
 
+_BLOCKS = "h1 h2 h3 h4 p li tr dt dd div pre figure figcaption details summary section header footer"
+"""The elements of our pages that begin a line."""
+
+
+def lines_of(page: str) -> list[str]:
+    """Return the text of a page as it is read: a line for each block and for each row, and the labels of plots.
+
+    A heading begins with # and its level, and with + where what follows is folded; ! marks a cell that stands out.
+    """
+    root = html.fromstring(page)
+    for element in root.xpath("//script | //style | //head | //svg/*"):
+        element.drop_tree()
+    for element in root.iter("svg"):
+        element.text = f"\n[{element.get('aria-label', '')}]\n"
+    for element in root.xpath("//td | //th"):
+        element.tail = "|"
+    for element in root.xpath("//td//span | //td[contains(@class, 'off')]"):
+        element.text = f"{'! ' if element.tag == 'td' else ' '}{element.text or ''}"
+    for element in root.iter(*_BLOCKS.split()):
+        mark = f"{'#' * int(element.tag[1])} " if element.tag[1:].isdigit() else ""
+        mark += "+ " * (element.getparent().tag == "summary" or (element.tag == "summary" and not len(element)))
+        element.text, element.tail = f"\n{mark}{(element.text or '').lstrip()}", f"\n{element.tail or ''}"
+    rows = (" ".join(line.replace("|", " | ").split()) for line in root.text_content().split("\n"))
+    return [line for line in rows if line]
+
+
 def unfolded(page: str) -> str:
     """The text of a page that is not folded, without plots."""
     root = html.fromstring(page)
@@ -77,13 +101,6 @@ def rows(page: str) -> list[list[str]]:
     return [[cell.text_content().strip() for cell in row.iter("th", "td")] for row in html.fromstring(page).iter("tr")]
 
 
-def row_of(v: Variable) -> list[str]:
-    """Return the cells of a variable in the table of variables."""
-    unit = f"{pretty_unit(v.unit)} ({v.display_unit})" if v.display_unit else pretty_unit(v.unit)
-    limits = ["" if value is None else number(value) for value in (v.start, v.minimum, v.maximum)]
-    return [v.name, v.description, v.causality, v.variability, unit, *limits]
-
-
 def check_is_whole(page: str) -> None:
     """Check that every element is closed, and that every reference within the page leads to one element."""
     assert page.startswith("<!DOCTYPE html>")
@@ -91,7 +108,7 @@ def check_is_whole(page: str) -> None:
     assert root.get("lang") == "en"
     ids = [element.get("id") for element in root.iter() if isinstance(element.tag, str) and element.get("id")]
     assert len(ids) == len(set(ids))
-    assert {a.get("href").removeprefix("#") for a in root.iter("a")} <= set(ids)
+    assert {a[1:] for a in root.xpath("//a/@href") if a.startswith("#")} <= set(ids)
     assert set(re.findall(r"url\(#(\w+)\)", page)) | set(re.findall(r'<use [^>]*href="#(\w+)"', page)) <= set(ids)
     for tag in re.findall(r"\w+", "table tbody tr td th div p ul li figure math mrow msub msubsup mfrac svg text"):
         assert len(re.findall(rf"<{tag}[\s>]", page)) == page.count(f"</{tag}>"), tag

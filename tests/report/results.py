@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import cache
 from math import inf, pi
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,6 +27,7 @@ from rov_fmu.identify.result import (
     Point,
     Prediction,
     SensorNoise,
+    Slip,
     Verdict,
 )
 from rov_fmu.tank.catalogue import QUANTITIES
@@ -181,6 +183,31 @@ def without_findings() -> Identification:
 def example() -> Identification:
     """Return the result with all that is to be told about it."""
     return told(without_findings())
+
+
+def bare() -> Identification:
+    """A result of one axis without logs, tables, effects or anything else that a report shows."""
+    result = without_findings()
+    axis = AxisResult(SURGE, GOOD, (), (0.0, 0.7), (), (), (), None)
+    empty: dict[str, Any] = dict.fromkeys(("forces", "effects", "disturbances", "logging", "sensors"), ())
+    folder = replace(result.folder, logs=[])
+    correlation = (), result.correlation[1][:0, :0]
+    return told(replace(result, axes=(axis,), curves={}, folder=folder, correlation=correlation, **empty))
+
+
+def driven_by(names: Sequence[str]) -> Identification:
+    """The example with some of the thrusters of its vehicle."""
+    vehicle = without_findings().vehicle
+    layout = vehicle.layout
+    kept = replace(layout, thrusters=tuple(t for t in layout.thrusters if t.name in names))
+    return told(replace(without_findings(), vehicle=vehicle.with_(kept)))
+
+
+def doubtful() -> Identification:
+    """The example with one rear thruster, an assumed thrust and a depth in cm in one of its logs."""
+    curves = {"top": (Coefficient("a_t_top", 6.0, (5.0, 7.0), "N", "6.0 ± 1.0 N", 0.5),)}
+    slips = (Slip(FILES[1], "depth", "is it in cm", 20.0),)
+    return told(replace(driven_by(["l", "t"]), slips=slips, forces=(), curves=curves))
 
 
 def compared_with(other: Vehicle) -> Identification:

@@ -14,33 +14,9 @@ from rov_fmu.report.templates import sentence
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.pages import text_of, unfolded
-from tests.report.results import example
 
 MOST_WORDS = 1200
 """The most words of the FMU's page that are not folded."""
-
-
-def test_the_card_of_an_identified_vehicle_has_its_data_ranges_verdicts_and_errors() -> None:
-    vehicle = example().vehicle
-    made = vehicle.provenance
-    assert made
-    made = made.model_copy(update={"inputs": {"log_1.csv": "1" * 64}})
-    found = card(replace(vehicle, provenance=made, limits=("It leaks.",)))
-    assert [*found] == ["What it is", "From which data", "Where it holds", "How far to trust it", "What it leaves out"]
-    assert found["What it is"] == ["Tadpole, version 1. A small ROV that exists only in tests."]
-    assert found["From which data"][-1] == "The vehicle file has the SHA-256 of log_1.csv."
-    assert found["Where it holds"][0] == "Commands of 20% to 70%; beyond them the thrust curves extrapolate."
-    assert "Tested: depth: -1.0 to 1.0 m." in found["Where it holds"]
-    trust = found["How far to trust it"]
-    assert trust[:3] == [*made.verdicts]
-    assert trust[3:6] == [f"Unseen data: {error}." for error in made.errors]
-    assert trust[6:] == [f"Open: {warning}." for warning in made.warnings]
-    assert found["What it leaves out"][-1] == "It leaks."
-    assert "Sway, pitch, roll. The vehicle does not drift outward in a turn." in found["What it leaves out"]
-
-
-def test_the_card_of_a_vehicle_by_hand_claims_no_errors(vehicle: Vehicle) -> None:
-    assert card(vehicle)["How far to trust it"] == ["Its publication reports no check on unseen data."]
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,6 @@ from time import sleep
 import pytest
 from rich.progress import Progress, TextColumn
 
-from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
 from rov_fmu.prove.check import MetaData
@@ -19,10 +17,8 @@ from rov_fmu.prove.claims import CLAIMS, Proof
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_claims, print_end, print_table, table
-from rov_fmu.report.console_results import print_tuning
 from rov_fmu.report.progress import Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
-from tests.vehicles import HEAVY, VIDEORAY
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -100,26 +96,6 @@ def test_numbers_and_words_are_written_for_readers() -> None:
     assert sentence("log_1.csv: it lacks") == "log_1.csv: it lacks"
     assert [*map(pretty_unit, ("N.m.s2/rad2", "1", "us", "deg/s"))] == ["N·m·s²/rad²", "1", "µs", "°/s"]
     assert [in_words("time to 63 %", "s"), in_words("force", "1")] == ["Time to 63 % (s)", "Force"]
-
-
-def test_a_tuning_is_printed_with_its_deviations_its_commands_and_the_lag(capsys: pytest.CaptureFixture[str]) -> None:
-    wanted = ("V_ss", 0.5, 0.4), ("V_ss", 0.7, 0.6), ("Tau", 0.5, 0.3)
-    print_tuning(tune(HEAVY, HEAVE, [Target(*of) for of in wanted]))
-    out = capsys.readouterr().out
-    rows = re.findall(r"^(\d+)% +(\w+) +([\d.]+) +([\d.]+) +([-+][\d.]+)%$", out, re.M)
-    assert [(quantity, int(command) / 100.0, float(value)) for command, quantity, value, *_ in rows] == [*wanted]
-    for *_, value, model, deviation in rows:
-        assert float(deviation) == pytest.approx(100.0 * (float(model) / float(value) - 1.0), abs=0.1)
-    assert re.findall(r"^(\w+) = [\d.]+   95 %: [\d.]+ \.\.\. [\d.]+$", out, re.M) == ["alpha_w", "beta_w"]
-    print_tuning(tune(VIDEORAY, HEAVE, [Target(*wanted[0])]))
-    alone = capsys.readouterr().out
-    assert re.findall(r"^(\w+) = [\d.]+$", alone, re.M) == ["alpha_w", "beta_w"], "one point tells no interval"
-    assert "lag" not in alone
-    assert out.splitlines()[-3:] == [
-        "A command of 50% of heave: u_5 = 0.5, u_6 = 0.5, u_7 = 0.5, u_8 = 0.5",
-        "A command of 70% of heave: u_5 = 0.7, u_6 = 0.7, u_7 = 0.7, u_8 = 0.7",
-        "Tau is that of steady thrust; the lag of curve t200, T = 0.0287 s, comes on top",
-    ]
 
 
 def test_a_claim_has_its_figure_or_why_it_was_not_checked(capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,20 +1,16 @@
 """The estimates of a vehicle file vary together in a study, and its page shows them with their Sobol indices."""
 
 from collections.abc import Mapping
-from contextlib import redirect_stderr
 from dataclasses import replace
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from lxml import html
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.report.templates import sentence
-from rov_fmu.study import Results
+from rov_fmu.study import Results, study
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.model import Variable
 from rov_fmu.study.plan.plan import Plan
@@ -134,17 +130,14 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
 # ---- Done ------------------------------------------------------------------------------------------------------------
 
 
-@pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> tuple[Results, list[str]]:
-    """The results of a study of an FMU, made by the command, and the lines that it printed to stderr."""
-    folder = tmp_path_factory.mktemp("estimates")
+def planned(folder: Path, fmu: Path, runs: int) -> Path:
+    """Write the plan of a study beside the vehicle file from which it varies."""
     write_vehicle(MADE, folder / "made.toml")
-    plan = folder / "plan.toml"
-    plan.write_text(f"""fmu = "{beside(videoray_fmu, folder)}"
+    (folder / "plan.toml").write_text(f"""fmu = "{beside(fmu, folder)}"
 vary_from = "made.toml"
 stop_time = 0.1
 step = 0.1
-runs = 2560
+runs = {runs}
 sampler = "saltelli"
 [vary]
 m_rov.normal = {{ mean = 6.572, sd = 0.05 }}
@@ -152,18 +145,30 @@ m_rov.normal = {{ mean = 6.572, sd = 0.05 }}
 mixed = "a_d_u + 2*b_d_u + a_d_w + 4*m_rov"
 same = "0*a_d_u"
 """)
-    with redirect_stderr(StringIO()) as printed:
-        assert main(["study", str(plan), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
-    return Results(folder / "results"), without_progress(printed.getvalue()).splitlines()
+    return folder / "plan.toml"
+
+
+def test_the_command_tells_the_warnings_and_the_results_keep_the_estimates(
+    videoray_fmu: Path, tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    plan = str(planned(tmp_path, videoray_fmu, 10))
+    assert main(["study", plan, "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
+    results = Results(tmp_path / "results")
+    assert results.warnings
+    lines = without_progress(capsys.readouterr().err).splitlines()
+    assert lines == [f"rov-fmu: warning: {warning}" for warning in results.warnings]
+    assert results.plan["vary_from"]["estimates"] == {
+        name: {"value": value, "error": error} for name, (value, error, _) in ROWS.items()
+    }
 
 
 @pytest.mark.long
-def test_sobol_indices_are_those_of_groups_in_closed_form(done: tuple[Results, list[str]]) -> None:
+def test_sobol_indices_are_those_of_groups_in_closed_form(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
     """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
 
     If a_d_u and b_d_u were independent, they would have 0.60 of it.
     """
-    results, _ = done
+    results = study(planned(tmp_path, videoray_fmu, 2560), tmp_path / "results", scheduler=scheduler)
     assert results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])
@@ -176,27 +181,3 @@ def test_sobol_indices_are_those_of_groups_in_closed_form(done: tuple[Results, l
     assert (found.S1_95 < 0.2).all()
     with pytest.raises(FileError, match="same is the same in all runs"):
         results.sensitivity("same")
-
-
-def test_the_page_has_the_warnings_of_the_console_and_how_each_parameter_varies(
-    done: tuple[Results, list[str]],
-) -> None:
-    results, lines = done
-    page = html.fromstring((results.folder / "study.html").read_text(encoding="utf-8"))
-    items = [item.text_content() for item in page.xpath("//ul[@class='warnings']/li")]
-    warnings = results.warnings
-    assert (
-        warnings[0]
-        == "the plan gives no input of the FMU (u_l, u_r, u_t, X_ext, Z_ext and 3 more): all keep their start values"
-    )
-    assert warnings[1].startswith("the FMU has other values than made.toml of b_d_w (0.6324, not 0.372294), a_d_r (0.")
-    assert warnings[2:] == ("what is correlated has one Sobol index together: a_d_u and b_d_u",)
-    assert items == [f"{sentence(warning)}." for warning in warnings]
-    assert lines == [f"rov-fmu: warning: {warning}" for warning in warnings]
-    varied = {row[0].text_content(): row[1].text_content() for row in page.xpath("//h2[@id='varied']/following::tr")}
-    assert varied["b_d_u"] == "estimate: value 5, error 0.3"
-    assert "Correlated, and therefore drawn together: a_d_u, b_d_u." in " ".join(page.text_content().split())
-    assert varied["m_rov"] == "normal: mean 6.572, sd 0.05"
-    index = results.sensitivity("mixed").loc["a_d_u, b_d_u"]
-    cells = page.xpath("//h2[@id='sensitivity']/following::table[1]//tr[td/code='a_d_u, b_d_u']/td")
-    assert float(cells[1].text_content()) == pytest.approx(index.S1, abs=1e-3)

@@ -18,7 +18,6 @@ from tests.vehicles import VIDEORAY, thruster
 
 N = 40
 STEP = [0.3 * (n >= 10) for n in range(N)]
-PAPER = VIDEORAY.layout
 MIXED = Layout(
     axes=(VehicleAxis(SURGE), VehicleAxis(YAW)),
     curves=(Curve("rear"),),

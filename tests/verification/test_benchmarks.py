@@ -176,7 +176,6 @@ def test_one_command_prints_it_all(tmp_path: Path) -> None:
         "RK4",
         "memory of each",
         "A study by two workers",
-        "kept",
         "MuJoCo with the plug-in",
     )
     for part in (*parts, "heyoka / ours" if taylor.installed() else taylor.NOT_INSTALLED[0]):
@@ -192,7 +191,7 @@ def test_many_vehicles_are_measured_in_each_way(vehicle: Vehicle, cores: int) ->
     ways = {taylor.OURS, taylor.LANES, taylor.TURNING, *(taylor.BATCHES if taylor.installed() else ())}
     assert {way: len(costs) for way, costs in found.seconds.items()} == dict.fromkeys(ways, 2)
     assert all(costs.min() > 0.0 for costs in found.seconds.values())
-    headings, *rows = taylor.section(vehicle.name, [found], 0.8)
+    headings, *rows = taylor.section(vehicle.name, [found])
     assert headings[1:] == ["1 s"]
     assert [row[0] for row in rows[:3]] == [taylor.OURS, taylor.LANES, taylor.TURNING]
     assert float(rows[-1][1]) == pytest.approx(found.ratio(taylor.LANES, [taylor.OURS]), rel=0.01)

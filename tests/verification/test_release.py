@@ -48,6 +48,7 @@ def test_the_inventory_of_an_fmu_names_every_file(fmu: Path) -> None:
     assert {c["name"] for c in inventory["components"] if c["type"] == "library"} == {"rov-fmu", "ziglang"}
 
 
+@pytest.mark.long
 def test_the_inventory_of_a_wheel_names_what_it_requires(tmp_path: Path) -> None:
     wheel = tmp_path / "rov_fmu-0-py3-none-any.whl"
     lines = ["Metadata-Version: 2.4", "Name: rov-fmu", "Version: 0", "Requires-Dist: numpy>=2"]

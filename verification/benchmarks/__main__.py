@@ -41,8 +41,6 @@ for 1 s, or for the step where it is longer; at steps of 1 s and more fmi2DoStep
 fmi3SetFloat64.
 """
 _QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, study_runs=(100, 400))
-_PROMISED = (0.8, 1.0)
-"""The largest ratio of the cost of many vehicles to that of heyoka's best batches: VideoRay, BlueROV2 Heavy."""
 
 
 @click.command(help=__doc__)
@@ -80,11 +78,11 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
                 write_whole(Output(picture_file, picture.cost_error_picture(steps).encode()), force=True)
     else:
         yield [["Plain C: not measured, the programs are written for Linux on x86-64"]]
-    for limit, one in zip(_PROMISED, (rov, heavy), strict=True):
+    for one in (rov, heavy):
         with say(f"many of {one.name}"):
             for cores in sorted({1, usable_cores()}):
                 found = [taylor.many_vehicles(one, h, effort.repetitions, cores) for h in taylor.STEPS]
-                yield taylor.section(one.name, found, limit)
+                yield taylor.section(one.name, found)
     with say("simulators"):
         for one in (rov, load_vehicle(SHIPPED["bluerov2"]), heavy):
             yield simulators.section(one, effort.manoeuvres)

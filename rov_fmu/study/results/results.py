@@ -88,7 +88,7 @@ class Results:
             )
             values = part[output].to_numpy().reshape(ended, -1)  # each run has all times, one after another
             with np.errstate(all="ignore"):  # about numbers that are infinite, or nearly so
-                found.append(np.quantile(values, quantiles, axis=0, overwrite_input=True).T)
+                found.append(np.quantile(values, quantiles, axis=0).T)
         return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
 
     def sensitivity(self, figure: str, seed: int = 1) -> pd.DataFrame:

@@ -100,13 +100,6 @@ def test_both_interfaces_put_the_bytes_of_the_users_file_into_the_fmu(kind: str,
     assert origin(replace(one.with_(m_rov=9.0), coefficients=one.coefficients, sources=one.sources)) == origin(one)
 
 
-def test_both_interfaces_build_the_same_bytes(tmp_path: Path) -> None:
-    with without_page():
-        assert main(["build", str(BARE), "--platform", "host", "-o", str(tmp_path / "command.fmu")]) == 0
-        rov_fmu.load(BARE).build(tmp_path / "python.fmu", platforms="host")
-    assert (tmp_path / "command.fmu").read_bytes() == (tmp_path / "python.fmu").read_bytes()
-
-
 def test_a_file_that_changes_while_its_vehicle_is_in_use_does_not_change_the_vehicle(tmp_path: Path) -> None:
     path = tmp_path / "rov.toml"
     path.write_bytes(BARE.read_bytes())

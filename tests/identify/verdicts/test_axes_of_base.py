@@ -7,12 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from lxml import html
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.fmu.card import card_text
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.findings import next_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
 from rov_fmu.report.console import _Console
@@ -25,7 +23,6 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.folders import HEAD, folder_of, read, responses
-from tests.identify.conftest import FORCES, KNOWN, TRUTH
 from tests.report.pages import text_of
 from tests.report.test_report import leave_plots_out
 from tests.vehicles import VIDEORAY
@@ -131,42 +128,3 @@ def test_every_surface_has_the_same_word_for_every_axis(
     assert made
     assert made.words == {axis.name: verdict.word for axis, verdict in result.verdicts.items()}
     assert all(map(VERDICT.fullmatch, made.verdicts))
-
-
-def test_an_axis_of_rov_toml_that_nothing_shows_is_named_although_the_vehicle_lacks_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    result = identify(read(tmp_path, KNOWN, FORCES | responses(TRUTH, HEAVE)))
-    assert {form.axis for form in result.vehicle.layout.axes} == {HEAVE}
-    assert {axis: one.word for axis, one in result.verdicts.items() if axis is not HEAVE} == dict.fromkeys(
-        (SURGE, YAW), "not identified"
-    )
-    for name, text in surfaces(result, monkeypatch):
-        said = " ".join(text.split()).casefold()
-        for axis in (SURGE, YAW):
-            assert f"{axis.name}: not identified" in said, (name, axis.name)
-            assert f"no test shows it, so the vehicle has no {axis.name}" in said, (name, axis.name)
-    assert {test.partition(":")[0] for test in next_tests(result)} >= {"surge", "yaw"}
-
-
-def test_no_answer_of_an_axis_of_the_base_is_told_but_how_to_identify_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    result = identify(read(tmp_path, f'base = "videoray_refit"\n{HEAD}', responses(VIDEORAY, YAW)))
-    texts = dict(surfaces(result, monkeypatch))
-    assert "(yaw)" in texts["terminal"]
-    for axis in (SURGE, HEAVE):
-        assert f"({axis.name})" not in texts["terminal"]
-        (test,) = (one for one in next_tests(result) if one.startswith(f"{axis.name}: "))
-        assert test in texts["terminal"]
-        assert test.casefold() in texts["report"].casefold()
-    assert "depth" in test
-    rows = html.fromstring(documentation_page(result.vehicle)).xpath("//table[.//th='Motion']/tbody/tr")
-    cells = [[cell.text_content() for cell in row.xpath("td")] for row in rows]
-    assert {("Surge", "not identified"), ("Heave", "not identified")} == {tuple(row) for row in cells if len(row) == 2}
-    assert {row[0].split()[0] for row in cells if len(row) > 2} == {"Yaw"}
-    assert result.vehicle.shown_axis is YAW
-    heads = html.fromstring(report_page(result)).xpath("//th[@scope='row']")
-    assert {f"{SURGE.positive}{SURGE.name}", f"{HEAVE.positive}{HEAVE.name}"}.isdisjoint(
-        one.text_content().casefold() for one in heads
-    )

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from decimal import Decimal
 from itertools import combinations
-from math import ceil, exp, hypot, sin
+from math import hypot, sin
 from typing import Any
 
 import numpy as np
@@ -13,13 +13,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Annotation
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.report.page.fmu_page import plot_steady, plot_steps
+from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.report.page.fmu_page import plot_steps
 from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import place, scenes
-from rov_fmu.report.plots.steps import draw_curve, held_commands, tables_by_axis
+from rov_fmu.report.plots.steps import held_commands, tables_by_axis
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.report.plots.test_identification import bars, lines
 from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
 
 ONE = VEHICLES["yaw only"]
@@ -81,52 +80,8 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says() -> None:
 # ---- Over the command and over time ----------------------------------------------------------------------------------
 
 
-def test_the_plot_of_thrust_has_its_dead_band() -> None:
-    """The thrust is a_t m^2 + b_t m, where m is what the command exceeds the dead band by."""
-    k, m = HEAVY, 0.5 - HEAVY["c_0_t200"]
-    ax = panel(draw_curve, k, *k.layout.curves)
-    commands, force = np.array(ax.lines[0].get_data())
-    for command, end, sign in ((50.0, "", 1.0), (-50.0, "_reverse", -1.0)):
-        expected = sign * (k[f"a_t_t200{end}"] * m**2 + k[f"b_t_t200{end}"] * m)
-        assert force[commands == command] == pytest.approx([expected])
-    assert (commands.min(), commands.max()) == ax.get_xlim() == (-100.0, 100.0)
-    assert not force[abs(commands) <= 8.72].any()
-    assert bars(ax)[0][:2] == pytest.approx((-8.72, 17.44))
-
-
-def test_the_plots_of_velocities_have_the_model_what_was_measured_degrees_and_knots() -> None:
-    """Table 7 prints 2.82 rad/s in yaw at 50 %, and 2.61 rad/s and 1.41 s of the test.
-
-    a_d V^2 + b_d V = alpha F gives 2.8544 rad/s, and 2.5744 rad/s without alpha.
-    """
-    tables, degrees = tables_by_axis(VIDEORAY), 180.0 / np.pi
-    turning, ahead = (panel(plot_steady, VIDEORAY, axis, tables[axis.name]) for axis in (YAW, SURGE))
-    for label, V in (("tuned", 2.8544), ("without tuning", 2.5744), ("measured", 2.61)):
-        assert dict(zip(*lines(turning)[label], strict=True))[50.0] == pytest.approx(V * degrees, rel=1e-4)
-    assert turning.get_title(loc="left") == "Steady yaw velocity (°/s)"
-    assert (turning.get_xlim(), turning.get_ylim()[0], turning.child_axes) == ((0.0, 100.0), 0.0, [])
-    (knots,) = ahead.child_axes
-    assert knots.get_ylim()[1] == pytest.approx(ahead.get_ylim()[1] * 3600.0 / 1852.0)
-    assert bars(turning)[0][:2] == pytest.approx((20.0, 50.0))
-    steps = panel(plot_steps, VIDEORAY, YAW, held_commands(VIDEORAY, tables.values()), tables["yaw"])
-    assert steps.get_title(loc="left") == "Yaw velocity after a step (°/s)"
-    assert [text.get_text() for text in steps.texts] == ["20 %", "30 %", "50 %", "70 %"]
-    (t, v), V_ss, Tau = (np.array(line.get_data()) for line in steps.lines[6:9])
-    assert (t[0], v[0], t[-1]) == (0.0, 0.0, ceil(3.3 * 3.1302))
-    assert [v[-1], np.interp(1.5031, t, v)] == pytest.approx(
-        2.8544 * degrees * np.array([1.0, 1.0 - exp(-1.0)]), rel=5e-3
-    )
-    assert [*V_ss[1], *Tau[:, 0]] == pytest.approx(
-        [2.61 * degrees, 2.61 * degrees, 1.41, (1.0 - exp(-1.0)) * 2.61 * degrees]
-    )
-
-
-def test_directions_that_differ_and_lines_near_each_other_are_told_apart() -> None:
-    assert not panel(plot_steady, ONE, YAW, None).patches, "it holds for every command"
-    narrow = panel(plot_steady, replace(HEAVY, command_range=(0.2, 0.7)), HEAVE, None)
-    assert [bar[:2] for bar in bars(narrow)] == [(20.0, 50.0), (-70.0, 50.0)]
-    assert narrow.get_xlim() == (-100.0, 100.0)
-    assert narrow.get_ylim()[0] < 0.0
+def test_names_of_lines_near_each_other_do_not_overlap_and_a_scale_is_in_knots() -> None:
+    """A knot is 1852 m in an hour."""
     steps = panel(plot_steps, HEAVY, HEAVE, [*map(Decimal, (10, 12, 100))], None)
     assert [text.get_text() for text in steps.texts] == ["−100 %", "−12 %", "−10 %", "10 %", "12 %", "100 %"]
     boxes = [text.get_window_extent() for text in steps.texts]
@@ -134,6 +89,7 @@ def test_directions_that_differ_and_lines_near_each_other_are_told_apart() -> No
     (knots,) = steps.child_axes
     numbers = [label.get_window_extent() for label in knots.get_yticklabels()]
     assert not any(box.overlaps(number) for box in boxes for number in numbers)
+    assert knots.get_ylim() == pytest.approx([end * 3600.0 / 1852.0 for end in steps.get_ylim()])
 
 
 def test_step_responses_have_commands_of_all_tables_or_even_tens() -> None:
