@@ -99,7 +99,7 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
     weigh(tmp_path)
     tests = load_tests(tmp_path)
     assert tests.vehicle["m_rov"] == 12.0
-    assert axes <= {*tests.tested.logs}
+    assert axes <= {*tests.logged}
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
     assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"], abs=2e-3)
@@ -303,8 +303,8 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     assert warning.startswith(f"rov-fmu: warning: {name}: left out as unreadable: ")
     weigh(tmp_path)
     tests = load_tests(tmp_path)
-    assert tests.tested.logs == ["heave"]
-    assert f"{name}: left out as unreadable" in by_heading(tests.findings)["Warnings"][0]
+    assert tests.logged == ["heave"]
+    assert f"{name}: left out as unreadable" in by_heading(tests.folder.findings)["Warnings"][0]
     log.unlink()
     for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):
         assert main(["identify", *arguments]) == 2
