@@ -8,14 +8,16 @@ kinds are run one after the other, in parts if wanted: `--keep` keeps the outcom
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, log, sqrt
+from math import inf, log
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
 
-from tests.identify.scenarios.drawn import Drawn, Fault
+from rov_fmu.identify.assess import EXACT, ROCKING
+from rov_fmu.identify.result import Interval
+from tests.identify.scenarios.drawn import Battery, Drawn, Fault
 from tests.identify.scenarios.outcome import Estimate, Outcome, outcome
 
 _ALL = ("surge", "heave", "yaw")
@@ -24,6 +26,7 @@ RIGHT: dict[str, Drawn] = {
     "lag not asked": Drawn(),
     "sag": Drawn(fault=Fault(sag=0.12)),
     "current": Drawn(fault=Fault(current=0.08)),
+    "filtered sensors": Drawn(fault=Fault(filter=0.4)),
     "no velocity sensor": Drawn(_ALL, ("yaw", "heave")),
     "neither velocity nor heading": Drawn(_ALL, ("heave",)),
     "one log per axis": Drawn(alone=True),
@@ -42,6 +45,10 @@ WRONG: dict[str, Drawn] = {
     "tether": Drawn(fault=Fault(tether=0.5)),
     "knots as m/s": Drawn(fault=Fault(unit=1.944)),
     "saturation": Drawn(fault=Fault(saturation=0.5)),
+    "cubic thrust": Drawn(power=3.0),
+    "late sensors": Drawn(fault=Fault(late=0.3)),
+    "feet as m": Drawn(fault=Fault(unit=3.281)),
+    "voltage without a column": Drawn(fault=Fault(battery=Battery(1.5, sag=0.15, droop=0.05))),
 }
 """The kinds that it does not know."""
 FAR = 3.0
@@ -55,8 +62,18 @@ def off(estimate: Estimate) -> float:
     assert estimate.interval
     if not estimate.value * estimate.truth > 0.0:
         return inf
-    low, high = sorted(map(abs, estimate.interval))
-    return abs(log(estimate.value / estimate.truth)) / (0.5 * log(high / max(low, 1e-12)))
+    return abs(log(estimate.value / estimate.truth)) / half_width_of(estimate.interval)
+
+
+def half_width_of(interval: Interval) -> float:
+    """Return half the width of the interval of the logarithm of an answer."""
+    low, high = sorted(map(abs, interval))
+    return 0.5 * log(high / max(low, 1e-12))
+
+
+def least_width(estimate: Estimate) -> float:
+    """Return the half-width below which no answer is claimed, with its rounding."""
+    return 1.02 * (ROCKING if estimate.quantity.startswith("V_ss") else EXACT)
 
 
 @dataclass(frozen=True)
@@ -99,10 +116,13 @@ class Line:
     @property
     def width(self) -> float:
         """The half-width of the intervals relative to the errors, both RMS of logarithms, of those beyond the least."""
-        some = [e for e in self.printed if e.interval and e.value * e.truth > 0.0]
-        halves = [0.5 * abs(log(abs(e.interval[1] / e.interval[0]))) for e in some if e.interval]
-        errors = [log(e.value / e.truth) for e in some]
-        return sqrt(np.mean(np.square(halves)) / np.mean(np.square(errors))) if errors else np.nan
+        pairs = [
+            (half, log(e.value / e.truth))
+            for e in self.printed
+            if e.interval and e.value * e.truth > 0.0 and (half := half_width_of(e.interval)) > least_width(e)
+        ]
+        halves, errors = np.square(pairs).T if pairs else (np.nan, np.nan)
+        return float(np.sqrt(np.mean(halves) / np.mean(errors)))
 
     @property
     def far(self) -> tuple[int, int]:
