@@ -21,8 +21,9 @@ from rov_fmu.vehicle.uncertainty import quantile
 DEGREES_OF_FREEDOM = 10.0
 QUANTILE = quantile(DEGREES_OF_FREEDOM)
 """Half the width of a 95 % interval in standard errors."""
-_ALIKE = 6.0
-"""The number of samples in turn in which the structure lacks the same: those of about half a second at 10 Hz."""
+_ALIKE = 2.0
+"""The number of samples in turn in which the structure lacks the same. With it, the intervals of vehicles drawn anew
+whose structure is wrong contain the truth in 95 %, as with 6 and twice as wide ones; with 1, in 92 %."""
 _WORST = 1e3
 """The largest error of predictions that counts. It is infinite where a motion diverges."""
 _LEAST = 1e-10
