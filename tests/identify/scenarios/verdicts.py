@@ -1,8 +1,9 @@
 """Vehicles drawn anew: are verdicts as honest as intervals? python -m tests.identify.scenarios.verdicts --seeds N.
 
 The table has a line for each kind of water and logger: how many axes are *good*, how many intervals of answers contain
-the truth, how far the farthest one is off in half-widths, and how wide the intervals are relative to the errors. The
-kinds are run one after the other, in parts if wanted: `--keep` keeps the outcomes in a file, and tells all that it has.
+the truth, how far the farthest one is off in half-widths, how wide the intervals are relative to the errors, and the
+largest error of predictions over 10 s relative to the noise, R. The kinds are run one after the other, in parts if
+wanted: `--keep` keeps the outcomes in a file, and tells all that it has.
 """
 
 import pickle
@@ -85,6 +86,8 @@ class Line:
     farthest: Sequence[float]
     """How far the farthest answer of each axis is off, in half-widths; NaN without answers."""
     printed: Sequence[Estimate]
+    structure: Sequence[float]
+    """The error over 10 s of each axis, relative to the noise."""
     seconds: float
 
     @classmethod
@@ -101,7 +104,8 @@ class Line:
                 words.append(word)
                 farthest.append(max(map(off, own), default=np.nan))
                 printed += own
-        return cls(words, farthest, printed, sum(o.seconds for o in outcomes) / max(len(outcomes), 1))
+        structure = [error for o in outcomes for error in o.structure.values()]
+        return cls(words, farthest, printed, structure, sum(o.seconds for o in outcomes) / max(len(outcomes), 1))
 
     @property
     def good(self) -> float:
@@ -135,7 +139,8 @@ class Line:
         counts = "/".join(str(self.words.count(word)) for word in ("good", "usable", "do not use"))
         worst = max([x for x in self.farthest if not np.isnan(x)], default=np.nan)
         missed = f"{self.far[0]}/{self.far[1]}"
-        return counts, f"{self.coverage:.1%}", f"{worst:.1f}", missed, f"{self.width:.1f}", f"{self.seconds:.1f}"
+        R, coverage = max(self.structure, default=np.nan), f"{self.coverage:.1%}"
+        return counts, coverage, f"{worst:.1f}", missed, f"{self.width:.1f}", f"{R:.1f}", f"{self.seconds:.1f}"
 
 
 def broken(kept: Mapping[str, Sequence[Outcome]]) -> Iterator[str]:
@@ -169,8 +174,8 @@ def main(names: Sequence[str], seeds: int, first: int, keep: Path | None) -> Non
                 kept[name, seed] = run(name, seed)
                 if keep:
                     keep.write_bytes(pickle.dumps(kept))
-    form = "{:30} {:>11} {:>8} {:>9} {:>9} {:>6} {:>6}"
-    click.echo(form.format("kind", "g/u/do not", "covered", "farthest", "far good", "width", "CPU s"))
+    form = "{:30} {:>11} {:>8} {:>9} {:>9} {:>6} {:>6} {:>6}"
+    click.echo(form.format("kind", "g/u/do not", "covered", "farthest", "far good", "width", "R", "CPU s"))
     by_kind = {name: [o for (n, _), o in kept.items() if n == name] for name in dict.fromkeys(n for n, _ in kept)}
     everything = {"right": [*RIGHT], "wrong": [*WRONG], "all": [*by_kind]}
     for name, some in [
