@@ -131,9 +131,7 @@ def _axis(
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     if is_told and is_steady:
-        every = assess.answers(
-            (*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least
-        )
+        every = assess.answers((*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least)
         answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
     unknown = [d for d in slow if d.axis is axis or d.kind == "slow gain" or (d.axis is None and axis in (SURGE, SWAY))]
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
