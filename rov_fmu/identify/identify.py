@@ -130,9 +130,8 @@ def _axis(
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     if is_told and is_steady:
-        answers = assess.answers(
-            (*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least
-        )
+        every = assess.answers((*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least)
+        answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}

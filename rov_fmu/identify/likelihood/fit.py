@@ -68,13 +68,18 @@ class Fit:
         return self.file.posterior, self.posterior
 
     @cached_property
+    def most_followed(self) -> float:
+        """The strongest command that the thrusters follow."""
+        return float(self.file.posterior.table.get(self.file.posterior.z, "command limit", default=1.0))
+
+    @cached_property
     def command_range(self) -> tuple[float, float]:
-        """The weakest and the strongest command of the tests."""
+        """The weakest and the strongest command of the tests that the thrusters follow."""
         used = [abs(row.command) for row in self.objective.rows]
         for one in self.objective.logs:
             assert one.log.commands
             used += np.abs(one.log.commands.value).tolist()
-        used = [round(c, 6) for c in used if c > 1e-3]
+        used = [round(min(c, self.most_followed), 6) for c in used if c > 1e-3]
         low, high = min(used, default=0.0), max(used, default=1.0)
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
 

@@ -21,8 +21,9 @@ from rov_fmu.vehicle.uncertainty import quantile
 DEGREES_OF_FREEDOM = 10.0
 QUANTILE = quantile(DEGREES_OF_FREEDOM)
 """Half the width of a 95 % interval in standard errors."""
-_ALIKE = 6.0
-"""The number of samples in turn in which the structure lacks the same: those of about half a second at 10 Hz."""
+_ALIKE = 2.0
+"""The number of samples in turn in which the structure lacks the same. With it, 96 % of the intervals of drawn vehicles
+with a wrong structure contain the truth; with 6, 97 % of those 1.5 times as wide; with 1, 94 %, some far off."""
 _WORST = 1e3
 """The largest error of predictions that counts. It is infinite where a motion diverges."""
 _LEAST = 1e-10

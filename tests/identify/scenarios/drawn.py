@@ -11,7 +11,9 @@ from pathlib import Path
 
 import numpy as np
 from scipy.integrate import quad
+from scipy.signal import lfilter
 
+from rov_fmu.identify.assess import ANSWERED
 from tests.folders import THRUSTER
 from tests.identify.scenarios.scenario import (
     NOTHING_SPECIAL,
@@ -72,6 +74,10 @@ class Fault:
     """The share of the thrust that is lost until the end of a log."""
     unit: float = 1.0
     """The factor of a logged velocity."""
+    late: float = 0.0
+    """How much later than the clock of the commands that of the sensors is, s; a multiple of the time of a row."""
+    filter: float = 0.0
+    """The time constant of a filter in each sensor, s."""
     current: float = 0.0
     """m/s."""
     battery: Battery = Battery(0.0)
@@ -95,6 +101,8 @@ class Body:
     loss: float
     """The share of the full thrust that is lost per speed of advance, s/m."""
     lag: float
+    power: float = 2.0
+    """Thrust is proportional to this power of a command beyond the dead band."""
 
     def beyond(self, command: float) -> float:
         """Return a command beyond the dead band, relative to the full one."""
@@ -104,7 +112,7 @@ class Body:
     def force(self, command: float) -> float:
         """Return the thrust of a thruster at rest, N."""
         e = self.beyond(command)
-        return self.full * (self.astern if command < 0.0 else 1.0) * e * abs(e)
+        return copysign(self.full * (self.astern if command < 0.0 else 1.0) * abs(e) ** self.power, e)
 
     def answers(self, axis: str, command: float, health: Sequence[float]) -> tuple[float, float, float]:
         """Return V_ss, the time to 63 % of it, and the stopping distance of the axis alone, by quadrature."""
@@ -124,7 +132,7 @@ class Body:
         return copysign(V, push), rise, M / a * log((a * V + b) / (0.1 * a * V + b))
 
 
-def drawn_body(random: np.random.Generator, *, load: float = 0.0, lag: float | None = None) -> Body:
+def drawn_body(random: np.random.Generator, load: float, lag: float | None, power: float) -> Body:
     """Draw a vehicle of 6 to 14 kg. `load` is relative to the full thrust."""
     mass, full = random.uniform(6.0, 14.0), random.uniform(18.0, 40.0)
     dry = {"surge": mass, "heave": mass, "yaw": mass * random.uniform(0.014, 0.024)}
@@ -141,7 +149,7 @@ def drawn_body(random: np.random.Generator, *, load: float = 0.0, lag: float | N
     loss = random.uniform(0.0, 0.15)
     T = random.uniform(0.05, 0.2) if lag is None else lag
     shape = random.uniform(0.7, 1.0), random.uniform(0.02, 0.06)
-    return Body(dry, inertia, drag, load * full, arm, full, *shape, loss, T)
+    return Body(dry, inertia, drag, load * full, arm, full, *shape, loss, T, power)
 
 
 @dataclass(frozen=True)
@@ -155,6 +163,8 @@ class Drawn:
     load: float = 0.0
     """Relative to the full thrust of a thruster."""
     lag: float | None = None
+    power: float = 2.0
+    """Of the thrust over the command."""
     alone: bool = False
     """True if each log drives one axis only."""
     seconds: float = 60.0
@@ -163,22 +173,25 @@ class Drawn:
     expected: Expected = NOTHING_SPECIAL
 
     def truths(self, seed: int) -> Truths:
-        """Return the answers of each axis that a sensor shows, those of a weak pair with its weakness.
+        """Return the answers of each axis that a sensor shows, those of a weak or dead thruster with its weakness.
 
         A battery that sags has its average thrust: logs without its voltage do not show which of it is the full one.
         """
         body = self._body(np.random.default_rng(seed))
-        body = replace(body, full=body.full * (1.0 - 0.5 * self.fault.sag))
-        health = [h if h > 0.0 else 1.0 for h in self.fault.health]
+        battery = self.fault.battery
+        thrust = 1.0 if self.has_voltage else (1.0 - 0.5 * battery.sag) ** battery.exponent
+        body = replace(body, full=body.full * (1.0 - 0.5 * self.fault.sag) * thrust)
+        health = [abs(h) for h in self.fault.health]
         found: dict[tuple[str, str], float] = {}
         for axis in self.sensors:
-            for command in (0.3, -0.3, 0.5, -0.5):
+            for command in ANSWERED:
                 names = [(axis, name) for name in answer_names(command)]
-                found |= zip(names, body.answers(axis, command, health), strict=True)
+                followed = copysign(min(abs(command), self.fault.saturation), command)
+                found |= zip(names, body.answers(axis, followed, health), strict=True)
         return found
 
     def _body(self, random: np.random.Generator) -> Body:
-        return drawn_body(random, load=self.load * random.choice([-1.0, 1.0]), lag=self.lag)
+        return drawn_body(random, self.load * random.choice([-1.0, 1.0]), self.lag, self.power)
 
     def write(self, seed: int, folder: Path) -> None:
         """Write the logs, the table and rov.toml."""
@@ -227,7 +240,7 @@ class Drawn:
         names = ("port", "stbd", "top")[: 2 + ("heave" in self.axes)]
         table = {"time [s]": time} | {f"{n} [%]": 100.0 * c for n, c in zip(names, commands, strict=False)}
         for axis in self.sensors:
-            values = motion[axis] + _NOISE[axis] * random.standard_normal(len(time))
+            values = _shown(motion[axis], self.fault) + _NOISE[axis] * random.standard_normal(len(time))
             if axis == "surge":
                 values = self.fault.unit * values
             table[_HEADERS[axis]] = np.degrees(values) % 360.0 if axis == "yaw" else values
@@ -249,9 +262,9 @@ def flown(body: Body, fault: Fault, commands: Array, heading: float) -> dict[str
             v_a = w if n == 2 else u - arm * r
             e = body.beyond(c)
             if fault.rotor:
-                goal, force, turns = e, state * abs(state), abs(state)
+                goal, force, turns = e, copysign(abs(state) ** body.power, state), abs(state)
             else:
-                goal, force, turns = e * abs(e), state, abs(c)
+                goal, force, turns = copysign(abs(e) ** body.power, e), state, abs(c)
             lagging.append((goal - state) / body.lag)
             F = (
                 thrust
@@ -288,3 +301,10 @@ def flown(body: Body, fault: Fault, commands: Array, heading: float) -> dict[str
         k4 = rates([a + _STEP * b for a, b in zip(y, k3, strict=True)], followed, thrust)
         y = [a + _STEP / 6.0 * (b + 2.0 * (c + d) + e) for a, b, c, d, e in zip(y, k1, k2, k3, k4, strict=True)]
     return dict(zip(("surge", "yaw", "heave", "voltage"), np.array(rows).T, strict=True))
+
+
+def _shown(true: Array, fault: Fault) -> Array:
+    """Return what a sensor without noise shows in each row."""
+    rows = np.maximum(np.arange(len(true)) - round(fault.late / (_STEP * _ROW)), 0)
+    kept = exp(-_STEP * _ROW / fault.filter) if fault.filter else 0.0
+    return np.asarray(true[0] + lfilter([1.0 - kept], [1.0, -kept], true[rows] - true[0]))

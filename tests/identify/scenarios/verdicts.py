@@ -1,21 +1,24 @@
 """Vehicles drawn anew: are verdicts as honest as intervals? python -m tests.identify.scenarios.verdicts --seeds N.
 
 The table has a line for each kind of water and logger: how many axes are *good*, how many intervals of answers contain
-the truth, how far the farthest one is off in half-widths, and how wide the intervals are relative to the errors. The
-kinds are run one after the other, in parts if wanted: `--keep` keeps the outcomes in a file, and tells all that it has.
+the truth, how far the farthest one is off in half-widths, how wide the intervals are relative to the errors, and the
+largest error of predictions over 10 s relative to the noise, R. The kinds are run one after the other, in parts if
+wanted: `--keep` keeps the outcomes in a file, and tells all that it has.
 """
 
 import pickle
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import inf, log, sqrt
+from math import inf, log
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import click
 import numpy as np
 
-from tests.identify.scenarios.drawn import Drawn, Fault
+from rov_fmu.identify.assess import EXACT, ROCKING
+from rov_fmu.identify.result import Interval
+from tests.identify.scenarios.drawn import Battery, Drawn, Fault
 from tests.identify.scenarios.outcome import Estimate, Outcome, outcome
 
 _ALL = ("surge", "heave", "yaw")
@@ -24,6 +27,7 @@ RIGHT: dict[str, Drawn] = {
     "lag not asked": Drawn(),
     "sag": Drawn(fault=Fault(sag=0.12)),
     "current": Drawn(fault=Fault(current=0.08)),
+    "filtered sensors": Drawn(fault=Fault(filter=0.4)),
     "no velocity sensor": Drawn(_ALL, ("yaw", "heave")),
     "neither velocity nor heading": Drawn(_ALL, ("heave",)),
     "one log per axis": Drawn(alone=True),
@@ -42,6 +46,10 @@ WRONG: dict[str, Drawn] = {
     "tether": Drawn(fault=Fault(tether=0.5)),
     "knots as m/s": Drawn(fault=Fault(unit=1.944)),
     "saturation": Drawn(fault=Fault(saturation=0.5)),
+    "cubic thrust": Drawn(power=3.0),
+    "late sensors": Drawn(fault=Fault(late=0.3)),
+    "feet as m": Drawn(fault=Fault(unit=3.281)),
+    "voltage without a column": Drawn(fault=Fault(battery=Battery(1.5, sag=0.15, droop=0.05))),
 }
 """The kinds that it does not know."""
 FAR = 3.0
@@ -55,8 +63,18 @@ def off(estimate: Estimate) -> float:
     assert estimate.interval
     if not estimate.value * estimate.truth > 0.0:
         return inf
-    low, high = sorted(map(abs, estimate.interval))
-    return abs(log(estimate.value / estimate.truth)) / (0.5 * log(high / max(low, 1e-12)))
+    return abs(log(estimate.value / estimate.truth)) / half_width_of(estimate.interval)
+
+
+def half_width_of(interval: Interval) -> float:
+    """Return half the width of the interval of the logarithm of an answer."""
+    low, high = sorted(map(abs, interval))
+    return 0.5 * log(high / max(low, 1e-12))
+
+
+def least_width(estimate: Estimate) -> float:
+    """Return the half-width below which no answer is claimed, with its rounding."""
+    return 1.02 * (ROCKING if estimate.quantity.startswith("V_ss") else EXACT)
 
 
 @dataclass(frozen=True)
@@ -68,6 +86,8 @@ class Line:
     farthest: Sequence[float]
     """How far the farthest answer of each axis is off, in half-widths; NaN without answers."""
     printed: Sequence[Estimate]
+    structure: Sequence[float]
+    """The error over 10 s of each axis, relative to the noise."""
     seconds: float
 
     @classmethod
@@ -84,7 +104,8 @@ class Line:
                 words.append(word)
                 farthest.append(max(map(off, own), default=np.nan))
                 printed += own
-        return cls(words, farthest, printed, sum(o.seconds for o in outcomes) / max(len(outcomes), 1))
+        structure = [error for o in outcomes for error in o.structure.values()]
+        return cls(words, farthest, printed, structure, sum(o.seconds for o in outcomes) / max(len(outcomes), 1))
 
     @property
     def good(self) -> float:
@@ -99,10 +120,13 @@ class Line:
     @property
     def width(self) -> float:
         """The half-width of the intervals relative to the errors, both RMS of logarithms, of those beyond the least."""
-        some = [e for e in self.printed if e.interval and e.value * e.truth > 0.0]
-        halves = [0.5 * abs(log(abs(e.interval[1] / e.interval[0]))) for e in some if e.interval]
-        errors = [log(e.value / e.truth) for e in some]
-        return sqrt(np.mean(np.square(halves)) / np.mean(np.square(errors))) if errors else np.nan
+        pairs = [
+            (half, log(e.value / e.truth))
+            for e in self.printed
+            if e.interval and e.value * e.truth > 0.0 and (half := half_width_of(e.interval)) > least_width(e)
+        ]
+        halves, errors = np.square(pairs).T if pairs else (np.nan, np.nan)
+        return float(np.sqrt(np.mean(halves) / np.mean(errors)))
 
     @property
     def far(self) -> tuple[int, int]:
@@ -115,7 +139,8 @@ class Line:
         counts = "/".join(str(self.words.count(word)) for word in ("good", "usable", "do not use"))
         worst = max([x for x in self.farthest if not np.isnan(x)], default=np.nan)
         missed = f"{self.far[0]}/{self.far[1]}"
-        return counts, f"{self.coverage:.1%}", f"{worst:.1f}", missed, f"{self.width:.1f}", f"{self.seconds:.1f}"
+        R, coverage = max(self.structure, default=np.nan), f"{self.coverage:.1%}"
+        return counts, coverage, f"{worst:.1f}", missed, f"{self.width:.1f}", f"{R:.1f}", f"{self.seconds:.1f}"
 
 
 def broken(kept: Mapping[str, Sequence[Outcome]]) -> Iterator[str]:
@@ -149,8 +174,8 @@ def main(names: Sequence[str], seeds: int, first: int, keep: Path | None) -> Non
                 kept[name, seed] = run(name, seed)
                 if keep:
                     keep.write_bytes(pickle.dumps(kept))
-    form = "{:30} {:>11} {:>8} {:>9} {:>9} {:>6} {:>6}"
-    click.echo(form.format("kind", "g/u/do not", "covered", "farthest", "far good", "width", "CPU s"))
+    form = "{:30} {:>11} {:>8} {:>9} {:>9} {:>6} {:>6} {:>6}"
+    click.echo(form.format("kind", "g/u/do not", "covered", "farthest", "far good", "width", "R", "CPU s"))
     by_kind = {name: [o for (n, _), o in kept.items() if n == name] for name in dict.fromkeys(n for n, _ in kept)}
     everything = {"right": [*RIGHT], "wrong": [*WRONG], "all": [*by_kind]}
     for name, some in [
