@@ -156,7 +156,8 @@ def fit_all(
     file, least = full, best
     if known.bent:
         file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
-        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88), enough=_QUICK)
+        show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
+        least = minimise(file, best.z, show, near=best.data, enough=_QUICK)
     errors = with_shared(known.layout, structure(full, best))
     of_file = without_weak_effects(file, least)
     return Fit(
