@@ -49,8 +49,26 @@ static real lanes_exp(real x)
     return x > 700.0 ? (real)HUGE_VAL : sum;
 }
 
+/* Return the angle of a vector: the series of the arctangent is used up to a sixteenth of a turn. */
+static real lanes_angle(real y, real x)
+{
+    const real larger = fmax(fmax(fabs(x), fabs(y)), 1e-300), ratio = fmin(fabs(x), fabs(y)) / larger + 0.0 * (x + y);
+    const mask is_far = ratio > 0.41421356237309504880;
+    const real t = is_far ? (ratio - 1.0) / (ratio + 1.0) : ratio, s = t * t;
+    real sum = 0.0;
+    for (int n = 41; n > 0; n -= 2) {
+        sum = 1.0 / n - s * sum;
+    }
+    const real eighth = t * sum + (is_far ? (real)0.78539816339744830962 : (real)0.0);
+    const real quarter = fabs(y) > fabs(x) ? 1.57079632679489661923 - eighth : eighth;
+    const real half = x < 0.0 ? 3.14159265358979323846 - quarter : quarter;
+    return y < 0.0 ? -half : half;
+}
+
 #undef sin
 #undef cos
+#undef atan2
+#define atan2 lanes_angle
 #define sin lanes_sine
 #define cos lanes_cosine
 #define exp lanes_exp
