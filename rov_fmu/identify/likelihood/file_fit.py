@@ -55,7 +55,7 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
         order = [*_weakest(posterior, least.value - best.value)]
         tried = [absent.union(order[: n + 1]) for n in range(len(order))]
-        found = refits(objective, least, [objective.whole] * len(tried), tried, anew=False)
+        found = refits(objective, least, [objective.whole] * len(tried), tried)
         within = [n for n, one in enumerate(found) if one.value - best.value <= MOST_RISE]
         if within:
             absent, least, is_exact = tried[within[-1]], found[within[-1]], False

@@ -183,7 +183,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     larger = end.z.copy()
     for n, p in enumerate(objective.table.parameters):
         band = objective.table.place("dead band", p.of)
-        if p.kind == "linear thrust" and band is not None:
+        if p.kind == "linear thrust" and p.low < p.high and band is not None:
             d = objective.deviation[band]
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):

@@ -131,19 +131,13 @@ def _within_reach(objective: Objective, place: Minimum) -> tuple[float, Array]:
 
 
 def refits(
-    objective: Objective,
-    best: Minimum,
-    parts: Sequence[Part],
-    absent: Sequence[Collection[int]] = (),
-    *,
-    anew: bool = True,
+    objective: Objective, best: Minimum, parts: Sequence[Part], absent: Sequence[Collection[int]] = ()
 ) -> list[Minimum]:
     """Minimise J for some parts of the data, each from the minimum for all data, without the noise.
 
     If `absent` is given, it has the places of the effects that each fit is without. All fits take their damped steps
     together, so that the lanes of the filter are full. The derivatives are those at the minimum for all data, which are
-    exact, as long as a fit is near it, or always if it gets no derivatives `anew`. A fit to most of the data needs two
-    steps.
+    exact, as long as a fit is near it, and always if it is without effects. A fit to most of the data needs two steps.
     """
     free = np.array([parameter.of_motion for parameter in objective.table.parameters])
     fits = [
@@ -156,7 +150,7 @@ def refits(
             break
         moved = np.array([fit.moved for fit in active]).T
         for fit, trial in zip(active, objective.trials(moved, [fit.part for fit in active], best.runs), strict=True):
-            fit.judge(*trial, anew=anew)
+            fit.judge(*trial)
     return [Minimum(fit.z, fit.value, fit.runs, fit.data, total(fit.objective, fit.z, fit.data)[1]) for fit in fits]
 
 
@@ -164,7 +158,7 @@ class _Refit:
     """A fit to a part of the data, between two steps."""
 
     def __init__(self, objective: Objective, part: Part, best: Minimum, *, is_inside: bool) -> None:
-        self.objective, self.part, self.z = objective, part, best.z
+        self.objective, self.part, self.z, self.is_inside = objective, part, best.z, is_inside
         self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
         self.data = _data_of(part, best)
         self.value = objective.value(self.z, self.runs) if is_inside else np.inf
@@ -181,14 +175,14 @@ class _Refit:
             self.damping = max(4.0 * self.damping, 1e-3)
         return -float(gradient @ change + 0.5 * change @ information @ change)
 
-    def judge(self, value: float, samples: Sequence[Samples], *, anew: bool) -> None:
+    def judge(self, value: float, samples: Sequence[Samples]) -> None:
         """Take the step if J falls, with new derivatives if it falls by much. Otherwise, the next step is shorter."""
         if not value < self.value:
             self.damping = max(8.0 * self.damping, 1.0)
             return
         gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
         self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
-        if anew and _REFIT_FAR < gain < np.inf:
+        if self.is_inside and _REFIT_FAR < gain < np.inf:
             with suppress(DivergedError):
                 self.runs = self.objective.runs(self.z, self.runs)
                 self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
