@@ -24,9 +24,7 @@
 #include "step.c"
 
 #if LANES > 1
-EACH_LANE(exp, (real x), LANE(x, i))
 EACH_LANE(asin, (real x), LANE(x, i))
-#define exp lanes_exp
 #define asin lanes_asin
 #endif
 

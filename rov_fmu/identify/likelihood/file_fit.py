@@ -21,8 +21,6 @@ _POSITIVE = 2.0
 """2 ln of the Bayes factor from which evidence is positive (Kass and Raftery 1995)."""
 _EXPECTED = 1.5
 """Effects are tried while J is expected to rise by at most so many times MOST_RISE: it is only nearly quadratic."""
-_STEPS = 2
-"""The most derivatives of a fit without effects, from the end of its refit."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,23 +41,33 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
 
     An effect that would be an input of the FMU, such as the voltage, is left out before, whatever the rise, if the
     evidence for it is not positive.
+
+    The refits keep the derivatives of the fit that they begin at: J where they end is J, and exact derivatives follow
+    at the end, with which more effects may go.
     """
     posterior, parameters = Posterior.of(objective.table, best.z, best.information), objective.table.parameters
     inputs = (n for n, p in enumerate(parameters) if KINDS[p.kind].adds_input)
     absent = frozenset(n for n in inputs if posterior.evidence(n) < _POSITIVE)
     if absent:
-        best = minimise(objective.without(absent), best.z, most=_STEPS)
-    least = best
+        best = _exact(objective, absent, best)
+    least, is_exact = best, True
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
         order = [*_weakest(posterior, least.value - best.value)]
         tried = [absent.union(order[: n + 1]) for n in range(len(order))]
         found = refits(objective, least, [objective.whole] * len(tried), tried)
         within = [n for n, one in enumerate(found) if one.value - best.value <= MOST_RISE]
-        if not within:
+        if within:
+            absent, least, is_exact = tried[within[-1]], found[within[-1]], False
+        elif is_exact:
             return FileFit(objective.without(absent), least, posterior)
-        absent = tried[within[-1]]
-        least = minimise(objective.without(absent), found[within[-1]].z, most=_STEPS)
+        else:
+            least, is_exact = _exact(objective, absent, least), True
+
+
+def _exact(objective: Objective, absent: frozenset[int], near: Minimum) -> Minimum:
+    """Return the minimum of J without some effects, with exact derivatives, from a fit near it."""
+    return minimise(objective.without(absent), near.z, most=1, near=near.data)
 
 
 def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:

@@ -162,7 +162,8 @@ def fit_all(
     file, least = full, best
     if known.bent:
         file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
-        least = minimise(file, best.z, moving(on_progress, "quadratic thrust", 0.82, 0.88), enough=_QUICK)
+        show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
+        least = minimise(file, best.z, show, near=best.data, enough=_QUICK)
     errors = with_shared(known.layout, structure(full, best))
     of_file = without_weak_effects(file, least)
     return Fit(
@@ -188,7 +189,7 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
     larger = end.z.copy()
     for n, p in enumerate(objective.table.parameters):
         band = objective.table.place("dead band", p.of)
-        if p.kind == "linear thrust" and band is not None:
+        if p.kind == "linear thrust" and p.low < p.high and band is not None:
             d = objective.deviation[band]
             larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
     if np.array_equal(larger, end.z):

@@ -303,10 +303,14 @@ class Objective:
         """Return the part of J that the priors contribute."""
         return float(np.sum(((z - self.mean) / self.deviation) ** 2))
 
+    def samples(self, z: Array, runs: Sequence[Run]) -> list[Samples]:
+        """Return the samples of the runs of some parameters, and then those of the rows of tables, if any."""
+        found = [(run.innovations, run.variances) for run in runs]
+        return [*found, self.row_values(z)] if self.rows else found
+
     def value(self, z: Array, runs: Sequence[Run]) -> float:
         """Return J for the runs of some parameters."""
-        found = [(run.innovations, run.variances) for run in runs]
-        return self._sum(z, [*found, self.row_values(z)] if self.rows else found)
+        return self._sum(z, self.samples(z, runs))
 
     def chosen(self, n: int) -> slice:
         """Return the samples of a log that count; all rows of tables, which follow the logs, do."""

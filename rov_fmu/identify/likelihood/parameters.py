@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import log
 from typing import Any
 
@@ -258,30 +258,30 @@ class Table:
 
     def followed(self, z: Array, one: SampledLog) -> Array:
         """Return the inputs that thrusters can follow, by a limit and a slew limit: (sets x) rows x inputs."""
-        limit, slew = (self.get(z, kind, default=None) for kind in ("command limit", "slew limit"))
-        inputs = one.record.inputs
-        if one.log.follows_axis or (limit is None and slew is None):
-            return inputs
-        places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
-        limited = np.array(np.broadcast_to(inputs, (*np.shape(z)[1:], *inputs.shape)))
-        values = limited[..., places]
-        if limit is not None:
-            most = np.reshape(limit, (*np.shape(limit), 1, 1))
-            values = np.clip(values, -most, most)
-        if slew is not None:
-            steps = np.diff(one.record.told)
-            now = values[..., 0, :]
-            for row, step in enumerate(steps.tolist()):  # the mean over a row is that at its middle
-                most = np.reshape(slew, (*np.shape(slew), 1)) * step
-                before, now = now, now + np.clip(values[..., row, :] - now, -most, most)
-                values[..., row, :] = 0.5 * (before + now)
-        limited[..., places] = values
-        return limited
+        limits = (self.get(z, kind, default=np.inf) for kind in ("command limit", "slew limit"))
+        some = [_followed(one, float(limit), float(slew)) for limit, slew in np.broadcast(*limits)]
+        return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
         place = self.place("sensor lag", "", with_same_lag(sensor))
         return None if place is None else z[place]
+
+
+@lru_cache(64)
+def _followed(one: SampledLog, limit: float, slew: float) -> Array:
+    """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same."""
+    found = one.record.inputs
+    if one.log.follows_axis or limit == slew == np.inf:
+        return found
+    found, steps = found.copy(), np.diff(one.record.told).tolist() if slew < np.inf else []
+    for n in (n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands):
+        values = found[:, n] = np.clip(found[:, n], -limit, limit)
+        now = float(values[0])
+        for row, (value, step) in enumerate(zip(values.tolist(), steps, strict=False)):
+            before, now = now, now + min(max(value - now, -slew * step), slew * step)
+            found[row, n] = 0.5 * (before + now)  # the mean over a row is that at its middle
+    return found
 
 
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:

@@ -52,6 +52,7 @@ def minimise(
     start: Array,
     on_step: Callable[[int], None] = lambda _: None,
     *,
+    near: Sequence[Data] = (),
     most: int = MOST_STEPS,
     enough: float = ENOUGH,
     last: bool = True,
@@ -59,21 +60,25 @@ def minimise(
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
-    All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The fit
-    ends when new derivatives twice in turn reduce J by less than `enough`, the second time exact ones, and early where
-    J within reach, with the information, promises nothing. The `last` fit takes one more step with exact derivatives.
-    These are then its data and information; those of others are of the step before.
+    All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The first
+    derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
+    less than `enough`, the second time exact ones, and early where J within reach, with the information, promises
+    nothing. Data and information of a `last` fit have exact derivatives: those of the step before if J hardly fell, and
+    otherwise others, after one more step with them. Those of a fit that is not the last are of the step before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
-    now, stalled = Minimum(z, objective.value(z, runs), runs, [], np.diag(2.0 / objective.deviation**2)), 0
+    now, stalled = Minimum(z, objective.value(z, runs), runs, near, np.diag(2.0 / objective.deviation**2)), 0
     for count in range(1, most + 1):
         on_step(count)
         try:
-            data = objective.data(now.z, now.runs, exact=stalled > 0)
+            if near and count == 1:
+                data = [old.at(*some) for old, some in zip(near, objective.samples(z, runs), strict=True)]
+            else:
+                data = objective.data(now.z, now.runs, exact=stalled > 0)
             information = total(objective, now.z, data)[1]
         except DivergedError:
-            if not now.data:
+            if count == 1:
                 raise
             break
         before = now = replace(now, data=data, information=information)
@@ -83,8 +88,9 @@ def minimise(
         stalled = stalled + 1 if before.value - now.value < enough else 0
         if stalled == _STALLED:
             break
-    if last:
+    if last and not (stalled == _STALLED and before.value - now.value < ENOUGH):
         now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
+    if last:
         now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
     return now
 
@@ -131,7 +137,7 @@ def refits(
 
     If `absent` is given, it has the places of the effects that each fit is without. All fits take their damped steps
     together, so that the lanes of the filter are full. The derivatives are those at the minimum for all data, which are
-    exact, as long as a fit is near it. A fit to most of the data needs two steps.
+    exact, as long as a fit is near it, and always if it is without effects. A fit to most of the data needs two steps.
     """
     free = np.array([parameter.of_motion for parameter in objective.table.parameters])
     fits = [
@@ -152,7 +158,7 @@ class _Refit:
     """A fit to a part of the data, between two steps."""
 
     def __init__(self, objective: Objective, part: Part, best: Minimum, *, is_inside: bool) -> None:
-        self.objective, self.part, self.z = objective, part, best.z
+        self.objective, self.part, self.z, self.is_inside = objective, part, best.z, is_inside
         self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
         self.data = _data_of(part, best)
         self.value = objective.value(self.z, self.runs) if is_inside else np.inf
@@ -176,7 +182,7 @@ class _Refit:
             return
         gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
         self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
-        if _REFIT_FAR < gain < np.inf:
+        if self.is_inside and _REFIT_FAR < gain < np.inf:
             with suppress(DivergedError):
                 self.runs = self.objective.runs(self.z, self.runs)
                 self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)

@@ -68,7 +68,8 @@ def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: 
         first = evidence(objective.value(z, objective.runs(z, best.runs)))
         if first <= KEPT:
             return first
-        return evidence(minimise(without, z, most=_STEPS, last=False, promises=lambda J, _: evidence(J) <= KEPT).value)
+        end = minimise(without, z, near=best.data, most=_STEPS, last=False, promises=lambda J, _: evidence(J) <= KEPT)
+        return evidence(end.value)
     except DivergedError:
         return inf
 

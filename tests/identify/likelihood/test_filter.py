@@ -1,14 +1,17 @@
 """The filter in C agrees with a textbook filter in NumPy and with the engine."""
 
+import ctypes
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import cos, exp, inf, pi, sin
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from rov_fmu.c.compile import C_SOURCES, FILTER_LANES_FILE, VECTORS_HEADER, compile_engine
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
@@ -423,6 +426,33 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
             scale = np.abs(expected.innovations).max()
             assert one.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
             assert one.variances == pytest.approx(expected.variances, rel=1e-9)
+
+
+def test_functions_of_vectors_are_exact_to_rounding(tmp_path: Path) -> None:
+    """They are those of the lanes, beside numbers of 64 bits of mantissa. NaN stays NaN, so that a run diverges."""
+    compute = """
+        #define EXPORT __attribute__((visibility("default")))
+        EXPORT void compute(const double x[], const double y[], double found[], long n) {
+            for (long k = 0; k < n; k++) {
+                const real a = x[k], b = y[k], each[4] = {sin(a), cos(a), atan2(a, b), exp(b)};
+                for (int f = 0; f < 4; f++) { found[4 * k + f] = LANE(each[f], k % LANES); }
+            }
+        }"""
+    files = VECTORS_HEADER, C_SOURCES / "real.h", FILTER_LANES_FILE
+    library = tmp_path / "functions"
+    library.write_bytes(compile_engine({"filter.c": compute} | {path.name: path.read_text() for path in files}))
+    random, count = np.random.default_rng(3), 5000
+    x = random.uniform(-1.0, 1.0, count) * 10.0 ** random.uniform(-8.0, 5.0, count)
+    y = random.uniform(-700.0, 700.0, count)
+    y[:6], x[:3] = (0.0, -0.0, 1e-300, -750.0, 750.0, np.nan), (0.0, 1.0, -1e-300)
+    found = np.zeros((count, 4))
+    pointers = [ctypes.c_void_p(array.ctypes.data) for array in (x, y, found)]
+    ctypes.CDLL(str(library)).compute(*pointers, ctypes.c_long(count))
+    a, b = x.astype(np.longdouble), y.astype(np.longdouble)
+    with np.errstate(over="ignore", under="ignore"):
+        expected = np.column_stack([np.sin(a), np.cos(a), np.arctan2(a, b), np.exp(b)]).astype(float)
+    expected[3:5, 3] = 0.0, np.inf
+    assert found == pytest.approx(expected, rel=1e-15, abs=3e-16, nan_ok=True)
 
 
 def with_a_gap() -> list[tuple[float, int]]:

@@ -77,7 +77,7 @@ def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
 
     in_lanes = errors()
     monkeypatch.setattr(Filter, "run_many", one_by_one)
-    assert in_lanes == pytest.approx(errors(), rel=1e-6)
+    assert in_lanes == pytest.approx(errors(), rel=1e-5)  # rounding, in differences over steps of 1e-6
 
 
 def check_gradient(objective: Objective, z: Array) -> None:
