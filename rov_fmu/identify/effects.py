@@ -9,13 +9,14 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.identify.identified_vehicle import EXACT_BAND
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import lost_in_words, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import Variant, lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import CENTRE, Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
+from rov_fmu.io.numbers import significant
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -54,6 +55,8 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         of, words = listed(one.variant.of), dict[str, str]()
         if kind == "momentary commands":
             words = _lost(fit, one.variant.of)
+        elif kind == "idle commands":
+            of = listed(_until(fit, one.variant))
         elif kind in ("health", "reversed commands"):
             of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
         found = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
@@ -70,6 +73,13 @@ def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
     """Return along which axis most of the command is lost between the rows of some logs, in words."""
     most = max((one for one in fit.objective.logs if one.log.file in files), key=lambda one: max(one.lost.values()))
     return lost_in_words(most.lost, most.interval)
+
+
+def _until(fit: Fit, variant: Variant) -> Iterator[str]:
+    """Yield each file whose commands do not act at first, with the time since its first row."""
+    first = {one.log.file: float(one.record.told[0]) for one in fit.objective.logs}
+    for file, until in zip(variant.of, variant.until, strict=True):
+        yield f"{file} (until {significant(until - first[file], 2)} s)"
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

@@ -140,6 +140,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("reversed commands", quiet(structures=(Structure("reversed commands", "l", 0.97),)), "(probability 97%)", quiet()),
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
     (
+        "idle commands",
+        quiet(structures=(Structure("idle commands", "a.csv (until 6.0 s)", 1.0),)),
+        "a.csv (until 6.0 s): the commands do not act before, as if the thrusters were off",
+        quiet(),
+    ),
+    (
         "rotor lag",
         quiet(structures=(Structure("rotor lag", "", 0.98),)),
         "the speed of the rotors lags behind",

@@ -18,6 +18,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.hypotheses import (
     HYPOTHESES,
     Model,
+    Unknown,
     Variant,
     probability,
     structure,
@@ -142,7 +143,8 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     (one,), plain = model.logs, {p.key for p in model.table.parameters}
     for kind, hypothesis in HYPOTHESES.items():
         for of in hypothesis.variants(model.known, model.logs):
-            changed = model.applied(Variant(kind, of))
+            until = (one.record.told[-1],) * len(of) if kind == "idle commands" else ()
+            changed = model.applied(Variant(kind, of, until))
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert {p.key for p in changed.table.parameters} == plain
@@ -154,7 +156,7 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
                 continue
             assert added == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
             assert added or is_other
-    assert sum(one.probability for one in HYPOTHESES.values()) < 0.5
+    assert sum(one.probability for one in HYPOTHESES.values()) < 0.6
 
 
 def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
@@ -206,6 +208,33 @@ def test_momentary_commands_lose_what_changes_between_rows() -> None:
     assert beside_lines(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
     assert beside_lines(np.repeat(rng.standard_normal(400), 50)) < 0.03
     assert beside_lines(np.zeros(10)) == 0.0
+
+
+def off_until(start: float) -> Callable[[Commands], Commands]:
+    """Thrusters that are off until a time, s."""
+    return lambda u: {n: np.where(INTERVAL * np.arange(len(c)) < start, 0.0, c) for n, c in u.items()}
+
+
+@pytest.mark.parametrize("start", [0.0, 2.5, 7.4])
+@pytest.mark.parametrize("drag", [1.0, 2.0])
+def test_commands_are_idle_until_the_thrusters_are_on(start: float, drag: float, tmp_path: Path) -> None:
+    """Also a vehicle with the wrong drag tells it, and none whose commands are reversed for the whole log."""
+    logs = {"dive.csv": dive("videoray", Fault("", acting=off_until(start)), np.random.default_rng(3))}
+    tests = load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', logs))
+    model = Model(*begin(tests))
+    (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
+    variant = Variant("idle commands", of)
+    z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
+    found = Unknown(model, model.objective(), z).idle(variant)
+    assert found.of == (of if start else ())
+    for until in found.until:
+        assert until == pytest.approx(start, abs=0.35)
+        one = model.applied(found).logs[0].record
+        assert not one.inputs[one.told < until].any()
+        assert np.array_equal(one.inputs[one.told >= until], model.logs[0].record.inputs[one.told >= until])
+    (one,) = model.logs
+    against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
+    assert not Unknown(against, against.objective(), z).idle(variant).of
 
 
 @pytest.mark.parametrize(
