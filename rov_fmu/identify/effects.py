@@ -16,7 +16,6 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
-from rov_fmu.io.numbers import significant
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -56,7 +55,7 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         if kind == "momentary commands":
             words = _lost(fit, one.variant.of)
         elif kind == "idle commands":
-            of = listed(_until(fit, one.variant))
+            of = listed(_acting(fit, one.variant))
         elif kind in ("health", "reversed commands"):
             of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
         found = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
@@ -75,11 +74,12 @@ def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
     return lost_in_words(most.lost, most.interval)
 
 
-def _until(fit: Fit, variant: Variant) -> Iterator[str]:
-    """Yield each file whose commands do not act at first, with the time since its first row."""
-    first = {one.log.file: float(one.record.told[0]) for one in fit.objective.logs}
-    for file, until in zip(variant.of, variant.until, strict=True):
-        yield f"{file} (until {significant(until - first[file], 2)} s)"
+def _acting(fit: Fit, variant: Variant) -> Iterator[str]:
+    """Yield each file whose commands do not always act, with the times since its first row between which they do."""
+    told = {one.log.file: one.record.told for one in fit.objective.logs}
+    for file, (begin, end) in zip(variant.of, variant.acting, strict=True):
+        first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
+        yield f"{file} ({first} to {last} s)"
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

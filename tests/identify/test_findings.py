@@ -141,8 +141,8 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
     (
         "idle commands",
-        quiet(structures=(Structure("idle commands", "a.csv (until 6.0 s)", 1.0),)),
-        "a.csv (until 6.0 s): the commands do not act before, as if the thrusters were off",
+        quiet(structures=(Structure("idle commands", "a.csv (6.0 to 80.0 s)", 1.0),)),
+        "a.csv (6.0 to 80.0 s): the commands do not act before and after, as if the thrusters were off",
         quiet(),
     ),
     (

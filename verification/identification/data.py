@@ -204,8 +204,8 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     tests = load_tests(folders["training"])
     known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
-    until = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
-    _, unseen = Variant("idle commands", tuple(until), tuple(until.values())).applied(known, unseen)
+    begins = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
+    _, unseen = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values())).applied(known, unseen)
     training, test = ([_recording(known, log) for log in some] for some in (logs, unseen))
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}

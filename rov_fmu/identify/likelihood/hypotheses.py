@@ -87,8 +87,8 @@ class Variant:
     kind: str
     """Its key in HYPOTHESES, which is also the kind of its parameter."""
     of: Of
-    until: tuple[float, ...] = ()
-    """When the commands of each of the files begin to act, s."""
+    acting: tuple[tuple[float, float], ...] = ()
+    """When the commands of each of the files begin to act, and when they end, s."""
 
     @property
     def parameter(self) -> tuple[str, str]:
@@ -115,11 +115,12 @@ def _momentary(known: Beginning, logs: Logs, variant: Variant) -> tuple[Beginnin
 
 
 def _without_idle(known: Beginning, logs: Logs, variant: Variant) -> tuple[Beginning, Logs]:
-    """Return the logs without the commands that do not act yet."""
-    until = dict(zip(variant.of, variant.until, strict=True))
+    """Return the logs without the commands that do not act."""
+    times = dict(zip(variant.of, variant.acting, strict=True))
 
     def acting(one: SampledLog) -> SampledLog:
-        acts = one.record.told >= until.get(one.log.file, -inf)
+        begin, end = times.get(one.log.file, (-inf, inf))
+        acts = (one.record.told >= begin) & (one.record.told < end)
         return one.with_inputs(np.where(acts[:, None], one.record.inputs, 0.0))
 
     return known, [acting(one) for one in logs]
@@ -178,9 +179,9 @@ def _momentary_files(_: Beginning, logs: Logs) -> Iterator[Of]:
         yield tuple(files)
 
 
-def _beginning_with_commands(_: Beginning, logs: Logs) -> Iterator[Of]:
-    """Yield the files whose first row has a command."""
-    files = [one.log.file for one in logs if np.abs(one.record.inputs[:1]).max(initial=0.0) > LEAST_COMMAND]
+def _with_commands_at_ends(_: Beginning, logs: Logs) -> Iterator[Of]:
+    """Yield the files whose first or last row has a command."""
+    files = [one.log.file for one in logs if np.abs(one.record.inputs[[0, -1]]).max() > LEAST_COMMAND]
     if files:
         yield tuple(files)
 
@@ -257,11 +258,11 @@ HYPOTHESES = {
     ),
     "idle commands": Hypothesis(
         0.05,
-        _beginning_with_commands,
+        _with_commands_at_ends,
         _without_idle,
         sentence=(
-            "{of}: the commands do not act before, as if the thrusters were off{odds}. They count as 0 there. Let the "
-            "logs begin when the thrusters are on"
+            "{of}: the commands do not act before and after, as if the thrusters were off{odds}. They count as 0 "
+            "there. Record while the thrusters are on"
         ),
     ),
     "rotor lag": Hypothesis(
@@ -537,12 +538,13 @@ class Unknown:
         return found
 
     def idle(self, variant: Variant) -> Variant:
-        """Return until when the commands of some files do not act: the unknown force makes up for their thrust.
+        """Return when the commands of some files act: before and after, the unknown force makes up for their thrust.
 
-        With the thrust T and the unknown force r, it ends where the sum of r² - (r + T)² - T²/2 from the begin is
-        largest. A position tells r late, so that axes with measured velocities alone count where there are some.
+        With the thrust T and the unknown force r, the sum of r² - (r + T)² - T²/2 from the begin, and that from the
+        end, are largest there. A position tells r late, so that axes with measured velocities alone count where there
+        are some.
         """
-        until = {}
+        found = {}
         for n, one in enumerate(self.model.logs):
             if one.log.file not in variant.of:
                 continue
@@ -552,11 +554,19 @@ class Unknown:
             prompt = {m.sensor.axis for m in one.measured if m.sensor.is_velocity} or {*one.layout.bare_axes}
             scale[[form.axis not in prompt for form in one.layout.axes]] = inf
             r, T = force[at] / scale, self._thrust(one, one.record.inputs, time[at]) / scale
-            gain = _IDLE_STEP * np.cumsum(np.sum(r**2 - (r + T) ** 2 - _IDLE * T**2, axis=1))
-            end = int(np.argmax(gain))
-            if gain[end] > _IDLE * LEAST_COMMAND**2 and end < _LONGEST_IDLE * len(gain):
-                until[one.log.file] = float(time[at][end])
-        return replace(variant, of=tuple(until), until=tuple(until.values()))
+            gain = _IDLE_STEP * np.sum(r**2 - (r + T) ** 2 - _IDLE * T**2, axis=1)
+
+            def rows(gain: Array) -> int:
+                total = np.cumsum(gain)
+                most = int(np.argmax(total))
+                is_idle = total[most] > _IDLE * LEAST_COMMAND**2 and most < _LONGEST_IDLE * len(gain)
+                return most if is_idle else 0
+
+            first, last = rows(gain), rows(gain[::-1])
+            if first or last:
+                begin, end = time[at][first] if first else -inf, time[at][-1 - last] if last else inf
+                found[one.log.file] = float(begin), float(end)
+        return replace(variant, of=tuple(found), acting=tuple(found.values()))
 
     def explained(self, variant: Variant, start: float) -> float:
         """Return how much more probable the unknown force is with a hypothesis: the sum over all axes of N ln (r²/s²).

@@ -143,8 +143,8 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     (one,), plain = model.logs, {p.key for p in model.table.parameters}
     for kind, hypothesis in HYPOTHESES.items():
         for of in hypothesis.variants(model.known, model.logs):
-            until = (one.record.told[-1],) * len(of) if kind == "idle commands" else ()
-            changed = model.applied(Variant(kind, of, until))
+            acting = ((one.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
+            changed = model.applied(Variant(kind, of, acting))
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert {p.key for p in changed.table.parameters} == plain
@@ -210,28 +210,35 @@ def test_momentary_commands_lose_what_changes_between_rows() -> None:
     assert beside_lines(np.zeros(10)) == 0.0
 
 
-def off_until(start: float) -> Callable[[Commands], Commands]:
-    """Thrusters that are off until a time, s."""
-    return lambda u: {n: np.where(INTERVAL * np.arange(len(c)) < start, 0.0, c) for n, c in u.items()}
+def off_beside(start: float, end: float) -> Callable[[Commands], Commands]:
+    """Thrusters that are on between two times, s."""
+
+    def acting(u: Commands) -> Commands:
+        time = INTERVAL * np.arange(len(next(iter(u.values()))))
+        return {n: np.where((time >= start) & (time < end), c, 0.0) for n, c in u.items()}
+
+    return acting
 
 
-@pytest.mark.parametrize("start", [0.0, 2.5, 7.4])
+@pytest.mark.parametrize(("start", "end"), [(0.0, SECONDS), (2.5, SECONDS), (7.4, SECONDS), (0.0, 40.0), (4.0, 41.5)])
 @pytest.mark.parametrize("drag", [1.0, 2.0])
-def test_commands_are_idle_until_the_thrusters_are_on(start: float, drag: float, tmp_path: Path) -> None:
+def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, drag: float, tmp_path: Path) -> None:
     """Also a vehicle with the wrong drag tells it, and none whose commands are reversed for the whole log."""
-    logs = {"dive.csv": dive("videoray", Fault("", acting=off_until(start)), np.random.default_rng(3))}
+    logs = {"dive.csv": dive("videoray", Fault("", acting=off_beside(start, end)), np.random.default_rng(3))}
     tests = load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', logs))
     model = Model(*begin(tests))
     (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
     variant = Variant("idle commands", of)
     z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
     found = Unknown(model, model.objective(), z).idle(variant)
-    assert found.of == (of if start else ())
-    for until in found.until:
-        assert until == pytest.approx(start, abs=0.35)
-        one = model.applied(found).logs[0].record
-        assert not one.inputs[one.told < until].any()
-        assert np.array_equal(one.inputs[one.told >= until], model.logs[0].record.inputs[one.told >= until])
+    assert found.of == (of if start > 0.0 or end < SECONDS else ())
+    for begins, ends in found.acting:
+        assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
+        assert min(ends, SECONDS) == pytest.approx(end, abs=0.35)
+        one, whole = model.applied(found).logs[0].record, model.logs[0].record
+        acts = (one.told >= begins) & (one.told < ends)
+        assert not one.inputs[~acts].any()
+        assert np.array_equal(one.inputs[acts], whole.inputs[acts])
     (one,) = model.logs
     against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
     assert not Unknown(against, against.objective(), z).idle(variant).of
