@@ -36,7 +36,7 @@ _LEAST_GAIN = 0.03
 _LEAST_CURRENT = 0.02
 """The current of an unseen log is never known to better than this, m/s."""
 _STEPS = 0.3, 0.03, 0.003
-"""The steps of the derivatives of predictions, relative to standard errors: the first that leaves all motions finite."""
+"""The steps of the derivatives of predictions, relative to standard errors: the first to leave all motions finite."""
 _LOST = 1.8
 """The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
 

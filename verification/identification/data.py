@@ -205,8 +205,8 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
     begins = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
-    _, unseen = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values())).applied(known, unseen)
-    training, test = ([_recording(known, log) for log in some] for some in (logs, unseen))
+    off = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values()))
+    training, test = ([_recording(known, log) for log in some] for some in (logs, off.applied(known, unseen)[1]))
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)

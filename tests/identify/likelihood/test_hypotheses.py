@@ -235,10 +235,10 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
     for begins, ends in found.acting:
         assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
         assert min(ends, SECONDS) == pytest.approx(end, abs=0.35)
-        one, whole = model.applied(found).logs[0].record, model.logs[0].record
-        acts = (one.told >= begins) & (one.told < ends)
-        assert not one.inputs[~acts].any()
-        assert np.array_equal(one.inputs[acts], whole.inputs[acts])
+        changed, whole = model.applied(found).logs[0].record, model.logs[0].record
+        acts = (whole.told >= begins) & (whole.told < ends)
+        assert not changed.inputs[~acts].any()
+        assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
     (one,) = model.logs
     against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
     assert not Unknown(against, against.objective(), z).idle(variant).of
