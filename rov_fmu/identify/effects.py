@@ -7,7 +7,7 @@ from math import inf, pi
 import numpy as np
 
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import lost_in_words, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import Variant, lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
@@ -44,6 +44,8 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         of, words = listed(one.variant.of), dict[str, str]()
         if kind == "momentary commands":
             words = _lost(fit, one.variant.of)
+        elif kind == "idle commands":
+            of = listed(_acting(fit, one.variant))
         elif kind in ("health", "reversed commands"):
             of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
         structure = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
@@ -60,6 +62,14 @@ def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
     """Return along which axis most of the command is lost between the rows of some logs, in words."""
     most = max((one for one in fit.objective.logs if one.log.file in files), key=lambda one: max(one.lost.values()))
     return lost_in_words(most.lost, most.interval)
+
+
+def _acting(fit: Fit, variant: Variant) -> Iterator[str]:
+    """Yield each file whose commands do not always act, with the times since its first row between which they do."""
+    told = {one.log.file: one.record.told for one in fit.objective.logs}
+    for file, (begin, end) in zip(variant.of, variant.acting, strict=True):
+        first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
+        yield f"{file} ({first} to {last} s)"
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

@@ -35,6 +35,8 @@ _LEAST_GAIN = 0.03
 """Thrust is never predicted to better than 3 %: batteries and water differ from day to day."""
 _LEAST_CURRENT = 0.02
 """The current of an unseen log is never known to better than this, m/s."""
+_STEPS = 0.3, 0.03, 0.003
+"""The steps of the derivatives of predictions, relative to standard errors: the first to leave all motions finite."""
 _LOST = 1.8
 """The largest standard deviation of a heading, rad: that of a direction about which nothing is known."""
 
@@ -236,9 +238,15 @@ def ahead(
     run = objective.run(z, number, begin=begin, span=span)
     parameters = enumerate(objective.table.parameters)
     places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
-    steps = 0.3 * np.sqrt(np.maximum(np.diag(covariance)[places], 0.0)) + 1e-9
+    errors = np.sqrt(np.maximum(np.diag(covariance)[places], 0.0))
     slopes = np.zeros((len(run.innovations), len(z)))
-    slopes[:, places] = objective.changes(z, number, places, steps, run, begin, span)
+    for share in _STEPS:
+        try:
+            slopes[:, places] = objective.changes(z, number, places, share * errors + 1e-9, run, begin, span)
+            break
+        except DivergedError:
+            if share is _STEPS[-1]:
+                raise
     deviations = np.sqrt(run.variances + variances_of(slopes, covariance))
     wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
     lost = wraps[objective.records[number].sensor]

@@ -139,6 +139,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ("reversed commands", quiet(structures=(Structure("reversed commands", "l", 0.97),)), "(probability 97%)", quiet()),
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
     (
+        "idle commands",
+        quiet(structures=(Structure("idle commands", "a.csv (6.0 to 80.0 s)", 1.0),)),
+        "a.csv (6.0 to 80.0 s): the commands do not act before and after, as if the thrusters were off",
+        quiet(),
+    ),
+    (
         "rotor lag",
         quiet(structures=(Structure("rotor lag", "", 0.98),)),
         "the speed of the rotors lags behind",

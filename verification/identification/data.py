@@ -16,6 +16,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests
+from rov_fmu.identify.likelihood.hypotheses import Variant
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded
@@ -49,6 +50,10 @@ class DataSet(Protocol):
     def truth(self) -> Truth:
         """The true coefficients, where they are known."""
 
+    @property
+    def idle(self) -> Mapping[str, float]:
+        """How long no command acts in some test recordings, s after the first row of commands."""
+
     def write(self, part: str, data: Path | None, folder: Path) -> None:
         """Write rov.toml and the recordings of a part (training or test) to a folder. Raises DataFileError."""
 
@@ -67,6 +72,7 @@ class Recorded:
     tables: Mapping[str, str] = field(default_factory=dict)
     """The texts of tables of tank tests by file."""
     truth: Truth = field(default_factory=dict)
+    idle: Mapping[str, float] = field(default_factory=dict)
 
     def of_part(self, part: str) -> list[str]:
         """Return the names of the recordings of a part: every third one is for the test."""
@@ -100,7 +106,7 @@ def published(folder: Path) -> Recorded:
     told = read_toml(folder / "recordings.toml", DataFileError)
     rov = (folder / ROV_FILE).read_text(encoding="utf-8")
     tables = {path.name: path.read_text(encoding="utf-8") for path in sorted(folder.glob("*.csv"))}
-    return Recorded(folder.name, told["origin"], rov, told["recordings"], tables)
+    return Recorded(folder.name, told["origin"], rov, told["recordings"], tables, idle=told.get("idle", {}))
 
 
 # ---- Recordings ------------------------------------------------------------------------------------------------------
@@ -198,7 +204,9 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     tests = load_tests(folders["training"])
     known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
-    training, test = ([_recording(known, log) for log in some] for some in (logs, unseen))
+    begins = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
+    off = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values()))
+    training, test = ([_recording(known, log) for log in some] for some in (logs, off.applied(known, unseen)[1]))
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)

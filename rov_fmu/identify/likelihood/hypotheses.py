@@ -35,6 +35,8 @@ SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted."""
+_FAR = 100.0
+"""How much less 2 ln of the evidence of thinned logs may be for a hypothesis that they hardly tell."""
 _STEP = 0.5
 """The time between two values of the unknown force, s."""
 _SHARES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
@@ -45,10 +47,13 @@ _MOST = 3
 """The most hypotheses that may hold at once."""
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
+_IDLE_STEP, _IDLE, _LONGEST_IDLE = 0.1, 0.5, 0.5
+"""Commands may not act yet where the unknown force, at steps of the first number, s, makes up for their thrust but for
+the second share of its square, and until the third share of a log."""
 
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
-Change = Callable[[Prior, Logs, Of], tuple[Prior, Logs]]
+Change = Callable[[Prior, Logs, "Variant"], tuple[Prior, Logs]]
 Search = Callable[[Objective, Mapping[int, float]], Minimum]
 """A function that minimises J of thinned logs from a start in which some parameters, by their places, have numbers."""
 
@@ -83,6 +88,8 @@ class Variant:
     kind: str
     """Its key in HYPOTHESES, which is also the kind of its parameter."""
     of: Of
+    acting: tuple[tuple[float, float], ...] = ()
+    """When the commands of each of the files begin to act, and when they end, s."""
 
     @property
     def parameter(self) -> tuple[str, str]:
@@ -91,32 +98,44 @@ class Variant:
 
     def applied(self, known: Prior, logs: Logs) -> tuple[Prior, Logs]:
         """Return what is known before the fit, and the logs, if this is so."""
-        return HYPOTHESES[self.kind].change(known, logs, self.of)
+        return HYPOTHESES[self.kind].change(known, logs, self)
 
 
 # ---- The changes -----------------------------------------------------------------------------------------------------
 
 
 def _with_parameter(kind: str) -> Change:
-    def change(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
-        return replace(known, assumed=(*known.assumed, (kind, of[0] if of else ""))), logs
+    def change(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+        return replace(known, assumed=(*known.assumed, (kind, variant.parameter[1]))), logs
 
     return change
 
 
-def _momentary(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
-    return known, [replace(one, is_momentary=one.is_momentary or one.log.file in of) for one in logs]
+def _momentary(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+    return known, [replace(one, is_momentary=one.is_momentary or one.log.file in variant.of) for one in logs]
+
+
+def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+    """Return the logs without the commands that do not act."""
+    times = dict(zip(variant.of, variant.acting, strict=True))
+
+    def acting(one: SampledLog) -> SampledLog:
+        begin, end = times.get(one.log.file, (-inf, inf))
+        acts = (one.record.told >= begin) & (one.record.told < end)
+        return one.with_inputs(np.where(acts[:, None], one.record.inputs, 0.0))
+
+    return known, [acting(one) for one in logs]
 
 
 def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
     """Return the change of the commands of some thrusters to those of others, with a sign."""
 
-    def change(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
-        others, sign = places(of)
+    def change(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+        others, sign = places(variant.of)
         found = []
         for one in logs:
             inputs, names = one.record.inputs.copy(), [*one.layout.inputs]
-            for thruster, other in zip(of, others, strict=True):
+            for thruster, other in zip(variant.of, others, strict=True):
                 if {f"u_{thruster}", f"u_{other}"} <= {*names}:
                     inputs[:, names.index(f"u_{thruster}")] = sign * one.record.inputs[:, names.index(f"u_{other}")]
             found.append(one.with_inputs(inputs))
@@ -125,7 +144,7 @@ def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
     return change
 
 
-def _with_rotors(known: Prior, logs: Logs, _: Of) -> tuple[Prior, Logs]:
+def _with_rotors(known: Prior, logs: Logs, _: Variant) -> tuple[Prior, Logs]:
     def lagging(layout: Layout) -> Layout:
         return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
 
@@ -135,8 +154,8 @@ def _with_rotors(known: Prior, logs: Logs, _: Of) -> tuple[Prior, Logs]:
     )
 
 
-def _slewing(known: Prior, logs: Logs, of: Of) -> tuple[Prior, Logs]:
-    known, logs = _with_parameter("slew limit")(known, logs, of)
+def _slewing(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+    known, logs = _with_parameter("slew limit")(known, logs, variant)
     return known, [one if one.log.follows_axis else one.refined(_FINEST) for one in logs]
 
 
@@ -157,6 +176,13 @@ def commands_of(one: SampledLog) -> dict[str, Array]:
 def _momentary_files(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield the files with momentary commands."""
     files = [one.log.file for one in logs if one.lost and not one.is_momentary]
+    if files:
+        yield tuple(files)
+
+
+def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield the files whose first or last row has a command."""
+    files = [one.log.file for one in logs if np.abs(one.record.inputs[[0, -1]]).max() > LEAST_COMMAND]
     if files:
         yield tuple(files)
 
@@ -231,6 +257,15 @@ HYPOTHESES = {
         ),
         changes_thrust=False,
     ),
+    "idle commands": Hypothesis(
+        0.05,
+        _with_commands_at_ends,
+        _without_idle,
+        sentence=(
+            "{of}: the commands do not act before and after, as if the thrusters were off{odds}. They count as 0 "
+            "there. Record while the thrusters are on"
+        ),
+    ),
     "rotor lag": Hypothesis(
         0.07,
         _lagging,
@@ -245,8 +280,8 @@ HYPOTHESES = {
     "health": Hypothesis(
         0.1,
         _thrusters,
-        lambda known, logs, of: _with_parameter("health")(
-            replace(known, exact=known.exact - {known.layout.health[of[0]]}), logs, of
+        lambda known, logs, variant: _with_parameter("health")(
+            replace(known, exact=known.exact - {known.layout.health[variant.of[0]]}), logs, variant
         ),
         (0.0,),
         "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
@@ -439,8 +474,17 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
         if (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
         for of in hypothesis.variants(model.known, model.logs)
     }
+    unknown = (
+        Unknown(model, now.objective, now.minimum.z)
+        if any(HYPOTHESES[one.kind].changes_thrust for one in variants)
+        else None
+    )
+    if unknown:
+        timed = [
+            (unknown.idle(one) if one.kind == "idle commands" else one, starts) for one, starts in variants.items()
+        ]
+        variants = {one: starts for one, starts in timed if one.kind != "idle commands" or one.of}
     ranked = {one: starts for one, starts in variants.items() if HYPOTHESES[one.kind].changes_thrust}
-    unknown = _Unknown(now) if ranked else None
     gains = {
         (one, start): unknown.explained(one, start) for one, starts in ranked.items() for start in starts if unknown
     }
@@ -454,32 +498,33 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
             fits.append((one, objective, search(objective, {} if own is None else {own: best[one]})))
     most = max((_evidence(objective, end) for _, objective, end in fits), default=-inf)
     for one, objective, end in fits:
-        if one not in ranked or _evidence(objective, end) > most - WINS:
+        if _evidence(objective, end) > most - (WINS if one in ranked else _FAR):
             yield one, end
 
 
-class _Unknown:
+class Unknown:
     """The unknown force along each axis, and how much of it a change of the commands explains."""
 
-    def __init__(self, now: Explained) -> None:
-        objective, z = now.objective, now.minimum.z.copy()
-        self.model, table = now.model, objective.table
+    def __init__(self, model: Model, objective: Objective, best: Array) -> None:
+        self.model, table, z = model, objective.table, best.copy()
         for n, p in enumerate(table.parameters):
             if p.kind == "slow force":
                 z[n] = p.high
             elif p.is_slow_size:
                 z[n] = p.low
-        self.vehicle, _ = table.model(now.minimum.z)
+        self.vehicle, _ = table.model(best)
         self.scale = {axis.name: float(table.force_unit(z, axis)) for axis in table.layout.bare_axes}
-        self.time, self.force = [], []
-        for n, one in enumerate(now.model.logs):
+        self.time, self.force, self.all = [], [], []
+        for n, one in enumerate(model.logs):
             first, record = objective.filters[n].force, objective.records[n]
             at = first_in_each(record.time, 1.0 / _STEP)
             run = objective.run(z, n, with_states=True)
+            force = run.states[:, first : first + len(one.layout.axes)]
+            self.all.append((record.time, force))
             self.time.append(record.time[at])
-            self.force.append(run.states[at, first : first + len(one.layout.axes)])
+            self.force.append(force[at])
         self.before = [
-            self._thrust(one, one.record.inputs, time) for one, time in zip(now.model.logs, self.time, strict=True)
+            self._thrust(one, one.record.inputs, time) for one, time in zip(model.logs, self.time, strict=True)
         ]
 
     def _thrust(self, one: SampledLog, inputs: Array, time: Array) -> Array:
@@ -492,6 +537,37 @@ class _Unknown:
             effects = [self.vehicle.effect(t, form.axis) for form in one.layout.axes]
             found += self.vehicle[one.layout.health[t.name]] * np.outer(forces, effects)
         return found
+
+    def idle(self, variant: Variant) -> Variant:
+        """Return when the commands of some files act: before and after, the unknown force makes up for their thrust.
+
+        With the thrust T and the unknown force r, the sum of r² - (r + T)² - T²/2 from the begin, and that from the
+        end, are largest there. A position tells r late, so that axes with measured velocities alone count where there
+        are some.
+        """
+        found = {}
+        for n, one in enumerate(self.model.logs):
+            if one.log.file not in variant.of:
+                continue
+            scale = np.array([self.scale[form.axis.name] for form in one.layout.axes])
+            time, force = self.all[n]
+            at = first_in_each(time, 1.0 / _IDLE_STEP)
+            prompt = {m.sensor.axis for m in one.measured if m.sensor.is_velocity} or {*one.layout.bare_axes}
+            scale[[form.axis not in prompt for form in one.layout.axes]] = inf
+            r, T = force[at] / scale, self._thrust(one, one.record.inputs, time[at]) / scale
+            gain = _IDLE_STEP * np.sum(r**2 - (r + T) ** 2 - _IDLE * T**2, axis=1)
+
+            def rows(gain: Array) -> int:
+                total = np.cumsum(gain)
+                most = int(np.argmax(total))
+                is_idle = total[most] > _IDLE * LEAST_COMMAND**2 and most < _LONGEST_IDLE * len(gain)
+                return most if is_idle else 0
+
+            first, last = rows(gain), rows(gain[::-1])
+            if first or last:
+                begin, end = time[at][first] if first else -inf, time[at][-1 - last] if last else inf
+                found[one.log.file] = float(begin), float(end)
+        return replace(variant, of=tuple(found), acting=tuple(found.values()))
 
     def explained(self, variant: Variant, start: float) -> float:
         """Return how much more probable the unknown force is with a hypothesis: the sum over all axes of N ln (r²/s²).

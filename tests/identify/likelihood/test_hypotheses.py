@@ -18,6 +18,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.hypotheses import (
     HYPOTHESES,
     Model,
+    Unknown,
     Variant,
     probability,
     structure,
@@ -142,7 +143,8 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     (one,), plain = model.logs, {p.key for p in model.table.parameters}
     for kind, hypothesis in HYPOTHESES.items():
         for of in hypothesis.variants(model.known, model.logs):
-            changed = model.applied(Variant(kind, of))
+            acting = ((one.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
+            changed = model.applied(Variant(kind, of, acting))
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert {p.key for p in changed.table.parameters} == plain
@@ -154,7 +156,7 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
                 continue
             assert added == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
             assert added or is_other
-    assert sum(one.probability for one in HYPOTHESES.values()) < 0.5
+    assert sum(one.probability for one in HYPOTHESES.values()) < 0.6
 
 
 def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
@@ -206,6 +208,40 @@ def test_momentary_commands_lose_what_changes_between_rows() -> None:
     assert beside_lines(rng.standard_normal(20000)) == pytest.approx(0.5, abs=0.02)
     assert beside_lines(np.repeat(rng.standard_normal(400), 50)) < 0.03
     assert beside_lines(np.zeros(10)) == 0.0
+
+
+def off_beside(start: float, end: float) -> Callable[[Commands], Commands]:
+    """Thrusters that are on between two times, s."""
+
+    def acting(u: Commands) -> Commands:
+        time = INTERVAL * np.arange(len(next(iter(u.values()))))
+        return {n: np.where((time >= start) & (time < end), c, 0.0) for n, c in u.items()}
+
+    return acting
+
+
+@pytest.mark.parametrize(("start", "end"), [(0.0, SECONDS), (2.5, SECONDS), (7.4, SECONDS), (0.0, 40.0), (4.0, 41.5)])
+@pytest.mark.parametrize("drag", [1.0, 2.0])
+def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, drag: float, tmp_path: Path) -> None:
+    """Also a vehicle with the wrong drag tells it, and none whose commands are reversed for the whole log."""
+    logs = {"dive.csv": dive("videoray", Fault("", acting=off_beside(start, end)), np.random.default_rng(3))}
+    tests = load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', logs))
+    model = Model(*begin(tests))
+    (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
+    variant = Variant("idle commands", of)
+    z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
+    found = Unknown(model, model.objective(), z).idle(variant)
+    assert found.of == (of if start > 0.0 or end < SECONDS else ())
+    for begins, ends in found.acting:
+        assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
+        assert min(ends, SECONDS) == pytest.approx(end, abs=0.35)
+        changed, whole = model.applied(found).logs[0].record, model.logs[0].record
+        acts = (whole.told >= begins) & (whole.told < ends)
+        assert not changed.inputs[~acts].any()
+        assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
+    (one,) = model.logs
+    against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
+    assert not Unknown(against, against.objective(), z).idle(variant).of
 
 
 @pytest.mark.parametrize(

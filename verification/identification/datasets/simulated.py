@@ -52,6 +52,7 @@ class Simulated:
     """How late the heading is, s."""
     base: str = "bluerov2_heavy"
     changed: Mapping[str, float] = field(default_factory=lambda: {"z_B": -0.05, "T_t200": 0.12})
+    idle: Mapping[str, float] = field(default_factory=dict[str, float])
     known: str = 'z_B = { value = -0.05, unit = "m", source = "measured" }\n[fit]\nlag = true'
     axes: tuple[Axis, ...] = tuple(AXES.values())
     count: int = 6
