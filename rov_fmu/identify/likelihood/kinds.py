@@ -211,10 +211,16 @@ KINDS = {
         0.1,
     ),
     "short force": Kind(
-        Prior("short_force", 2.5, "ln of the force that momentary commands lack", "seen in the changes between rows"),
+        Prior(
+            "short_force",
+            1.0,
+            "ln of the force that momentary commands lack",
+            "a quarter of the second differences between rows",
+        ),
         is_log=True,
         of_motion=False,
-        low=log(1e-6),
+        mean=log(0.25),
+        low=log(1e-3),
     ),
     "slow gain": _slow(
         Prior(
