@@ -84,6 +84,8 @@ typedef struct {
     const int *active;           /* for each state, whether it has a covariance; N_X numbers */
     ptrdiff_t tilts;             /* the times at which the roll and pitch of a vehicle that has neither state are known, or 0 */
     const double *tilt_time, *roll, *pitch;
+    const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
+                             not NULL, commands change along straight lines, and no change has a time of its own */
     double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
     double share;                /* the longest step relative to the fastest time constant */
 } record;
@@ -465,11 +467,11 @@ static real happened(const filter *f, ptrdiff_t row, double t)
     return since <= 0.0 ? 0.0 : within;
 }
 
-/* Return the standard deviation of the time since a change, which is uniformly distributed over a window. */
+/* Return the standard deviation of the time since a change, which is uniformly distributed over a window; 0 if there is a line. */
 static real spread(const filter *f, ptrdiff_t row, double t)
 {
     const real width = window(f, row), since = fmin(fmax(t - begins(f, row), 0.0), width);
-    return width > 0.0 ? since * sqrt(fmax(since / width * (1.0 / 3.0 - 0.25 * since / width), 0.0)) : 0.0;
+    return width > 0.0 && !f->log->beside ? since * sqrt(fmax(since / width * (1.0 / 3.0 - 0.25 * since / width), 0.0)) : 0.0;
 }
 
 /* Return what a row commands. The struct has numbers alone. */
@@ -740,21 +742,29 @@ static void step_delays(const filter *f, const sparse *phi, const real late[FORC
     }
 }
 
-/* Return the variance that a slow process gains. */
-static real gained(const filter *f, int slow, const real remains[N_SLOW])
+/* Return the size of a slow process, which after some rows is larger than after others if it is a short force. */
+static real size_of(const filter *f, int slow, ptrdiff_t row)
 {
-    return (1.0 - remains[slow] * remains[slow]) * f->set->size[slow] * f->set->size[slow];
+    const int axis = slow - (SHORT - FORCE);
+    return f->set->size[slow] * (axis >= 0 && axis < N_AXES && f->log->beside ? f->log->beside[row * N_AXES + axis] : 1.0);
+}
+
+/* Return the variance that a slow process gains after a row. */
+static real gained(const filter *f, int slow, const real remains[N_SLOW], ptrdiff_t row)
+{
+    const real size = size_of(f, slow, row);
+    return (1.0 - remains[slow] * remains[slow]) * size * size;
 }
 
 /* Move the covariance over a few steps, with the changes by the lateness. */
-static void step_covariance(const filter *f, real P[N_X][ROW], int steps, const delays *d, real remains[N_SLOW])
+static void step_covariance(const filter *f, real P[N_X][ROW], int steps, const delays *d, real remains[N_SLOW], ptrdiff_t row)
 {
     const sparse *const phi = transition_over(f, steps, remains);
     const double early = 0.5 * (steps - 1) / steps; /* what a slow process gains in a step acts in those after it: the mean share */
     const int n = f->count, last = n - 1, moving = count_before(f, FORCE);
     real(*const moved)[ROW] = f->m->moved;
     for (int a = moving; a < last; a++) {
-        P[a][a] += early * gained(f, f->listed[a] - FORCE, remains);
+        P[a][a] += early * gained(f, f->listed[a] - FORCE, remains, row);
     }
     multiply(phi, moving, P, n, moved);
     for (int a = 0; a < moving; a++) {
@@ -791,8 +801,8 @@ static void step_covariance(const filter *f, real P[N_X][ROW], int steps, const 
             P[a][b] = P[b][a] = flushed(remains[slow] * remains[f->listed[b] - FORCE] * P[a][b]);
         }
         P[a][last] = P[last][a] = flushed(remains[slow] * P[a][last]);
-        const real before = P[a][a] - early * gained(f, slow, remains);
-        P[a][a] = remains[slow] * remains[slow] * before + gained(f, slow, remains);
+        const real gain = gained(f, slow, remains, row);
+        P[a][a] = remains[slow] * remains[slow] * (P[a][a] - early * gain) + gain;
     }
     for (int k = 1; k < d->count; k++) { /* what began anew is not correlated with anything that it did not change */
         for (int b = 0; b <= last; b++) {
@@ -874,7 +884,7 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         step_delays(f, &m->once, late, &d);
         if (piece % TOGETHER == TOGETHER - 1 || piece == pieces - 1) {
             memcpy(remains, once, sizeof remains);
-            step_covariance(f, b->P, 1 + piece % TOGETHER, &d, remains);
+            step_covariance(f, b->P, 1 + piece % TOGETHER, &d, remains, row);
         }
     }
 }
@@ -1045,7 +1055,7 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
         f->now.x[i] = log->start[i];
         if (log->active[i]) {
             real *const variance = &f->now.P[f->count][f->count];
-            *variance = i >= FORCE && i < LATENESS ? f->set->size[i - FORCE] : log->error[i];
+            *variance = i >= FORCE && i < LATENESS ? size_of(f, i - FORCE, 0) : log->error[i];
             *variance *= *variance;
             f->listed[f->count++] = i;
         }

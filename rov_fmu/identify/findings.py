@@ -96,9 +96,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "thrust, directions and positions, and the units of the logs"
         ),
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
-        "structure": (
-            "the model lacks something along {axes}: its predictions over 10 s are {ratio} times the sensor's noise"
-        ),
+        "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
         "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",

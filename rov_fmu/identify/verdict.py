@@ -51,7 +51,7 @@ class Evidence:
     misfits: Sequence[str] = ()
     """The logs whose motors are not the thrusters along the axis."""
     structure: float = 0.0
-    """The error over 10 s of predictions by the fit to all data, relative to the noise of the sensor."""
+    """The error R of the fit to all data, relative to what noise explains (`hypotheses.structure`)."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
     is_assumed: bool = False
@@ -193,11 +193,11 @@ RULES = (
         unit="1",
     ),
     Rule(
-        "errors over 10 s of the fit to all data, relative to σ",
+        "errors R of the fit to all data",
         lambda e: e.structure,
         USUAL,
         None,
-        "Predictions over 10 s are off by {size} times the noise of the sensor, so the model lacks something.",
+        "The model's errors are {size} times what noise explains, so it lacks something.",
         unit="1",
     ),
     Rule(

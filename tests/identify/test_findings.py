@@ -126,7 +126,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "structure",
         surge(structure=5.0),
-        "lacks something along surge: its predictions over 10 s are 5.0 times the",
+        "lacks something along surge: its errors are 5.0 times what noise explains",
         quiet(),
     ),
     (

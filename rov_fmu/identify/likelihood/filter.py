@@ -70,6 +70,9 @@ class Record:
     """The standard deviations of all states of the vehicle that the sensors concern."""
     tilt: Array = field(default_factory=lambda: np.zeros((3, 0)))
     """3 x k: times (s), and the measured roll and pitch (rad) of a vehicle that has neither axis; k = 0 or k >= 2."""
+    beside: Array | None = None
+    """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
+    change along straight lines from row to row."""
 
 
 @dataclass(frozen=True)
@@ -144,7 +147,7 @@ class _Record(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
         ("tilts", ctypes.c_ssize_t),
-        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch")),
+        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
         *((name, ctypes.c_double) for name in ("longest", "changing", "share")),
     ]
 
@@ -337,8 +340,11 @@ class Filter:
         ]
         sizes = len(record.time), len(record.told), len(record.sensors)
         tilt = [np.ascontiguousarray(row) for row in record.tilt - np.array([[first], [0.0], [0.0]])]
+        beside = None if record.beside is None else np.ascontiguousarray(record.beside)
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
-        return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], *self._steps), [*arrays, *tilt]
+        lines = None if beside is None else beside.ctypes.data
+        kept: list[object] = [*arrays, *tilt, beside]
+        return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], lines, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
         """Return the kind and the place of a sensor, as filter.c wants them."""

@@ -11,7 +11,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, structure, with_shared
+from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, lateness, structure, with_shared
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -60,7 +60,7 @@ class Fit:
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
     structure: Mapping[Axis, float] = field(default_factory=dict)
-    """The error of predictions over 10 s along each axis or one that shares thrusters, relative to the noise."""
+    """The error R along each axis or one that shares thrusters, relative to what noise explains."""
 
     @property
     def posteriors(self) -> tuple[Posterior, Posterior]:
@@ -164,14 +164,14 @@ def fit_all(
         file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
         show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
         least = minimise(file, best.z, show, near=best.data, enough=_QUICK)
-    errors = with_shared(known.layout, structure(full, best))
+    errors, late = with_shared(known.layout, structure(full, best)), lateness(full, best.z)
     of_file = without_weak_effects(file, least)
     return Fit(
         known,
         full,
         best,
-        posterior.widened(errors),
-        replace(of_file, posterior=of_file.posterior.widened(errors)),
+        posterior.widened(errors, late),
+        replace(of_file, posterior=of_file.posterior.widened(errors, late)),
         float(difference),
         best_model.adopted,
         best_model.rivals,

@@ -45,6 +45,9 @@ _SMALL = 1e-3
 """An unknown force, relative to full thrust, that explains itself."""
 _MOST = 3
 """The most hypotheses that may hold at once."""
+_LATE, _HALF = 0.05, 0.5
+"""How much earlier or later momentary commands act along an axis, relative to the time between two rows (standard
+error), and the command whose time constant this changes."""
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
 _IDLE_STEP, _IDLE, _LONGEST_IDLE = 0.1, 0.5, 0.5
@@ -112,7 +115,8 @@ def _with_parameter(kind: str) -> Change:
 
 
 def _momentary(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-    return known, [replace(one, is_momentary=one.is_momentary or one.log.file in variant.of) for one in logs]
+    of = variant.of
+    return known, [one.with_lines(known.coefficients, known.full) if one.log.file in of else one for one in logs]
 
 
 def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
@@ -374,6 +378,24 @@ def _without_slow_noise(table: Table, z: Array, one: SampledLog, least: Sequence
         elif p.kind == "white noise" and p.of in noise:
             quiet[n] = max(z[n], log(noise[p.of]))
     return quiet
+
+
+def lateness(objective: Objective, z: Array) -> dict[str, float]:
+    """Return the standard error of the inertia of each axis by the time at which momentary commands act, relatively.
+
+    A line between two rows tells when a command changes to some hundredths of the time between them, and along each
+    axis in its own way: a stick moves it otherwise than a controller. The axis answers so much earlier or later, which
+    is the more of its time constant the faster it is.
+    """
+    late = _LATE * max((one.interval for one in objective.logs if one.is_momentary), default=0.0)
+    if not late:
+        return {}
+    vehicle, shapes = objective.table.model(z)
+    times = {
+        axis.name: float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
+        for axis in vehicle.layout.bare_axes
+    }
+    return {name: late / time for name, time in times.items() if 0.0 < time < inf}
 
 
 def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:

@@ -319,12 +319,16 @@ KINDS = {
     ),
     "short force": Kind(
         Deviation(
-            "short_force", 2.5, "ln of the force that momentary commands lack", "seen in the changes between rows"
+            "short_force",
+            1.0,
+            "ln of the force that momentary commands lack",
+            "a quarter of the second differences between rows",
         ),
         is_size=True,
         is_log=True,
         of_motion=False,
-        low=log(1e-6),
+        mean=log(0.25),
+        low=log(1e-3),
     ),
     "slow gain": _slow(
         Deviation(

@@ -21,8 +21,6 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUIETER = 2.0
 """The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
-_LEAST_SHORT = 1e-3
-"""The least force between momentary commands, relative to full thrust."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
 CURRENT = ("to the north", "to the east")
@@ -445,10 +443,8 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield from make("slow force", axis.name)
-            momentary = [one for one in logs if one.is_momentary and axis.name in one.layout.by_name]
-            if momentary:
-                size = max(one.between_rows(known.coefficients, axis) for one in momentary) / known.full[axis.name]
-                yield from make("short force", axis.name, mean=log(max(size, _LEAST_SHORT)))
+            if any(one.is_momentary and axis.name in one.layout.by_name for one in logs):
+                yield from make("short force", axis.name)
     if logs and not known.layout.fins:
         yield from make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):

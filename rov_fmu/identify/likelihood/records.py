@@ -47,6 +47,8 @@ LEAST_COMMAND = 0.05
 _CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
 """Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
 them has another command, and if more than the third share of a command is lost between them."""
+_LEAST_BESIDE = 1e-3
+"""The least second difference of the thrust that counts, relative to full thrust."""
 _LEAST_PUSH = 0.02
 """The smallest change of thrust that tests an axis, as a share of full thrust. Smaller changes are due to a heading or
 depth controller, or to rounded pulses."""
@@ -98,6 +100,8 @@ class SampledLog:
         later = told[rows] + parts * np.append(np.diff(told), 0.0)[rows]
         earlier = np.where(parts > 0.0, later, since[rows])
         made = {"told": later, "since": earlier, "inputs": self.record.inputs[rows]}
+        if self.record.beside is not None:
+            made["beside"] = self.record.beside[rows]
         return replace(self, record=replace(self.record, **made), thinned=replace(self.thinned, **made))
 
     @property
@@ -122,15 +126,20 @@ class SampledLog:
         forces = (vehicle.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
         return np.array([vehicle.along(axis, F) for F in forces])
 
-    def between_rows(self, coefficients: Mapping[str, float], axis: Axis) -> float:
-        """Return the usual size of the thrust along an axis that lines between momentary commands lack, N or N m.
+    def with_lines(self, coefficients: Mapping[str, float], full: Mapping[str, float]) -> "SampledLog":
+        """Return the log with momentary commands, and with how much lines between them may lack along each axis.
 
-        Second differences have 1.5 times the variance of what changes from row to row, and lines lack 5/3 of it: what
-        the rows have of it, and what passes between them. Few large steps do not count.
+        This is the RMS second difference of the thrust at both ends of a line, relative to full thrust. A line lacks an
+        eighth of it in its middle where the thrust is smooth, and up to a half where it jumps between the rows.
         """
-        thrust = self.thrust(coefficients, axis, self.record.inputs)
-        beside = thrust[1:-1] - 0.5 * (thrust[2:] + thrust[:-2])
-        return float(np.sqrt(5.0 / 3.0 / 1.5) * 1.4826 * np.median(np.abs(beside)))
+        found = []
+        for form in self.layout.axes:
+            thrust = self.thrust(coefficients, form.axis, self.record.inputs) / (full.get(form.axis.name) or 1.0)
+            ends = np.pad(np.diff(thrust, 2), 1, mode="edge") if len(thrust) > 2 else np.zeros(len(thrust))
+            after = np.append(ends[1:], 0.0)
+            found.append(np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2))
+        record, thinned = (replace(some, beside=np.array(found).T) for some in (self.record, self.thinned))
+        return replace(self, is_momentary=True, record=record, thinned=thinned)
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

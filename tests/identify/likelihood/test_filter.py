@@ -525,6 +525,29 @@ def test_a_switch_at_an_unknown_time_has_the_moments_of_a_uniform_time(t: float)
         assert variance == pytest.approx(h**2 / 12.0, rel=1e-3)
 
 
+def test_lines_between_rows_lack_as_much_as_each_row_says() -> None:
+    """Short forces of twice the size are those of twice the share, and a row says nothing of the rows before it.
+
+    A change along a line has no time of its own, which would add to the variance.
+    """
+    samples = [(0.05 * n, 0) for n in range(1, 101)]
+    log = replace(record([VELOCITY], samples), told=SWITCHES, since=SWITCHES - 0.1)
+
+    def variances(beside: Sequence[float] | None, size: float) -> Array:
+        lines = None if beside is None else np.array(beside)[:, None]
+        numbers = parameters(LAGGING, 1, short=(Slow(size, 0.05),), width=1.0, offset=-0.05)
+        return Filter(LAGGING).run(replace(log, beside=lines), numbers).variances
+
+    usual = variances([1.0, 1.0, 1.0, 1.0], 0.2)
+    np.testing.assert_allclose(variances([2.0, 2.0, 2.0, 2.0], 0.1), usual, rtol=1e-12)
+    later, row = variances([1.0, 1.0, 5.0, 1.0], 0.2), log.time <= SWITCHES[2]
+    np.testing.assert_array_equal(later[row], usual[row])
+    row = (log.time > SWITCHES[2] + 0.1) & (log.time < SWITCHES[3])
+    assert np.all(later[row] > 1.2 * usual[row])
+    jumps = (log.time > SWITCHES[1]) & (log.time < SWITCHES[1] + 0.1)
+    assert np.all(variances(None, 0.2)[jumps] > usual[jumps])
+
+
 @pytest.mark.parametrize("offset", [-0.3, 0.0, 0.4])
 def test_an_offset_moves_the_effect_of_a_command(offset: float) -> None:
     mean, variance = glided(2.0, offset=offset)

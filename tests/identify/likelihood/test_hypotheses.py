@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rov_fmu
-from rov_fmu.equation.catalogue import CURVE
+from rov_fmu.equation.catalogue import CURVE, SURGE
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.hypotheses import (
@@ -20,6 +20,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     Model,
     Unknown,
     Variant,
+    lateness,
     probability,
     structure,
     twins,
@@ -276,7 +277,62 @@ def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path
     (one,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
     assert one.is_momentary
     assert not list(HYPOTHESES["momentary commands"].variants(known, [one]))
-    assert all(one.between_rows(known.coefficients, form.axis) > 0.0 for form in one.layout.axes)
+    least = 1e-3  # of full thrust
+    assert one.record.beside is not None
+    assert one.record.beside.shape == (len(one.record.told), len(one.layout.axes))
+    assert np.all(one.record.beside >= least)
+    assert np.any(one.record.beside > 5.0 * least)
+
+
+def test_lines_between_momentary_commands_are_wrong_where_their_second_differences_are_large(model: Model) -> None:
+    """Commands that jump at any time and then settle, known 100 times per row, give the true mean of each row."""
+    rng, rows, fine = np.random.default_rng(0), 400, 100
+    target = np.repeat(rng.uniform(-0.5, 0.5, 40), rows * fine // 40)
+    command, now = np.zeros(rows * fine), 0.0
+    for n, wanted in enumerate(np.roll(target, 37)):
+        now += (wanted - now) / fine  # a stick that moves within a row
+        command[n] = now
+    known, one = model.known, model.logs[0]
+    layout, names = one.layout, [*one.layout.inputs]
+    thrusters = [names.index(f"u_{t.name}") for t in layout.thrusters_along(SURGE)]
+    axis = [form.axis for form in layout.axes].index(SURGE)
+
+    def thrust(commands: Array) -> Array:
+        inputs = np.zeros((len(commands), len(names)))
+        inputs[:, thrusters] = commands[:, None]
+        lines = one.with_inputs(inputs)
+        return lines.thrust(known.coefficients, SURGE, lines.record.inputs) / known.full["surge"]
+
+    sampled = np.zeros((rows, len(names)))
+    sampled[:, thrusters] = command[::fine, None]
+    beside = one.with_inputs(sampled).with_lines(known.coefficients, known.full).record.beside
+    assert beside is not None
+    at_rows, between = thrust(command[::fine]), thrust(command[:: fine // 5]).reshape(rows, 5).mean(axis=1)
+    lacking = np.abs(between[:-1] - 0.5 * (at_rows[1:] + at_rows[:-1]))
+    size = beside[:-1, axis]
+    calm, busy = size < np.quantile(size, 0.5), size > np.quantile(size, 0.95)
+    assert np.sqrt(np.mean(lacking[busy] ** 2)) > 10.0 * np.sqrt(np.mean(lacking[calm] ** 2))
+    assert 0.05 < np.sqrt(np.mean((lacking / size)[busy] ** 2)) < 0.6  # the prior: 0.25, within a factor of e
+
+
+def test_only_the_inertia_of_fast_axes_suffers_from_the_time_of_momentary_commands(model: Model) -> None:
+    """The time constant of an axis is its inertia times a function of drag and thrust: a shift of it is one of this."""
+    z = np.array([p.mean for p in model.table.parameters])
+    assert lateness(model.objective(), z) == {}
+    files = tuple(one.log.file for one in model.logs)
+    momentary = model.applied(Variant("momentary commands", files))
+    objective = momentary.objective()
+    z = np.array([p.mean for p in objective.table.parameters])
+    late = lateness(objective, z)
+    interval = max(one.interval for one in momentary.logs)
+    vehicle, shapes = objective.table.model(z)
+    for form in vehicle.layout.axes:
+        _, time = shapes.motions(vehicle, form.axis, np.array([0.5])).response()
+        assert late[form.axis.name] == pytest.approx(0.05 * interval / time[0])
+    narrow = Posterior(objective.table, z, np.diag(np.full(len(z), 1e-4)))
+    wide = narrow.widened({}, late)
+    for p, before, after in zip(objective.table.parameters, narrow.errors, wide.errors, strict=True):
+        assert after == pytest.approx(np.hypot(before, late.get(p.of, 0.0) if p.kind == "inertia" else 0.0))
 
 
 @pytest.mark.parametrize("health", [1.0, 0.5])
@@ -311,14 +367,14 @@ def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(mo
     deviation = np.array([p.deviation for p in table.parameters])
     narrow = Posterior(table, np.array([p.mean for p in table.parameters]), np.diag((0.01 * deviation) ** 2))
     axes = [form.axis for form in model.known.layout.axes]
-    assert narrow.widened(dict.fromkeys(axes, 1.4)) is narrow
-    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes})
+    assert narrow.widened(dict.fromkeys(axes, 1.4), {}) is narrow
+    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes}, {})
     for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
         if p.kind == "inertia":
             factor = np.sqrt(1.0 + 2.0 * 24.0) if p.of == "heave" else 1.0
             assert after == pytest.approx(factor * before, rel=0.02)
         assert after <= prior * (1.0 + 1e-6)
-    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf)).errors <= deviation * (1.0 + 1e-6))
+    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf), {}).errors <= deviation * (1.0 + 1e-6))
 
 
 def test_a_probability_follows_from_the_odds() -> None:

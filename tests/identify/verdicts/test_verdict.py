@@ -79,7 +79,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
         (
             {"structure": 4.2},
             "usable",
-            "Predictions over 10 s are off by 4.2 times the noise of the sensor, so the model lacks something.",
+            "The model's errors are 4.2 times what noise explains, so it lacks something.",
         ),
         (
             {"inertia": 0.8},
@@ -106,7 +106,7 @@ MADE: dict[str, Any] = {
     "score G": lambda x: {"predictions": scored(x)},
     "moving quantities": lambda x: {"predictions": [replace(DEPTH, error=2.0 * (n < 1000 * x)) for n in range(1000)]},
     "nothing predicted": lambda x: {"predictions": [DEPTH] * (x < 0.5)},
-    "errors over 10 s": lambda x: {"structure": x},
+    "errors R": lambda x: {"structure": x},
     "unknown dist": lambda x: {"disturbances": [replace(FORCE, share=x)]},
     "no answers": lambda x: {"answers": results.answers(1.0, 0.02) * (x < 0.5)},
     "half-width of the widest V_ss": lambda x: {"answers": results.answers(1.0, x)},
