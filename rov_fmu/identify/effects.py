@@ -27,7 +27,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
             continue
         posterior, kind = fit.posterior if n in file.absent else file, KINDS[p.kind]
         value = p.offset + p.factor * float(posterior.z[n])
-        low, high = around(value, max(p.factor * posterior.errors[n], kind.finest / QUANTILE))
+        low, high = around(value, p.factor * max(posterior.errors[n], kind.finest / QUANTILE))
         if kind.is_ratio or p.is_log:
             value, low, high = np.exp([value, low, high]).tolist()
         name = kind.words + (f" {p.part}" if p.part else "")

@@ -99,7 +99,7 @@ class Kind(Coordinate):
     is_lag: bool = False
     """True for a time constant, which the samples of sensors must be close enough to show."""
     finest: float = 0.0
-    """The half-width that no interval is narrower than."""
+    """The half-width of the narrowest interval: what is smaller is no effect."""
     is_size: bool = False
     """True for the size of a slow or short process."""
     slow: Process | None = None
@@ -278,6 +278,7 @@ KINDS = {
         is_coefficient=True,
         told_by=("log",),
         of_axis=_load,
+        finest=0.001,
         null=0.0,
     ),
     "current": Kind(
