@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf, isfinite, log, nan
+from math import exp, inf, log, nan
 
 import numpy as np
 
@@ -46,8 +46,8 @@ _SMALL = 1e-3
 _MOST = 3
 """The most hypotheses that may hold at once."""
 _LATE, _HALF = 0.05, 0.5
-"""How much earlier or later momentary commands act along an axis, relative to the time between two rows (standard
-error), and the command whose time constant this changes."""
+"""How much earlier or later commands that change between rows act along an axis, relative to the time between two rows
+(standard error), and the command whose time constant this changes."""
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
 _IDLE_STEP, _IDLE, _LONGEST_IDLE = 0.1, 0.5, 0.5
@@ -350,7 +350,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         ]
         try:
             if one.is_momentary or (one.lost and not ahead):
-                run = objective.run(_without_slow_noise(objective.table, best.z, one, least), n)
+                run = objective.run(_without_slow_noise(objective.table, best.z), n)
                 errors = run.innovations / np.sqrt(run.variances)
             else:
                 run = objective.run(best.z, n, begin=SETTLING, span=AHEAD)
@@ -363,31 +363,25 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     return found
 
 
-def _without_slow_noise(table: Table, z: Array, one: SampledLog, least: Sequence[float]) -> Array:
-    """Return the parameters with at least the given noise of the sensors of a log, and with no slow processes.
-
-    Coloured noise and what momentary commands lack are at most as large as usual.
-    """
-    noise = {m.channel.quantity.name: value for m, value in zip(one.measured, least, strict=True) if isfinite(value)}
+def _without_slow_noise(table: Table, z: Array) -> Array:
+    """Return the parameters with no slow processes. Coloured noise and short forces are at most as large as usual."""
     quiet = z.copy()
     for n, p in enumerate(table.parameters):
         if p.kind in ("coloured noise", "short force"):
             quiet[n] = min(z[n], p.mean)
         elif p.is_slow_size:
             quiet[n] = p.low
-        elif p.kind == "white noise" and p.of in noise:
-            quiet[n] = max(z[n], log(noise[p.of]))
     return quiet
 
 
 def lateness(objective: Objective, z: Array) -> dict[str, float]:
-    """Return the standard error of the inertia of each axis by the time at which momentary commands act, relatively.
+    """Return the standard error of the inertia of each axis by the time at which commands act, relatively.
 
-    A line between two rows tells when a command changes to some hundredths of the time between them, and along each
-    axis in its own way: a stick moves it otherwise than a controller. The axis answers so much earlier or later, which
-    is the more of its time constant the faster it is.
+    Where commands change between rows, these tell when to some hundredths of the time between them, and along each axis
+    in its own way: a stick moves it otherwise than a controller. The axis answers so much earlier or later, which is
+    the more of its time constant the faster it is.
     """
-    late = _LATE * max((one.interval for one in objective.logs if one.is_momentary), default=0.0)
+    late = _LATE * max((one.interval for one in objective.logs if one.lost), default=0.0)
     if not late:
         return {}
     vehicle, shapes = objective.table.model(z)

@@ -20,7 +20,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUIETER = 2.0
-"""The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact."""
+"""The white noise is at least exp(-2) of what the differences of the samples show: rounding is never taken as exact.
+Where commands change between rows, it is at least all of it, because J is rough where a sensor is more exact."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
 CURRENT = ("to the north", "to the east")
@@ -455,8 +456,9 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     for one in logs:
         for m in one.measured:
             noises.setdefault(m.channel.quantity.name, []).append(m.noise)
+    quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():
         mean = log(sorted(some)[len(some) // 2])
-        yield from make("white noise", quantity, mean=mean, low=mean - _QUIETER)
+        yield from make("white noise", quantity, mean=mean, low=mean - quieter)
         yield from make("coloured noise", quantity)
         yield from make("correlation time", quantity)
