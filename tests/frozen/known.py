@@ -182,11 +182,11 @@ def _study(folder: Path) -> str:
     from rov_fmu.study.results.summary import print_summary
     from rov_fmu.study.run.cluster import Spent
 
-    results = Results(folder)
-    with _without_plots():
+    with TemporaryDirectory() as temporary, _without_plots():
+        results = Results(shutil.copytree(folder, Path(temporary, folder.name)))
+        summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
         page = _text(study_page(results))
-    summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
-    return f"{summary}\n{page}".replace(f"{HERE}/", "")
+    return f"{summary}\n{page}".replace(f"{temporary}/", "")
 
 
 def _in_copy(folder: Path, options: str) -> str:
