@@ -156,18 +156,20 @@ def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
 def written(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
     """Return the vehicle with meaningful digits, after a check that its file, when it is read, is the fit.
 
-    Rounding keeps each value within its interval, and J, which very exact data change with the seventh digit. Raises
+    Rounding keeps each value within its interval, and J, which very exact data change with the seventh digit. Both J
+    are computed with the same steps of the filter, because those on the way to the minimum may have been others. Raises
     RuntimeError: this program is wrong then.
     """
     top = Path(commonpath([folder.resolve(), *(path.resolve().parent for path in vehicle.files)]))
     objective, least = copy(fit.file.objective), fit.file.minimum
+    of_fit = objective.value(least.z, objective.runs(least.z, least.runs))
     for digits in _DIGITS:
         short = _rounded(vehicle, digits)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             read = read_vehicle(top / "vehicle.toml", vehicle_text(short, top).encode())
         objective.table = fit.file.objective.table.of_vehicle(read)
-        rise = objective.value(least.z, objective.runs(least.z, least.runs)) - least.value
+        rise = objective.value(least.z, objective.runs(least.z, least.runs)) - of_fit
         if abs(rise) < _SAME:
             return short
     raise RuntimeError(f"{folder}: J of the vehicle file differs by {rise:.3g} from that of the fit")
