@@ -107,7 +107,7 @@ def _add_steady_thrust(formulas: Formulas, name: str, curve: Curve, health: Expr
 
 def _by_voltage(curve: Curve, names: Names) -> Expression:
     """Return the factor of the thrust at the present voltage."""
-    return call("pow", names("battery") / Name(curve.coefficient("V_0")), Name(curve.coefficient("n_V")))
+    return _power_of_voltage(curve, names, Name(curve.coefficient("n_V")))
 
 
 def _of_speed(curve: Curve, names: Names) -> Expression:
@@ -115,7 +115,11 @@ def _of_speed(curve: Curve, names: Names) -> Expression:
 
     The thrust is proportional to the square of that speed, and the loss to the speed (Fossen 2021).
     """
-    return call("pow", names("battery") / Name(curve.coefficient("V_0")), 0.5 * Name(curve.coefficient("n_V")))
+    return _power_of_voltage(curve, names, 0.5 * Name(curve.coefficient("n_V")))
+
+
+def _power_of_voltage(curve: Curve, names: Names, exponent: Expression) -> Expression:
+    return call("pow", names("battery") / Name(curve.coefficient("V_0")), exponent)
 
 
 def by_direction(command: Name, curve: Curve, key: str) -> Expression:

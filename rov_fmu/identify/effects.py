@@ -44,7 +44,7 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         of, words = listed(one.variant.of), dict[str, str]()
         if kind == "momentary commands":
             words = _lost(fit, one.variant.of)
-        elif kind == "idle commands":
+        elif one.variant.acting:
             of = listed(_acting(fit, one.variant))
         elif kind in ("health", "reversed commands"):
             of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")

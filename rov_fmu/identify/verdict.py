@@ -102,8 +102,8 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with `size`, the value with two digits, `share`, the value in percent, `known`, how well a number is
-    known whose half-width the value is, and what `names` tells."""
+    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells. If the
+    value is the half-width of an interval, `known` tells how well the number in it is known."""
     names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False

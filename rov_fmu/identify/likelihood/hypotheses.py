@@ -36,7 +36,8 @@ SETTLING = 5.0
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted."""
 _FAR = 100.0
-"""How much less 2 ln of the evidence of thinned logs may be for a hypothesis that they hardly tell."""
+"""A hypothesis that does not change the thrust is not fitted to all samples if its 2 ln of the evidence of thinned logs
+is so much below the largest one. Thinned logs hardly tell such a hypothesis."""
 _STEP = 0.5
 """The time between two values of the unknown force, s."""
 _SHARES = (0.0, 0.03, 0.1, 0.2, 0.35, 0.5, 0.7, 1.0)
@@ -50,9 +51,12 @@ _LATE, _HALF = 0.05, 0.5
 (standard error), and the command whose time constant this changes."""
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
-_IDLE_STEP, _IDLE, _LONGEST_IDLE = 0.1, 0.5, 0.5
-"""Commands may not act yet where the unknown force, at steps of the first number, s, makes up for their thrust but for
-the second share of its square, and until the third share of a log."""
+_IDLE_STEP = 0.1
+"""The time between two values of the unknown force that tell when commands do not act, s."""
+_IDLE = 0.5
+"""Commands may not act where the unknown force makes up for their thrust but for this share of its square."""
+_LONGEST_IDLE = 0.5
+"""Commands do not act during at most this share of a log, at its beginning or at its end."""
 
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
@@ -82,6 +86,8 @@ class Hypothesis:
     changes_thrust: bool = True
     """True if it changes the steady thrust, so that the unknown force shows how likely it is. Others are always fitted
     to thinned logs."""
+    has_times: bool = False
+    """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
 
 
 @dataclass(frozen=True)
@@ -115,8 +121,8 @@ def _with_parameter(kind: str) -> Change:
 
 
 def _momentary(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-    of = variant.of
-    return known, [one.with_lines(known.coefficients, known.full) if one.log.file in of else one for one in logs]
+    coefficients, full = known.coefficients, known.full
+    return known, [one.with_lines(coefficients, full) if one.log.file in variant.of else one for one in logs]
 
 
 def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
@@ -269,6 +275,7 @@ HYPOTHESES = {
             "{of}: the commands do not act before and after, as if the thrusters were off{odds}. They count as 0 "
             "there. Record while the thrusters are on"
         ),
+        has_times=True,
     ),
     "rotor lag": Hypothesis(
         0.07,
@@ -496,10 +503,8 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
         else None
     )
     if unknown:
-        timed = [
-            (unknown.idle(one) if one.kind == "idle commands" else one, starts) for one, starts in variants.items()
-        ]
-        variants = {one: starts for one, starts in timed if one.kind != "idle commands" or one.of}
+        timed = [(unknown.timed(one), starts) for one, starts in variants.items()]
+        variants = {one: starts for one, starts in timed if one.of or not HYPOTHESES[one.kind].has_times}
     ranked = {one: starts for one, starts in variants.items() if HYPOTHESES[one.kind].changes_thrust}
     gains = {
         (one, start): unknown.explained(one, start) for one, starts in ranked.items() for start in starts if unknown
@@ -530,13 +535,13 @@ class Unknown:
                 z[n] = p.low
         self.vehicle, _ = table.model(best)
         self.scale = {axis.name: float(table.force_unit(z, axis)) for axis in table.layout.bare_axes}
-        self.time, self.force, self.all = [], [], []
+        self.time, self.force, self.at_samples = [], [], []
         for n, one in enumerate(model.logs):
             first, record = objective.filters[n].force, objective.records[n]
             at = first_in_each(record.time, 1.0 / _STEP)
             run = objective.run(z, n, with_states=True)
             force = run.states[:, first : first + len(one.layout.axes)]
-            self.all.append((record.time, force))
+            self.at_samples.append((record.time, force))
             self.time.append(record.time[at])
             self.force.append(force[at])
         self.before = [
@@ -554,19 +559,21 @@ class Unknown:
             found += self.vehicle[one.layout.health[t.name]] * np.outer(forces, effects)
         return found
 
-    def idle(self, variant: Variant) -> Variant:
-        """Return when the commands of some files act: before and after, the unknown force makes up for their thrust.
+    def timed(self, variant: Variant) -> Variant:
+        """Return a hypothesis with the times between which the commands of its files act, if it has times.
 
-        With the thrust T and the unknown force r, the sum of r² - (r + T)² - T²/2 from the begin, and that from the
-        end, are largest there. A position tells r late, so that axes with measured velocities alone count where there
-        are some.
+        Before and after, the unknown force r makes up for the thrust T. The sum of r² - (r + T)² - T²/2 from the
+        beginning of a log, and that from its end, are largest where the commands begin and cease to act. A position
+        tells r late. So only axes with measured velocities count where there are some.
         """
+        if not HYPOTHESES[variant.kind].has_times:
+            return variant
         found = {}
         for n, one in enumerate(self.model.logs):
             if one.log.file not in variant.of:
                 continue
             scale = np.array([self.scale[form.axis.name] for form in one.layout.axes])
-            time, force = self.all[n]
+            time, force = self.at_samples[n]
             at = first_in_each(time, 1.0 / _IDLE_STEP)
             prompt = {m.sensor.axis for m in one.measured if m.sensor.is_velocity} or {*one.layout.bare_axes}
             scale[[form.axis not in prompt for form in one.layout.axes]] = inf

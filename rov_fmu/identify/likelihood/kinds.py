@@ -135,12 +135,14 @@ def _inertia(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
     return {} if _free(prior, form, "beta") else None
 
 
-def _drag(key: str) -> Callable[[Prior, VehicleAxis], Mapping[str, Any] | None]:
+def _drag(key: str, deviation: Deviation) -> Kind:
+    """Return the kind of a drag coefficient of an axis, ahead."""
+
     def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
         free = _free(prior, form, key)
         return {"mean": log(max(prior.coefficients[form.axis.coefficient(key)], 1e-9))} if free else None
 
-    return of_axis
+    return Kind(deviation, keys=(key,), is_coefficient=True, told_by=("log", "steady"), of_axis=of_axis, is_log=True)
 
 
 def _drag_astern(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
@@ -234,25 +236,17 @@ KINDS = {
         told_by=("log", "time_constant"),
         of_axis=_inertia,
     ),
-    "quadratic drag": Kind(
+    "quadratic drag": _drag(
+        "a_d",
         Deviation(
             "quadratic_drag", 1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"
         ),
-        keys=("a_d",),
-        is_coefficient=True,
-        told_by=("log", "steady"),
-        of_axis=_drag("a_d"),
-        is_log=True,
     ),
-    "linear drag": Kind(
+    "linear drag": _drag(
+        "b_d",
         Deviation(
             "linear_drag", 1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"
         ),
-        keys=("b_d",),
-        is_coefficient=True,
-        told_by=("log", "steady"),
-        of_axis=_drag("b_d"),
-        is_log=True,
     ),
     "drag astern": Kind(
         Deviation("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),

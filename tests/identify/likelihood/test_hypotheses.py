@@ -231,7 +231,7 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
     (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
     variant = Variant("idle commands", of)
     z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
-    found = Unknown(model, model.objective(), z).idle(variant)
+    found = Unknown(model, model.objective(), z).timed(variant)
     assert found.of == (of if start > 0.0 or end < SECONDS else ())
     for begins, ends in found.acting:
         assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
@@ -242,7 +242,7 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
         assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
     (one,) = model.logs
     against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
-    assert not Unknown(against, against.objective(), z).idle(variant).of
+    assert not Unknown(against, against.objective(), z).timed(variant).of
 
 
 @pytest.mark.parametrize(
