@@ -318,6 +318,7 @@ def applied(row: Row) -> Mutant | None:
     """Apply a kept mutant to the code of today. Return None if its line is not there, or in several places.
 
     The line is looked for with its neighbours in its file, then alone in its file, then with its neighbours anywhere.
+    Of several with its neighbours in its file, it is the one with its number.
     """
     texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files()}
     neighbours = [row["above"], row["before"], row["below"]]
@@ -329,8 +330,9 @@ def applied(row: Row) -> Mutant | None:
         numbers = range(1, len(lines) - 1)
         return [(file, n) for n in numbers if lines[n - number_above : n + 1 + number_above] == wanted]
 
+    own, here = places(row["file"], 1), (row["file"], int(row["line"]))
     anywhere = [place for file in texts for place in places(file, 1)]
-    for found in (places(row["file"], 1), places(row["file"], 0), anywhere):
+    for found in ([here] if here in own else own, places(row["file"], 0), anywhere):
         if len(found) == 1:
             file, line = found[0]
             return Mutant(file, line, row["before"], row["after"], with_line(texts[file], line, row["after"]))
