@@ -516,17 +516,28 @@ def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path) -> None
     assert int.from_bytes(picture[16:20]) == 1280
 
 
-def test_a_window_shows_steps_until_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    viewer = MagicMock()
-    viewer.is_running.side_effect = [True, True, False]
+def test_a_window_shows_steps_in_real_time_until_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr("time.monotonic", lambda: clock.now)
+    monkeypatch.setattr("time.sleep", lambda seconds: vars(clock).update(now=clock.now + seconds))
+    viewer, shown = MagicMock(), list[float]()
+    viewer.is_running.side_effect = [*[True] * 4, False]
+
+    def show_late() -> None:
+        """The motion pauses for 10 s at the third step, and is not made up for afterwards."""
+        clock.now += 10.0 * (len(shown) == 2)
+        shown.append(clock.now)
+
+    viewer.sync = show_late
     window = SimpleNamespace(launch_passive=lambda *_: viewer)
     monkeypatch.setitem(sys.modules, "mujoco.viewer", window)
     monkeypatch.setattr(mujoco, "viewer", window, raising=False)
     monkeypatch.setenv("DISPLAY", ":0")
     rov = load(rov_fmu.load(BARE))
     show(rov)
-    assert rov.data.time == pytest.approx(2.0 * rov.model.opt.timestep)
-    assert viewer.sync.call_count == 2
+    step = rov.model.opt.timestep
+    assert rov.data.time == pytest.approx(4.0 * step)
+    assert np.diff([*shown, clock.now]) == pytest.approx([step, 10.0 + step, 0.0, step])
 
 
 @pytest.fixture(scope="module")
