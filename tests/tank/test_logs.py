@@ -93,7 +93,8 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("late", ["depth [cm]", "voltage [V]"])
 def test_rows_that_arrive_late_are_sorted(late: str, tmp_path: Path) -> None:
-    """They fill a hole in the rows before them, here in those of one sensor, which has rows of its own."""
+    """They fill a hole in the rows before them, here in those of one sensor, which has rows of its own. Commands act
+    at the times of their own rows."""
     times = [n / 10 for n in range(300)]
     arriving = [*times[:20], *times[60:140], *times[20:60], *times[140:]]
     prompt = ({"depth [cm]", "voltage [V]"} - {late}).pop()
@@ -104,6 +105,7 @@ def test_rows_that_arrive_late_are_sorted(late: str, tmp_path: Path) -> None:
     ]
     log = read(tmp_path, f"time [s],command [%],{prompt},{late}", rows, HEAVE)
     assert [(found.kind, found.words["count"]) for found in log.findings] == [("rows sorted", 40)]
+    assert commanded(log.log, COMMAND, np.array(times)) == pytest.approx([0.3 * (time > 1) for time in times])
 
 
 @pytest.mark.parametrize(
