@@ -84,7 +84,8 @@ TESTS = {
     "rov_fmu/identify/given.py": "tank/test_description_mistakes.py tank/test_description.py identify",
     "rov_fmu/identify/beginning.py": "tank/test_description_mistakes.py tank/test_tank_tests.py tank identify",
     "rov_fmu/identify/findings.py": "identify/test_findings.py frozen/test_known_results.py identify",
-    "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify",
+    "rov_fmu/identify/inspection/*": "frozen/test_known_results.py interface/test_inspect_command.py identify",
+    "rov_fmu/identify/*": "identify/test_findings.py docs/test_identify_pages.py identify frozen/test_known_results.py",
     "rov_fmu/fmu/card.py": "frozen/test_known_results.py fmu/results/test_card.py report/test_card.py fmu",
     "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
     "rov_fmu/prove/proof.py": "cli/test_prove.py prove",
@@ -94,9 +95,10 @@ TESTS = {
     "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_osp.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
+    "rov_fmu/tank/readers/*": "tank/readers/test_one_dive.py tank frozen/test_known_results.py identify/test_wrench.py",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",
     "rov_fmu/tank/*": "tank frozen/test_known_results.py interface/test_inspect_command.py "
-    "identify/test_wrench.py identify/test_identify.py",
+    "identify/test_wrench.py identify/test_identify.py identify/likelihood/test_beginning.py",
     "rov_fmu/report/plots/proof.py": "prove",
     "rov_fmu/report/plots/*": "frozen/test_known_results.py report/plots report/test_pictures.py report",
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
@@ -318,6 +320,7 @@ def applied(row: Row) -> Mutant | None:
     """Apply a kept mutant to the code of today. Return None if its line is not there, or in several places.
 
     The line is looked for with its neighbours in its file, then alone in its file, then with its neighbours anywhere.
+    Of several with its neighbours in its file, it is the one with its number.
     """
     texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files()}
     neighbours = [row["above"], row["before"], row["below"]]
@@ -329,8 +332,9 @@ def applied(row: Row) -> Mutant | None:
         numbers = range(1, len(lines) - 1)
         return [(file, n) for n in numbers if lines[n - number_above : n + 1 + number_above] == wanted]
 
+    own, here = places(row["file"], 1), (row["file"], int(row["line"]))
     anywhere = [place for file in texts for place in places(file, 1)]
-    for found in (places(row["file"], 1), places(row["file"], 0), anywhere):
+    for found in ([here] if here in own else own, places(row["file"], 0), anywhere):
         if len(found) == 1:
             file, line = found[0]
             return Mutant(file, line, row["before"], row["after"], with_line(texts[file], line, row["after"]))

@@ -79,7 +79,7 @@ def text_of(path: Path, content: bytes, kind: type[FileError] = FileError) -> st
     try:
         return content.decode("utf-8-sig").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeDecodeError as error:
-        raise kind(f"{path}: not UTF-8 text, at byte {error.start}") from error
+        raise kind(f"{path}: is not UTF-8 text, at byte {error.start}") from error
 
 
 def root_of_xml(content: bytes) -> Any:

@@ -90,7 +90,7 @@ class _Member:
         try:
             return path.read_bytes().decode("utf-8-sig")
         except UnicodeDecodeError as error:
-            raise self.error(f"not UTF-8 text, at byte {error.start}") from error
+            raise self.error(f"is not UTF-8 text, at byte {error.start}") from error
 
     def xml(self, root: str) -> Any:
         """Return the root element of this file, which must have the name `root`."""

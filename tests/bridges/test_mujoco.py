@@ -516,17 +516,51 @@ def test_the_folder_needs_no_rov_fmu_and_draws_a_picture(tmp_path: Path) -> None
     assert int.from_bytes(picture[16:20]) == 1280
 
 
-def test_a_window_shows_steps_until_it_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
-    viewer = MagicMock()
-    viewer.is_running.side_effect = [True, True, False]
-    window = SimpleNamespace(launch_passive=lambda *_: viewer)
+@pytest.fixture
+def viewer(monkeypatch: pytest.MonkeyPatch) -> MagicMock:
+    """The window of MuJoCo, on a display."""
+    opened = MagicMock()
+    window = SimpleNamespace(launch_passive=opened)
     monkeypatch.setitem(sys.modules, "mujoco.viewer", window)
     monkeypatch.setattr(mujoco, "viewer", window, raising=False)
     monkeypatch.setenv("DISPLAY", ":0")
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    return opened
+
+
+def test_where_no_window_can_open_the_reason_and_the_remedy_are_told(
+    viewer: MagicMock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    viewer.side_effect = RuntimeError("it needs the main thread")
+    rov = load(rov_fmu.load(BARE))
+    with pytest.raises(SystemExit, match=r"\(it needs the main thread\).* run mjpython"):
+        show(rov)
+    monkeypatch.delenv("DISPLAY")
+    monkeypatch.setattr(sys, "platform", "linux")
+    with pytest.raises(SystemExit, match=r"no display .* the name of a picture"):
+        show(rov)
+
+
+def test_a_window_shows_steps_in_real_time_until_it_is_closed(
+    viewer: MagicMock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    clock = SimpleNamespace(now=100.0)
+    monkeypatch.setattr("time.monotonic", lambda: clock.now)
+    monkeypatch.setattr("time.sleep", lambda seconds: vars(clock).update(now=clock.now + seconds))
+    viewer.return_value.is_running.side_effect = [*[True] * 4, False]
+    shown = list[float]()
+
+    def show_late() -> None:
+        """The motion pauses for 10 s at the third step, and is not made up for afterwards."""
+        clock.now += 10.0 * (len(shown) == 2)
+        shown.append(clock.now)
+
+    viewer.return_value.sync = show_late
     rov = load(rov_fmu.load(BARE))
     show(rov)
-    assert rov.data.time == pytest.approx(2.0 * rov.model.opt.timestep)
-    assert viewer.sync.call_count == 2
+    step = rov.model.opt.timestep
+    assert rov.data.time == pytest.approx(4.0 * step)
+    assert np.diff([*shown, clock.now]) == pytest.approx([step, 10.0 + step, 0.0, step])
 
 
 @pytest.fixture(scope="module")

@@ -67,23 +67,25 @@ def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Pat
 
 @pytest.mark.parametrize("name", ["rov.toml", "r.html"])
 @pytest.mark.parametrize(
-    ("made_by_hand", "reason"),
+    ("own", "reason"),
     [
-        (False, "has changed since rov-fmu wrote it"),
-        (True, "is not as rov-fmu wrote it: it may have been made or changed by hand"),
+        (b"", "has changed since rov-fmu wrote it"),
+        (b"\xff my notes", "is not as rov-fmu wrote it: it may have been made or changed by hand"),
+        (b"%s\xff damaged", "is not UTF-8 text, at byte {}"),
     ],
 )
 def test_the_work_of_others_is_refused_before_anything_is_computed(
     name: str,
-    made_by_hand: bool,
+    own: bytes,
     reason: str,
     tank_tests: Path,
     folder: Path,
     capsys: Capsys,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    if made_by_hand:
-        own = b"\xff my notes"
+    """An empty text stands for the file with a change, and %s for its first line."""
+    if own:
+        own = own.replace(b"%s", (folder / name).read_bytes().splitlines(keepends=True)[0])
         (folder / name).write_bytes(own)
     else:
         own = _edited(folder / name)
@@ -93,6 +95,7 @@ def test_the_work_of_others_is_refused_before_anything_is_computed(
     assert _identify(tank_tests, folder) == 2
     out, err = capsys.readouterr()
     assert out == ""
+    reason = reason.format(own.find(b"\xff"))
     assert err == f"rov-fmu: {folder / name}: cannot be written: the file there {reason}; --force replaces it\n"
     assert (folder / name).read_bytes() == own
     assert len([*folder.iterdir()]) == 2

@@ -194,9 +194,12 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
 
 
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
+    """A sensor that shows nothing but noise is no slip, and hides none."""
     kinds = "depths a hundredfold", "radians under degrees"
     logs = [slipped(recordings(SLIPS[kind].axis)[0], SLIPS[kind]) for kind in kinds]
-    found = asked(tmp_path, *logs, rov=f'base = "videoray"\n{HEAD}')
+    short = {key: getattr(recordings(SURGE)[0], key)[:50] for key in ("time", "command")}
+    noise = replace(recordings(SURGE)[0], values=np.random.default_rng(0).normal(0.0, 0.01, 50), **short)
+    found = asked(tmp_path, *logs, noise, rov=f'base = "videoray"\n{HEAD}')
     assert found == {(log.file, SENSOR[log.axis.name]): QUESTIONS[kind] for log, kind in zip(logs, kinds, strict=True)}
 
 

@@ -238,7 +238,8 @@ def test_columns_may_be_inserted_twice_and_a_row_cut(tmp_path: Path) -> None:
 
 
 def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_path: Path) -> None:
-    """All cells are alike, or there is no row before the insertion, or the number of cells goes up and down."""
+    """All cells are alike, or fewer than three rows are before or after the insertion, or the number of cells goes up
+    and down."""
     for n in (80, 1):
         rows = [[str(i % 7)] * (3 if i < n else 5) for i in range(100)]
         path = _file(tmp_path, "\n".join(["time [s],length [m],x", *map(",".join, rows)]))
@@ -255,6 +256,8 @@ def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_pa
     ragged = [",".join(_cells(n) + ["1", "2"] * (n % 2)) for n in range(41)]
     table = read_columns(_file(tmp_path, "\n".join([",".join(TITLES), *ragged])), SI, others=True, loose=True)
     assert (table.torn, table.assumed) == (20, {})
+    table = read_columns(_file(tmp_path, _grown(90, (88, 2, 2))), SI, others=True, loose=True)
+    assert (table.torn, table.assumed) == (2, {})
 
 
 # ---- Variables over time ---------------------------------------------------------------------------------------------

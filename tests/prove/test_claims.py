@@ -77,10 +77,21 @@ def measured(measure: Measure, fmu: Path) -> Evidence:
 
 
 @pytest.fixture(scope="module")
-def proof(videoray_fmu: Path) -> Proof:
+def progress() -> list[tuple[str, float]]:
+    """What the proof told about its progress."""
+    return []
+
+
+@pytest.fixture(scope="module")
+def proof(videoray_fmu: Path, progress: list[tuple[str, float]]) -> Proof:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(measures, "_COST_SECONDS", 0.1)
-        return prove_claims(videoray_fmu, claims=CLAIMS_OF_VEHICLES)
+        return prove_claims(videoray_fmu, claims=CLAIMS_OF_VEHICLES, on_progress=lambda *told: progress.append(told))
+
+
+def test_each_claim_begins_after_an_equal_share_of_the_proof(proof: Proof, progress: list[tuple[str, float]]) -> None:
+    count = len(proof.evidence)
+    assert progress == [(claim.name.lower(), n / count) for n, (claim, _) in enumerate(proof.evidence)]
 
 
 def test_every_claim_that_applies_to_the_videoray_holds_and_its_page_loads_nothing(proof: Proof) -> None:
@@ -132,10 +143,7 @@ def _text(proof: Proof) -> str:
 @pytest.mark.long
 def test_the_page_answers_ten_questions(proof: Proof, identified: Path) -> None:
     """Of an FMU that must not be used for yaw it says so. That is no promise of the FMU, so nothing fails."""
-    progress: list[tuple[str, float]] = []
-    found = prove_claims(identified, claims=CLAIMS_OF_VEHICLES, on_progress=lambda *told: progress.append(told))
-    count = len(CLAIMS_OF_VEHICLES)
-    assert progress == [(claim.name.lower(), n / count) for n, claim in enumerate(CLAIMS_OF_VEHICLES)]
+    found = prove_claims(identified, claims=CLAIMS_OF_VEHICLES)
     assert found.digest == hashlib.sha256(identified.read_bytes()).hexdigest()
     results = [one.result for _, one in found.evidence]
     assert results == [*["holds"] * 4, "measured", "holds"]

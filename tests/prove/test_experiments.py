@@ -98,7 +98,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ({"inside": '<References source="../../../y"/>'}, "a.exp: source = '../../../y' does not lead to a file"),
         ({"inside": '<References source="..%5C..%5Cy"/>'}, "a.exp: source = '..%5C..%5Cy' does not lead to a file"),
         ({"inside": ""}, "fmi-ls-manifest.xml: names no experiment with expected results"),
-        ({"y": b"time,y\n0,\xff\n"}, "y.csv: not UTF-8 text, at byte 9"),
+        ({"y": b"time,y\n0,\xff\n"}, "y.csv: is not UTF-8 text, at byte 9"),
         ({"y": b"time,vector\n0,1\n"}, "y.csv, line 1, column 'vector': the variable is not a single number"),
         ({"y": b"time,z\n0,1\n"}, "y.csv, line 1, column 'z': the FMU has no such variable"),
     ],

@@ -51,6 +51,7 @@ def test_bounds_of_every_column(line: str, tmp_path: Path) -> None:
 def test_bounds_of_every_quantity(name: str, tmp_path: Path) -> None:
     quantity, path = QUANTITIES[name], tmp_path / "a.csv"
     beside = "heading [rad]" if name == "depth" else "depth [m]"
+    assert quantity.minimum == (0.0 if name in ("pressure", "voltage") else -quantity.maximum), "these have no sign"
     for limit, beyond in (
         (quantity.minimum, quantity.minimum * 1.001 - 1.0),
         (quantity.maximum, quantity.maximum * 1.001),

@@ -91,14 +91,21 @@ def test_a_clock_that_is_set_back_splits_the_log(tmp_path: Path) -> None:
     assert [finding.words for finding in log.findings] == [{"at": "29.95"}]
 
 
-def test_rows_that_arrive_late_are_sorted(tmp_path: Path) -> None:
-    """They fill a hole in the rows before them."""
-    times: list[float] = [n / 10 for n in range(300)]
-    moved = times[20:60]
-    del times[20:60]
-    rows = [f"{time},{30 * (time > 1)},{10 * time}" for time in [*times[:100], *moved, *times[100:]]]
-    log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
-    assert [(found.kind, found.words["count"]) for found in log.findings] == [("rows sorted", len(moved))]
+@pytest.mark.parametrize("late", ["depth [cm]", "voltage [V]"])
+def test_rows_that_arrive_late_are_sorted(late: str, tmp_path: Path) -> None:
+    """They fill a hole in the rows before them, here in those of one sensor, which has rows of its own. Commands act
+    at the times of their own rows."""
+    times = [n / 10 for n in range(300)]
+    arriving = [*times[:20], *times[60:140], *times[20:60], *times[140:]]
+    prompt = ({"depth [cm]", "voltage [V]"} - {late}).pop()
+    rows = [
+        row
+        for time, sent in zip(times, arriving, strict=True)
+        for row in (f"{time},{30 * (time > 1)},{10 + time},", f"{sent + 0.05:.2f},,,{10 + sent}")
+    ]
+    log = read(tmp_path, f"time [s],command [%],{prompt},{late}", rows, HEAVE)
+    assert [(found.kind, found.words["count"]) for found in log.findings] == [("rows sorted", 40)]
+    assert commanded(log.log, COMMAND, np.array(times)) == pytest.approx([0.3 * (time > 1) for time in times])
 
 
 @pytest.mark.parametrize(

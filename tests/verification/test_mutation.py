@@ -61,6 +61,9 @@ def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypa
         "x = 2\ny = 2\nx = 1\nz = 3\n",
         "x = 1\ny = 2\nx = 2\nz = 3\n",
     ]
+    (tmp_path / "a.py").write_text("x = 1\ny = 2\n" * 3)
+    alike = [mutation.applied(mutation.kept(mutation.Mutant("a.py", n, "y = 2", "y = 3", ""))) for n in (2, 4)]
+    assert [found and found.line for found in alike] == [2, 4], "the neighbours are alike, and its number tells"
     (tmp_path / "a.py").write_text("\nx = 1\nw = 2\nx = 1\nz = 3\n")
     assert [mutation.applied(row) for row in rows] == [None, None], "in two places, with other neighbours"
     (tmp_path / "a.py").write_text("a = 1\n")

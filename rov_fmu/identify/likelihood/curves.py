@@ -196,7 +196,7 @@ class Motions:
             return _closed_form({"A": A, "B": B, "C": self.of["C"], "v": v, "share": share})
 
 
-def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Array | float = 1.0) -> Array:
+def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Array | float) -> Array:
     """Return the times from rest to (1 - 1/e) V_ss, s, if all acceleration by C but a constant load lags by T, s.
 
     `linear` is its share that is linear in what lags. It is 1 where the force lags. Where the speed of the rotor does,

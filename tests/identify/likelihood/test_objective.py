@@ -3,13 +3,14 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.filter import Filter, Parameters, Record, Run
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
 from rov_fmu.identify.likelihood.solve import minimise, refits, total
@@ -159,6 +160,15 @@ def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objec
         (again,) = refits(own, minimise(own, found.z), [own.whole])
         errors = np.sqrt(np.diag(np.linalg.inv(again.information / 2.0)))
         assert (np.abs(found.z - again.z) < 1.0 * errors)[of_motion].all()
+
+
+def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objective: Objective, place: Array) -> None:
+    z = np.clip(place, objective.low, objective.high)
+    step, data = minimise(objective, z, most=1, last=False), objective.data(z, objective.runs(z), exact=False)
+    with patch.object(Objective, "data", side_effect=[data, DivergedError, DivergedError]):
+        assert minimise(objective, z, last=False).z == pytest.approx(step.z)
+        with pytest.raises(DivergedError):
+            minimise(objective, z, last=False)
 
 
 def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, place: Array) -> None:

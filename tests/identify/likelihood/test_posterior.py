@@ -1,11 +1,13 @@
 """The posterior: evidence by marginal likelihoods, and intervals."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, t
 
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around
 from rov_fmu.tank.arrays import Array
@@ -41,6 +43,14 @@ def test_an_effect_is_weighed_against_the_model_without_it(true: float, noise: f
 
     ratio = likelihood(slice(3)) - likelihood(slice(1, 3))
     assert posterior.evidence(0) == pytest.approx(2.0 * ratio, rel=1e-6)
+
+
+@pytest.mark.parametrize("kind", [kind for kind, one in KINDS.items() if one.finest])
+def test_what_is_below_the_finest_size_is_no_effect_however_exact_the_data_are(kind: str) -> None:
+    table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, (replace(LOAD, kind=kind, mean=0.0),))
+    for size, is_effect in ((0.5, False), (20.0, True)):
+        exact = Posterior(table, np.array([size * KINDS[kind].finest]), np.array([[1e-20]]))
+        assert (exact.evidence(0) > 0.0) == is_effect
 
 
 def test_an_absent_effect_has_no_error_and_the_others_have_those_of_the_model_without_it() -> None:

@@ -1,15 +1,19 @@
 """What is held out, by which data, and how uncertain its prediction is."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.held_out import Knowledge, held_out, predictions, unseen_current
+from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, unseen_current
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import structure
 from rov_fmu.identify.likelihood.objective import Objective, Part
@@ -51,6 +55,27 @@ def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit)
     assert [(p.axis, p.by) for p in own] == [(axis, one.by) for one in out for axis in one.axes]
     assert all(p.coverage > 0.8 for p in own)
     assert score_of(own) > 0.5
+
+
+@pytest.mark.parametrize("count", [2, 99])
+def test_predictions_take_shorter_steps_where_the_motion_of_wide_parameters_diverges(fit: Fit, count: int) -> None:
+    z, covariance = fit.best.z, np.asarray(np.linalg.inv(0.5 * fit.best.information), float)
+    changes = Objective.changes
+    errors, deviations = ahead(fit.objective, 0, z, covariance, 5.0, 10.0)
+    diverges = iter([True] * count)
+
+    def shorter(*given: Any) -> Any:
+        if next(diverges, False):
+            raise DivergedError
+        return changes(*given)
+
+    with (
+        patch.object(Objective, "changes", shorter),
+        nullcontext() if count == 2 else pytest.raises(DivergedError),
+    ):
+        again = ahead(fit.objective, 0, z, covariance, 5.0, 10.0)
+        assert again[0] == pytest.approx(errors)
+        assert again[1] == pytest.approx(deviations, rel=0.05)
 
 
 def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:

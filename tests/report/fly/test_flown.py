@@ -78,8 +78,9 @@ def test_a_key_pushes_along_its_axis_alone_and_the_hold_leaves_balancing_thruste
             assert pushed > 0.3 if form.axis.name == driven["name"] else abs(pushed) < 1e-3
     assert data["axes"][0]["held"] == {"u_1": -1.0, "u_2": -1.0, "u_3": 1.0, "u_4": 1.0}
     m, slant = 1.0 - heavy["c_0_t200"], sqrt(0.5)
-    strongest = heavy["a_t_t200"] * m**2 + heavy["b_t_t200"] * m
-    assert [t["most"] for t in data["thrusters"]] == pytest.approx([strongest] * 8)
+    for way, vehicle in {"": heavy, "_reverse": heavy.with_(a_t_t200_reverse=60.0)}.items():
+        strongest = vehicle[f"a_t_t200{way}"] * m**2 + vehicle[f"b_t_t200{way}"] * m
+        assert [t["most"] for t in data_of(vehicle)["thrusters"]] == pytest.approx([strongest] * 8), way
     assert (data["thrusters"][0]["at"], data["size"]) == ([0.156, 0.111, 0.085], 0.218)
     assert data["thrusters"][0]["along"] == pytest.approx([-slant, slant, 0.0])
     assert dict(data["variables"])["eta"] == 1.0, "a quaternion of no turn"

@@ -172,15 +172,14 @@ def test_a_recording_has_commands_measurements_bands_and_the_unknown_force(
     (tmp_path / "log_heave.csv").write_text("time [s],command [%],z [m]\n0,30,0\n1,-50,1\n2,-50,2\n", encoding="utf-8")
     commands = recording_of(tmp_path / "log_heave.csv", vehicle)["commands"]
     assert [commands[name][:2] for name in ("u_l", "u_r", "u_t")] == [[0.0, 0.0], [0.0, 0.0], [0.3, -0.5]]
-    rows = [f"{5 + n},{10 * n},{'' if n else 0},{0.1 * n},0.5" for n in range(5)]
     head = "time [s],u_t [%],depth [m],heave velocity [m/s],surge velocity [m/s]"
-    (tmp_path / "late.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
-    late = recording_of(tmp_path / "late.csv", vehicle)
-    assert (late["times"], late["commands"]["u_t"]) == ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.1, 0.2, 0.3, 0.4])
-    assert [(one["quantity"], one["times"]) for one in late["signals"]] == [
-        ("surge velocity", late["times"]),
-        ("heave velocity", late["times"]),
-    ], "one depth is no motion"
+    for depths, quantity in ((1, "heave velocity"), (5, "depth")):  # one depth is no motion
+        rows = [f"{5 + n},{10 * n},{n if n < depths else ''},{0.1 * n},0.5" for n in range(5)]
+        (tmp_path / "late.csv").write_text("\n".join([head, *rows]), encoding="utf-8")
+        late = recording_of(tmp_path / "late.csv", vehicle)
+        assert (late["times"], late["commands"]["u_t"]) == ([0.0, 1.0, 2.0, 3.0, 4.0], [0.0, 0.1, 0.2, 0.3, 0.4])
+        signals = [(one["quantity"], one["times"]) for one in late["signals"]]
+        assert signals == [("surge velocity", late["times"]), (quantity, late["times"])]
     with_mix = flown_vehicle("everything")
     titles = [f"thruster {t.name} [%]" for t in with_mix.layout.thrusters]
     given = [100.0 * with_mix.layout.gains[t.name].get("u_sway", 0.0) * 0.4 for t in with_mix.layout.thrusters]
