@@ -25,9 +25,8 @@ from pydantic import Field
 
 from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
-from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import listed, shown
-from rov_fmu.io.toml_file import Strict
+from rov_fmu.io.toml_file import Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
 from rov_fmu.tank.channels import Topic, frames_of
