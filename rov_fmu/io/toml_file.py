@@ -22,6 +22,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from rov_fmu.io.file_kinds import check_keys
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.reading import read_bytes, text_of
 
@@ -205,15 +206,10 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     A mistake that several entries of a list of tables repeat gives one line. After the first ten the lines are empty,
     because it takes long to find the most similar key for many unknown ones.
     """
-    unknown: dict[_Place, list[_Place]] = {}  # the places of the unknown keys of each table
-    for problem in problems:
-        if problem["type"] == "extra_forbidden":
-            unknown.setdefault(problem["loc"][:-1], []).append(problem["loc"])
-    repeated: dict[tuple[object, ...], list[ErrorDetails]] = {}
-    for problem in problems:
-        repeated.setdefault(_mistake(problem), []).append(problem)
+    places = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
+    unknown = grouped((place[:-1], place) for place in places)  # the places of the unknown keys of each table
     number = 0
-    for some in repeated.values():
+    for some in grouped((_mistake(problem), problem) for problem in problems).values():
         if number == MOST:
             yield ""
             continue
