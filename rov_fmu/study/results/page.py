@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
@@ -33,13 +32,8 @@ _CONSTANT = 1e-6
 """Values that vary by less than this share of the largest one count as constant."""
 
 
-def page_output(results: Results) -> Output:
-    """Return the page about the finished runs as a file in the folder of the study. Raises FileError."""
-    return Output(results.folder / PAGE, sealed(study_page(results), "<!-- {} -->", "study").encode())
-
-
 def study_page(results: Results) -> str:
-    """Return the page as HTML. It is the same for the same results."""
+    """Return the page about the finished runs as HTML. It is the same for the same results. Raises FileError."""
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
