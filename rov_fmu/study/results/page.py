@@ -42,22 +42,11 @@ def study_page(results: Results) -> str:
     tables = {name: found for name, found in indices.items() if not isinstance(found, str)}
     rows = [row for found in tables.values() for row in found]
     outputs = results.outputs if len(results.failed) < len(runs) else ()
-    model = results.model.removesuffix(".fmu")
     return page(
         "study.html.j2",
-        title=results.title or model,
-        model=model,
-        fmu=results.fmu,
-        made_by=results.made_by,
-        done=len(runs),
-        planned=results.planned,
-        failed=len(results.failed),
-        incomplete=len(results.incomplete),
-        sampler=plan["sampler"],
-        seed=plan["seed"],
+        results=results,
         quantiles=QUANTILES,
         figures=figures,
-        plots=[figure["plot"] for figure in figures if figure["plot"]],
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
@@ -68,10 +57,8 @@ def study_page(results: Results) -> str:
             for name, rows in tables.items()
         ],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
-        blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
         bands=[_band(results, name) for name in outputs],
-        warnings=results.warnings,
         script=inline_script("plots.js"),
         correlated=[group for group in results.groups if len(group) > 1],
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
