@@ -124,5 +124,10 @@ def pretty_unit(unit: str) -> str:
 
 def in_words(quantity: str, unit: str) -> str:
     """Return the title of a panel: the quantity in words, and its unit if there is one."""
-    shown = pretty_unit(unit) if unit != "1" else ""
-    return f"{quantity[:1].upper()}{quantity[1:]}{f' ({shown})' if shown else ''}"
+    return with_unit(f"{quantity[:1].upper()}{quantity[1:]}", unit)
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    words = "" if unit == "1" else pretty_unit(unit)
+    return f"{name} ({words})" if name and words else name or words

@@ -53,8 +53,7 @@ class Quantity(Strict):
 def within(value: float, declaration: Declaration) -> float:
     """Return the value if it is within the bounds of its coefficient. Raises ValueError."""
     if not declaration.minimum <= value <= declaration.maximum:
-        unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-        raise ValueError(f"must be within {declaration.minimum:.12g} ... {declaration.maximum:.12g}{unit}")
+        raise ValueError(f"must be within {declaration.minimum:.12g} ... {declaration.written(declaration.maximum)}")
     return value
 
 
