@@ -25,6 +25,7 @@ from rov_fmu.identify.result import (
     Effect,
     Identification,
     Interval,
+    Known,
     Logging,
     Prediction,
     Structure,
@@ -406,7 +407,7 @@ def with_lag(identification: Identification) -> list[str]:
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
-def with_error(known: tuple[float, Interval], unit: str) -> str:
+def with_error(known: Known, unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
     wider than the value is not known."""
     value, interval = known

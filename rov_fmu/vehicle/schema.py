@@ -178,10 +178,13 @@ _Thrust = Annotated[InstanceOf[ThrustTable], _file_read_by(read_thrust), _TEXT]
 _Current = Annotated[InstanceOf[CurrentTable], _file_read_by(read_current), _TEXT]
 
 
+_Volts = Annotated[Finite, Field(ge=0.1, le=1000.0)]
+
+
 class TableAtVoltage(Strict):
     """A table of thrust that was measured at a voltage."""
 
-    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    voltage: _Volts
     """The voltage, V."""
     table: _Thrust
     """The name of the CSV file."""
@@ -192,7 +195,7 @@ class ElectricCurrent(Strict):
     and the `table`, a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it,
     or none."""
 
-    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    voltage: _Volts
     """The voltage, V."""
     table: _Current
     """The name of the CSV file."""

@@ -122,7 +122,7 @@ def _as_number(given: Any) -> Any:
     return float(given) if isinstance(given, bool) else given
 
 
-def _in_order(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _in_order(points: "Points") -> "Points":
     for before, after in pairwise(points):
         if after[0] < before[0]:
             raise ValueError(f"the time must not go back, as it does from {before[0]:g} to {after[0]:g}")
@@ -152,7 +152,7 @@ class Signal(Strict):
         return self
 
     @property
-    def points(self) -> tuple[tuple[float, float], ...]:
+    def points(self) -> Points:
         """The points of either kind."""
         return self.steps or self.ramps or ()
 
