@@ -15,12 +15,9 @@ from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
 from rov_fmu.io.messages import brief
-from rov_fmu.prove.runs import WARNING, RunError, forget_message, keep_message, last_message, status_word
+from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
 from rov_fmu.study.plan.model import TYPES, Model, Variable
 from rov_fmu.study.plan.plan import Plan
-
-Array = npt.NDArray[np.float64]
-
 
 _Call = Callable[..., int]
 """A function of the FMU, which returns a status."""
