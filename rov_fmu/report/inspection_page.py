@@ -6,7 +6,7 @@ from markupsafe import Markup
 
 from rov_fmu.identify.inspection.inspected import Inspected
 from rov_fmu.io.messages import first_of
-from rov_fmu.report.console_log import NOT_ENOUGH, UNDETERMINED, cells, notes, unrecognised
+from rov_fmu.report import console_log
 from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
 from rov_fmu.report.templates import page
@@ -29,9 +29,6 @@ def inspection_page(inspected: Inspected) -> str:
         "inspection.html.j2",
         inspected=inspected,
         plot=plot,
-        cells=cells,
-        notes=lambda one: first_of(notes(one)),
-        unrecognised=lambda one: first_of(unrecognised(one)),
-        NOT_ENOUGH=NOT_ENOUGH,
-        UNDETERMINED=UNDETERMINED,
+        console=console_log,
+        first_of=first_of,
     )
