@@ -11,15 +11,13 @@ from itertools import pairwise
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
-from rov_fmu.bridges.sdf import written
+from rov_fmu.bridges.sdf import Array, written
 from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, ROTOR_LAG, effects_of
 from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Row = tuple[float, float]
 """A force, N, and the fraction of the full command that gives it."""
 

@@ -24,6 +24,10 @@ _FORMULAS = 100
 """The most layouts and libraries whose compiled formulas are kept."""
 
 
+_Stack = Callable[[Sequence[Any]], Any]
+"""Makes one vector of its components, each a number or an array."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Library:
     functions: Mapping[str, Callable[..., Any]]
@@ -31,8 +35,7 @@ class _Library:
 
     `interval(x, knots, columns)` returns from each column the number of the interval between the rising knots that
     contains x; the outer intervals have no end."""
-    stack: Callable[[Sequence[Any]], Any]
-    """Makes one vector of its components, each a number or an array."""
+    stack: _Stack
 
 
 def rates(vehicle: Vehicle, x: Any, forces: Any, p: Mapping[str, Any]) -> Any:
@@ -161,7 +164,7 @@ def _jax() -> _Library:
     return _of_arrays(jnp, stack)
 
 
-def _of_arrays(library: Any, stack: Callable[[Sequence[Any]], Any]) -> _Library:
+def _of_arrays(library: Any, stack: _Stack) -> _Library:
     """Return the library with the functions of NumPy, or of another one with the same names."""
 
     def interval(x: Any, knots: Sequence[float], columns: Sequence[Sequence[float]]) -> list[Any]:
@@ -185,9 +188,7 @@ def _casadi() -> _Library:
     return _library(lambda parts: casadi.vertcat(*parts), named, interval)
 
 
-def _library(
-    stack: Callable[[Sequence[Any]], Any], named: Mapping[str, Callable[..., Any]], interval: Callable[..., Any]
-) -> _Library:
+def _library(stack: _Stack, named: Mapping[str, Callable[..., Any]], interval: Callable[..., Any]) -> _Library:
     def size(x: Any) -> Any:
         return named["where"](x < 0.0, -x, x)  # with the derivative 1 at 0, as in the engine
 

@@ -14,6 +14,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
 from rov_fmu.identify.result import Identification, Prediction, UnknownForce
 from rov_fmu.io.file_kinds import IDENTIFIED
+from rov_fmu.io.groups import grouped
 from rov_fmu.report.page.recording import topic_name
 from rov_fmu.tank.log import Channel, Commands, Log
 from rov_fmu.tank.quality import unwrapped
@@ -87,9 +88,8 @@ def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
     """Yield all that is known about a log, each over its own times."""
     if log.commands:
         yield _commands(log.commands)
-    own: dict[str, list[Prediction]] = {}
-    for p in (p for axis in identification.axes for p in axis.predictions if p.file == log.file and p.is_judged):
-        own.setdefault(p.quantity, []).append(p)
+    predictions = (p for axis in identification.axes for p in axis.predictions)
+    own = grouped((p.quantity, p) for p in predictions if p.file == log.file and p.is_judged)
     rest = {c.quantity.name: c for c in log.channels if not c.unused and c.count}
     yield from (_prediction(parts, rest.pop(quantity, None)) for quantity, parts in own.items())
     yield from map(_measured, rest.values())

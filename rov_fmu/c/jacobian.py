@@ -14,11 +14,10 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.c.simulation import simulate
+from rov_fmu.c.simulation import Array, simulate
 from rov_fmu.io.messages import InputError, did_you_mean, listed
 from rov_fmu.vehicle.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 _SPACINGS = (3e-3, 1e-4, 3e-6)
 """The distances between the points, relative to the size of the number: first the one with the smallest rounding
 errors."""

@@ -23,6 +23,10 @@ from rov_fmu.equation.expression import (
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import Equation, equation_of, rate_formula
 
+_Run = tuple[str, str, int]
+"""The products of a state with neighbouring ones: that state, the first neighbour, and their number. For squares, the
+first item is empty."""
+
 
 class EquationSource:
     """The parts of model.h and equation.h in C."""
@@ -156,16 +160,12 @@ class EquationSource:
         """The index of the block of each state."""
         return {name: i for i, block in enumerate(self.blocks) for name in block}
 
-    def products(self, block: Sequence[str]) -> tuple[list[tuple[str, str, int]], dict[tuple[str, ...], str]]:
-        """Return the products of a block in runs, and the C expression of each product.
-
-        A run multiplies one state by several neighbouring states. It consists of that state, the first neighbour and
-        the number of neighbours. For squares, the first item is empty.
-        """
+    def products(self, block: Sequence[str]) -> tuple[list[_Run], dict[tuple[str, ...], str]]:
+        """Return the products of a block in runs, and the C expression of each product."""
         states = self.equation.states
         pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
         wanted = {("", a) if a == b else (a, b) for a, b in pairs}
-        runs: list[tuple[str, str, int]] = []
+        runs: list[_Run] = []
         places: dict[tuple[str, ...], str] = {}
         while wanted:
             first, second, length = self._longest_run(wanted)
@@ -176,7 +176,7 @@ class EquationSource:
             runs.append((first, second, length))
         return runs, places
 
-    def _longest_run(self, wanted: Collection[tuple[str, str]]) -> tuple[str, str, int]:
+    def _longest_run(self, wanted: Collection[tuple[str, str]]) -> _Run:
         """Return the longest run among some products; of several, the first in the order of the states."""
         states = self.equation.states
         candidates = {*wanted, *((b, a) for a, b in wanted if a)}

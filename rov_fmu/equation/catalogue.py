@@ -219,6 +219,10 @@ class Declaration:
         """The unit in which people read the quantity, or None if that is its own unit."""
         return None if self.unit == "1" and not self.is_share else DISPLAYS.get(self.unit, (None,))[0]
 
+    def written(self, value: float) -> str:
+        """Return a value with its unit, which a ratio does not have."""
+        return f"{value:.12g}{'' if self.unit == '1' else f' {self.unit}'}"
+
     def filled(self, **texts: str) -> "Declaration":
         """Return the declaration with its fields replaced by texts: {axis} by "surge"."""
         return replace(self, unit=self.unit.format(**texts), description=self.description.format(**texts))

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import inf
 
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 
 from .catalogue import (
@@ -335,10 +336,8 @@ class Layout:
 
         Beyond its range, the thrust of a curve stays that of the nearest table.
         """
-        names: dict[tuple[float, float], list[str]] = {}
-        for curve in self.curves:
-            if len(curve.tables) > 1:
-                names.setdefault((curve.tables[0].voltage, curve.tables[-1].voltage), []).append(curve.name)
+        several = [curve for curve in self.curves if len(curve.tables) > 1]
+        names = grouped(((curve.tables[0].voltage, curve.tables[-1].voltage), curve.name) for curve in several)
         return {bounds: " and ".join(curves) for bounds, curves in names.items()}
 
     @cached_property

@@ -25,6 +25,8 @@ _KIRCHHOFF = {
 }
 """For each axis, the products of a momentum and a velocity: the sign, the axis of the momentum, and the velocity."""
 _ORDER = "uvwpqr"
+_Pair = tuple[str, str]
+"""Two axes, by their velocities."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +35,7 @@ class MassMatrix:
 
     gains: Mapping[str, Expression]
     """For each axis, by its velocity: the formula of beta/m from the entry on the diagonal."""
-    entries: Mapping[tuple[str, str], Expression]
+    entries: Mapping[_Pair, Expression]
     """The formulas of the effective entries off the diagonal, by two velocities in the order of the axes.
 
     The vehicle may lack one of the two axes. The entry then gives a momentum along or about the missing axis."""
@@ -99,12 +101,10 @@ class MassMatrix:
                 )
                 formulas.define(total(parts), "inverse", row + column)
 
-    def _decomposed(
-        self, formulas: Formulas, block: tuple[str, ...]
-    ) -> tuple[dict[str, Name], dict[tuple[str, str], Name]]:
+    def _decomposed(self, formulas: Formulas, block: tuple[str, ...]) -> tuple[dict[str, Name], dict[_Pair, Name]]:
         """Add formulas for M = L D L^T, row by row. Return the names of the pivots in D, and of the factors in L."""
         pivot: dict[str, Name] = {}
-        factor: dict[tuple[str, str], Name] = {}
+        factor: dict[_Pair, Name] = {}
         for n, row in enumerate(block):
             for m, column in enumerate(block[:n]):
                 parts: list[Expression] = [self._name("mass", column, row)] if (column, row) in self.entries else []
@@ -119,26 +119,26 @@ class MassMatrix:
             pivot[row] = formulas.define(total([self._name("mass", row, row), *squares]), "pivot", row)
         return pivot, factor
 
-    def coriolis(self, axis: str) -> dict[tuple[str, str], Expression]:
+    def coriolis(self, axis: str) -> dict[_Pair, Expression]:
         """Return the coefficients of products of two velocities in the acceleration of an axis, as formulas."""
-        by_pair: dict[tuple[str, str], list[Expression]] = {}
+        by_pair: dict[_Pair, list[Expression]] = {}
         for other, inverse in self.inverse(axis).items():
             for pair, entries in self.products(other).items():
                 parts = (sign * self._term(inverse, entry) for sign, entry in entries)
                 by_pair.setdefault(pair, []).extend(parts)
         return {pair: total(parts) for pair, parts in sorted(by_pair.items(), key=lambda item: _places(item[0]))}
 
-    def _term(self, inverse: Name, entry: tuple[str, str]) -> Expression:
+    def _term(self, inverse: Name, entry: _Pair) -> Expression:
         a, b = entry
         is_uncoupled = a == b and self._is_uncoupled(a)
         return inverse / self.names("gain", a) if is_uncoupled else inverse * self._name("mass", a, b)
 
-    def products(self, axis: str) -> dict[tuple[str, str], list[tuple[int, tuple[str, str]]]]:
+    def products(self, axis: str) -> dict[_Pair, list[tuple[int, _Pair]]]:
         """Return the right side of Kirchhoff's equations for an axis.
 
         For each product of two velocities, it has entries of the mass matrix with their signs.
         """
-        by_pair: dict[tuple[str, str], list[tuple[int, tuple[str, str]]]] = {}
+        by_pair: dict[_Pair, list[tuple[int, _Pair]]] = {}
         for sign, momentum, velocity in _KIRCHHOFF[axis]:
             if velocity not in self.gains:
                 continue
@@ -154,7 +154,7 @@ class MassMatrix:
         return {pair: entries for pair, entries in ordered if entries}
 
 
-def _sorted(a: str, b: str) -> tuple[str, str]:
+def _sorted(a: str, b: str) -> _Pair:
     return (a, b) if _ORDER.index(a) <= _ORDER.index(b) else (b, a)
 
 

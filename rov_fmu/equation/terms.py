@@ -26,6 +26,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 
+from rov_fmu.io.groups import grouped
+
 from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
 from .expression import Expression, Formulas, Name, Names, call, directed, of, product, total, where
@@ -350,11 +352,9 @@ class _Table:
                         changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
                 if changes:
                     yield Term(self._named(total(changes), kind, v, curve.name), (arrived,) * power)
-            losses: dict[str, list[Expression]] = {}
             rising = advance(self.layout, self.names, curve, of_rotor("loss_rise")) if curve.has_rotors else ()
-            for force in (force for force in rising if force.axis in inverse):
-                losses.setdefault(force.factors[0], []).append(force.along(inverse[force.axis]))
-            for other, parts in losses.items():
+            along = [(force.factors[0], force.along(inverse[force.axis])) for force in rising if force.axis in inverse]
+            for other, parts in grouped(along).items():
                 yield Term(self._named(total(parts), "arriving_loss", v, other, curve.name), (arrived, other))
 
     def _term(self, v: str, forces: Sequence[Force], inverse: Mapping[str, Name]) -> Term:

@@ -121,15 +121,17 @@ _LISTS = {
 }
 
 
-def _structure(
-    variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]
-) -> dict[str, dict[str, dict[str, str]]]:
-    """Return the lists of <ModelStructure> by name: for each unknown the dependenciesKind of each known."""
+_Elements = dict[str, dict[str, str]]
+"""For each unknown the dependenciesKind of each known."""
+
+
+def _structure(variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]) -> dict[str, _Elements]:
+    """Return the lists of <ModelStructure> by name."""
     parameters, order = parameters_of(layout), {v.name: v.index for v in variables}
-    lists: dict[str, dict[str, dict[str, str]]] = {name: {} for name in names}
+    lists: dict[str, _Elements] = {name: {} for name in names}
     outputs, derivatives, initial = lists.values()
 
-    def add(to: dict[str, dict[str, str]], variable: Variable, known: Mapping[str, str]) -> None:
+    def add(to: _Elements, variable: Variable, known: Mapping[str, str]) -> None:
         to[variable.name] = dict(sorted(known.items(), key=lambda item: order[item[0]]))
 
     for v in variables:

@@ -25,6 +25,7 @@ from rov_fmu.identify.result import (
     Effect,
     Identification,
     Interval,
+    Known,
     Logging,
     Prediction,
     Structure,
@@ -32,6 +33,7 @@ from rov_fmu.identify.result import (
     relative_error,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank.arrays import rms, usual_range
@@ -267,9 +269,8 @@ def next_tests(identification: Identification) -> list[str]:
     If no test is useful, logs that need repair come first. Otherwise the sentence names the widest interval; without
     any test there is none. How to identify the other axes of the vehicle comes last.
     """
-    groups: dict[tuple[str, str], list[Axis]] = {}
-    for one in identification.axes_of_base:
-        groups.setdefault((one.reason, how_to_measure(one.axis, "<axis>")), []).append(one.axis)
+    of_base = identification.axes_of_base
+    groups = grouped(((one.reason, how_to_measure(one.axis, "<axis>")), one.axis) for one in of_base)
     others = [
         f"{listed(axis.name for axis in axes)}: {reason}. {how_to_record(axes)}."
         for (reason, _), axes in groups.items()
@@ -315,9 +316,7 @@ def _next_tests(identification: Identification) -> list[str]:
 
 def repairs(identification: Identification) -> list[str]:
     """Return what to do about each log that does not fit the others, in sentences. It comes before any other test."""
-    odd: dict[str, list[str]] = {}
-    for file, reason in _disagreements(identification):
-        odd.setdefault(file, []).append(reason)
+    odd = grouped(_disagreements(identification))
     others = len(identification.folder.logs) - len(odd)
     rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
     return [
@@ -408,7 +407,7 @@ def with_lag(identification: Identification) -> list[str]:
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
-def with_error(known: tuple[float, Interval], unit: str) -> str:
+def with_error(known: Known, unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
     wider than the value is not known."""
     value, interval = known
@@ -502,11 +501,8 @@ def _on_points(result: AxisResult) -> Iterator[Finding]:
 
 def _on_forces(identification: Identification) -> Iterator[Finding]:
     """Yield findings about tables of forces whose scale contradicts that of the logs."""
-    by_table: dict[tuple[str, str], list[float]] = {}
-    for p in identification.forces:
-        if p.counts and p.measured * p.model > 0.0:
-            by_table.setdefault((p.subject, p.file), []).append(p.measured / p.model)
-    for (curve, file), ratios in by_table.items():
+    told = [p for p in identification.forces if p.counts and p.measured * p.model > 0.0]
+    for (curve, file), ratios in grouped(((p.subject, p.file), p.measured / p.model) for p in told).items():
         ratio = float(np.median(ratios))
         if abs(log(ratio)) > log(1.0 + _CONTRADICTION):
             yield Finding("thrust tables", curve=curve, file=file, words={"ratio": significant(ratio, 2)})

@@ -23,6 +23,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.records import unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import Point, Prediction
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -276,10 +277,7 @@ def held_out_rows(objective: Objective, best: Minimum) -> Values:
     """
     rows, known = objective.rows, Knowledge(objective, best)
     found: dict[tuple[str, str, float], float] = {}
-    groups: dict[tuple[str, str, float], list[int]] = {}
-    for n, row in enumerate(rows):
-        kind = "force" if row.quantity == "force" else "motion"
-        groups.setdefault((kind, row.subject.name, abs(row.command)), []).append(n)
+    groups = grouped(((row.quantity == "force", row.subject.name, abs(row.command)), n) for n, row in enumerate(rows))
     parts = [Part(objective.whole.logs, [n for n in objective.whole.rows if n not in out]) for out in groups.values()]
     for members, part, without in zip(groups.values(), parts, refits(objective, best, parts), strict=True):
         some = [rows[n] for n in members]

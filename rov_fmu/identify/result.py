@@ -16,6 +16,8 @@ from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Interval = tuple[float, float]
+Known = tuple[float, Interval]
+"""A number with its 95 % interval."""
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
@@ -62,13 +64,13 @@ class Answer:
     axis: Axis
     command: float
     """A fraction of full command, with its sign."""
-    steady: tuple[float, Interval]
+    steady: Known
     """The steady velocity V_ss, m/s or rad/s."""
-    rise: tuple[float, Interval]
+    rise: Known
     """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
-    stop: tuple[float, Interval]
+    stop: Known
     """The stopping distance: from it to a tenth of it without thrust, m or rad."""
-    lagged: tuple[float, Interval] | None = None
+    lagged: Known | None = None
     """The time with the lag of the thrusters, s; None without a lag."""
 
 
@@ -339,7 +341,7 @@ class AxisOfBase:
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
 
 
-def half_width(known: tuple[float, Interval]) -> float:
+def half_width(known: Known) -> float:
     """Return the larger half of the interval of a number, relative to the number."""
     value, interval = known
     return max(abs(end / value - 1.0) for end in interval)

@@ -8,7 +8,7 @@ from tempfile import mkdtemp
 from rov_fmu.fmu.content import web_module
 from rov_fmu.io.file_kinds import PAGE, check_written
 from rov_fmu.io.messages import print_message
-from rov_fmu.io.output import Output, check_replaced, check_targets, sealed, write_whole
+from rov_fmu.io.output import check_replaced, check_targets, page_output, write_whole
 from rov_fmu.report.console import console
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of
@@ -33,9 +33,8 @@ def write_fly_page(
     names = [path.name for path in paths]
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
     shown = [Flown(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)]
-    page = sealed(fly_page(shown, recording=flown), "<!-- {} -->", "fly").encode()
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
-    write_whole(Output(path, page), force=force)
+    write_whole(page_output(path, fly_page(shown, recording=flown), "fly"), force=force)
     return path
 
 

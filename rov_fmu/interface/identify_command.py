@@ -9,7 +9,7 @@ from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written, is_mcap
 from rov_fmu.io.messages import InputError, Progress
-from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.io.output import Output, check_replaced, check_targets, page_output, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.vehicle.writer import check_report, vehicle_output
@@ -59,9 +59,10 @@ def identify_tests(
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if report:
-        from rov_fmu.report.report import report_output  # imports Matplotlib, which takes a second
+        from rov_fmu.report.report import report_page  # imports Matplotlib, which takes a second
 
-        outputs.append(report_output(identification, report, begin("drawing the report")))
+        page = report_page(identification, begin("drawing the report"))
+        outputs.append(page_output(report, page, "identify"))
     if vehicle:
         identified = identification.vehicle
         if report:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rov_fmu.identify.inspection.inspected import Inspected, inspect_logs
 from rov_fmu.io.file_kinds import PAGE, check_written
-from rov_fmu.io.output import check_replaced, check_targets, write_whole
+from rov_fmu.io.output import check_replaced, check_targets, page_output, write_whole
 
 
 def inspect_tests(
@@ -24,9 +24,9 @@ def inspect_tests(
     inspected = inspect_logs(paths)
     outputs = []
     if report:
-        from rov_fmu.report.inspection_page import inspection_output  # imports Matplotlib, which takes a second
+        from rov_fmu.report.inspection_page import inspection_page  # imports Matplotlib, which takes a second
 
-        outputs.append(inspection_output(inspected, report))
+        outputs.append(page_output(report, inspection_page(inspected), "inspect"))
     if drafts and inspected.text:
         outputs.append(inspected.completed)
     write_whole(*outputs, force=True)

@@ -12,7 +12,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.io.file_kinds import PAGE, check_written
 from rov_fmu.io.messages import Progress, ProofError, listed
-from rov_fmu.io.output import check_replaced, check_targets, write_whole
+from rov_fmu.io.output import check_replaced, check_targets, page_output, write_whole
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
@@ -21,7 +21,7 @@ from rov_fmu.prove.runs import Array, Plan
 from rov_fmu.prove.subject import Subject
 from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
 from rov_fmu.report.progress import parts
-from rov_fmu.report.proof_page import proof_output
+from rov_fmu.report.proof_page import proof_page
 
 _GLIDE, _GLIDE_STEPS = 10.0, 100
 """The length of a motion without thrust (s), and its number of steps."""
@@ -82,7 +82,7 @@ def prove_with_report(fmu: Path, report: Path, options: Options, on_progress: Pr
     proof = prove_claims(
         fmu, options.interface, options.tolerance, options.time_limit, options.key, CLAIMS_OF_VEHICLES, on_progress
     )
-    write_whole(proof_output(proof, report), force=options.force)
+    write_whole(page_output(report, proof_page(proof), "prove"), force=options.force)
     return proof
 
 

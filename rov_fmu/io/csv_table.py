@@ -57,6 +57,8 @@ _MOST_COMPARED = 1000
 LARGEST = 500_000_000
 """The largest file that is read, in bytes. Its numbers and lines take up to a few times its size in memory."""
 
+OpenStream = Callable[[], TextIO]
+"""Opens the lines of a table."""
 Conversion = Callable[[float], float]
 """The conversion of a number. It can be sent to the child process that reads a log."""
 
@@ -157,7 +159,7 @@ def read_columns(
     renamed: Mapping[str, str] = MappingProxyType({}),
     hint: str = "",
     check_header: Callable[[Mapping[str, str], Sequence[str]], Iterable[str]] = lambda _, __: (),
-    open_stream: Callable[[], TextIO] | None = None,
+    open_stream: OpenStream | None = None,
 ) -> Columns:
     """Read the columns, in any order, with headers such as `command [%]`. Raises DataFileError with all mistakes.
 
@@ -243,7 +245,7 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
     return {column.name: cells[place] if place < len(cells) else "" for place, column in file_columns.items()}
 
 
-def read_header(path: Path, open_stream: Callable[[], TextIO] | None = None) -> list[str]:
+def read_header(path: Path, open_stream: OpenStream | None = None) -> list[str]:
     """Return the cells of the header. Raises DataFileError."""
     return next(iter(_CsvFile(path, open_stream)))[1]
 
@@ -256,7 +258,7 @@ class Series(dict[str, "array[float]"]):
 
 
 def read_series(
-    path: Path | str, why_wrong: Callable[[str], str | None], open_stream: Callable[[], TextIO] | None = None
+    path: Path | str, why_wrong: Callable[[str], str | None], open_stream: OpenStream | None = None
 ) -> Series:
     """Read variables over time: the first column is the time, which may stay but not go back, the others are variables.
 
@@ -332,7 +334,7 @@ class _Mistakes:
 # ---- Lines -----------------------------------------------------------------------------------------------------------
 
 
-def open_text(path: Path) -> Callable[[], TextIO]:
+def open_text(path: Path) -> OpenStream:
     """Return a function that opens the lines of a table, each time from the start. Raises UnreadableFileError.
 
     The text is in UTF-16 if it begins with its byte order mark, otherwise in UTF-8, or else in code page 1252, in which
@@ -466,7 +468,7 @@ class _TornRows:
 class _CsvFile:
     """The lines of a CSV file from its header on that are not blank, each with its number and its cells."""
 
-    def __init__(self, path: Path | str, open_stream: Callable[[], TextIO] | None) -> None:
+    def __init__(self, path: Path | str, open_stream: OpenStream | None) -> None:
         self.path = path
         self._open = open_stream or open_text(Path(path))
         self._dialect = _dialect(self._open())

@@ -10,6 +10,8 @@ from math import exp
 from pathlib import Path
 from textwrap import wrap
 
+from rov_fmu.io.groups import grouped
+
 MOST = 10
 """The largest number of mistakes in a file that are printed. The others are only counted."""
 
@@ -139,9 +141,7 @@ def similar(name: str, names: Iterable[str], most: int = 1) -> list[str]:
 
     Of equally similar names, one with which the unknown name begins is first: for u_left, this is u_l, and not u_t.
     """
-    by_folded: dict[str, list[str]] = {}
-    for known in names:
-        by_folded.setdefault(known.casefold(), []).append(known)
+    by_folded = grouped((known.casefold(), known) for known in names)
     unknown = name.casefold()
 
     def closeness(known: str) -> tuple[float, bool]:

@@ -137,6 +137,11 @@ def sealed(text: str, comment: str, command: str) -> str:
     return f"{comment.format(words)}\n{text}"
 
 
+def page_output(path: Path, page: str, command: str) -> Output:
+    """Return the file of a page (HTML) that a command writes."""
+    return Output(path, sealed(page, "<!-- {} -->", command).encode())
+
+
 def without_seal(text: str) -> str:
     """Return the text without the first line that `sealed` adds, because it is about to be changed."""
     first, _, rest = text.partition("\n")

@@ -3,16 +3,26 @@
 import json
 import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin
 
-from pydantic import BaseModel, ConfigDict, ValidationError, ValidationInfo, create_model
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    WithJsonSchema,
+    create_model,
+)
 from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from rov_fmu.io.file_kinds import check_keys
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.reading import read_bytes, text_of
 
@@ -132,14 +142,44 @@ def validate(data: Toml, model: type[Checked], **context: object) -> tuple[Check
         return None, error.errors(include_url=False)
 
 
-def as_tuple(value: object) -> object:
-    """Return a list as a tuple, because TOML has only lists, and any other value as it is."""
-    return tuple(value) if isinstance(value, list) else value
-
-
 def folder_of(info: ValidationInfo) -> Path:
     """Return the folder of the file that is checked, or the current folder for data from no file."""
     return Path((info.context or {}).get("folder", ""))
+
+
+# ---- Kinds of values -------------------------------------------------------------------------------------------------
+
+
+AS_TUPLE = Field(strict=False)
+"""An array of TOML becomes a tuple."""
+
+
+def printable(text: str) -> str:
+    """Return the text if it has no control characters. Raises ValueError."""
+    if control := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):
+        raise ValueError(f"must be without the control character {control[0]!a}")
+    return text
+
+
+def rule(words: str, holds: Callable[[Any], object]) -> AfterValidator:
+    """Return a validator that raises ValueError with these words about a value that does not keep a rule."""
+
+    def checked(given: Any) -> Any:
+        if not holds(given):
+            raise ValueError(words)
+        return given
+
+    return AfterValidator(checked)
+
+
+NOT_BLANK = rule("must not be blank", str.strip)
+Text = Annotated[str, Field(min_length=1, max_length=10_000), AfterValidator(printable), NOT_BLANK]
+Name = Annotated[str, Field(min_length=1, max_length=100, pattern=r"^[^\n\t]*$"), AfterValidator(printable), NOT_BLANK]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+SYMBOL = rule("must be at most 30 letters, digits and underscores", re.compile("[A-Za-z0-9_]{1,30}").fullmatch)
+SYMBOL_SCHEMA = WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})
+Symbol = Annotated[str, SYMBOL, SYMBOL_SCHEMA]
+"""A name that becomes part of the names of FMU variables."""
 
 
 # ---- Problems in words -----------------------------------------------------------------------------------------------
@@ -166,15 +206,10 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     A mistake that several entries of a list of tables repeat gives one line. After the first ten the lines are empty,
     because it takes long to find the most similar key for many unknown ones.
     """
-    unknown: dict[_Place, list[_Place]] = {}  # the places of the unknown keys of each table
-    for problem in problems:
-        if problem["type"] == "extra_forbidden":
-            unknown.setdefault(problem["loc"][:-1], []).append(problem["loc"])
-    repeated: dict[tuple[object, ...], list[ErrorDetails]] = {}
-    for problem in problems:
-        repeated.setdefault(_mistake(problem), []).append(problem)
+    places = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
+    unknown = grouped((place[:-1], place) for place in places)  # the places of the unknown keys of each table
     number = 0
-    for some in repeated.values():
+    for some in grouped((_mistake(problem), problem) for problem in problems).values():
         if number == MOST:
             yield ""
             continue

@@ -11,8 +11,9 @@ from typing import Any, Literal
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, listed
-from rov_fmu.prove.proof import SHARE_OF_NOMINAL, Finding, compare, nominal
+from rov_fmu.prove.proof import SHARE_OF_NOMINAL, compare, nominal
 from rov_fmu.prove.runs import REAL, Answer, Array, RunError
 from rov_fmu.prove.subject import Subject
 
@@ -68,9 +69,7 @@ def expected(subject: Subject) -> Evidence:
     if not subject.experiments:
         return does_not_apply("the FMU carries no expected results (FMI-LS-REF)")
     findings = compare(subject)
-    by_experiment: dict[str, list[Finding]] = {}
-    for f in findings:
-        by_experiment.setdefault(f.experiment, []).append(f)
+    by_experiment = grouped((f.experiment, f) for f in findings)
     worst = [max(own, key=lambda f: f.deviation / f.tolerance) for own in by_experiment.values()]
     wrong = [f for f in findings if not f.passed]
     tolerances, deviations = [f.tolerance for f in worst], [f.deviation for f in worst]

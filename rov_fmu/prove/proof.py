@@ -2,7 +2,7 @@
 
 import io
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
@@ -13,7 +13,7 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
-from rov_fmu.io.messages import FileError, ProofError, brief, one_line
+from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, silent
 from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.experiments import Experiment
 from rov_fmu.prove.runs import Runs, forget_message, keep_message, last_message
@@ -56,7 +56,7 @@ def prove(
     interface: str | None = None,
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
-    on_experiment: Callable[[str, float], None] = lambda *_: None,
+    on_experiment: Progress = silent,
 ) -> list[Finding]:
     """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
@@ -75,7 +75,7 @@ def prove(
         return compare(subject, on_experiment)
 
 
-def compare(subject: Subject, on_experiment: Callable[[str, float], None] = lambda *_: None) -> list[Finding]:
+def compare(subject: Subject, on_experiment: Progress = silent) -> list[Finding]:
     """Run the experiments of an FMU and compare the results, as `prove` does."""
     fmu, wanted = subject.path, subject.interface
     has = [name for name, of in INTERFACES.items() if getattr(subject.description, of)]

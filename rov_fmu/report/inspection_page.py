@@ -1,19 +1,14 @@
 """The page of `rov-fmu inspect --report`: pictures of logs, what is recognised, and what no fit can learn from them."""
 
-from datetime import date
 from functools import partial
-from pathlib import Path
 
 from markupsafe import Markup
 
-from rov_fmu import __version__
 from rov_fmu.identify.inspection.inspected import Inspected
 from rov_fmu.io.messages import first_of
-from rov_fmu.io.output import Output, sealed
-from rov_fmu.report.console_log import NOT_ENOUGH, UNDETERMINED, cells, notes, unrecognised
+from rov_fmu.report import console_log
 from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
-from rov_fmu.report.report import today
 from rov_fmu.report.templates import page
 from rov_fmu.tank.inspection.inspection import Inspection
 
@@ -21,13 +16,8 @@ _WIDTH = 7.2
 """The width of a picture, inches."""
 
 
-def inspection_output(inspected: Inspected, path: Path) -> Output:
-    """Return the file of the page about logs."""
-    return Output(path, sealed(inspection_page(inspected), "<!-- {} -->", "inspect").encode())
-
-
-def inspection_page(inspected: Inspected, *, made: date | None = None) -> str:
-    """Return the page as HTML. The same logs and date (today by default) give the same text."""
+def inspection_page(inspected: Inspected) -> str:
+    """Return the page as HTML."""
 
     def plot(one: Inspection) -> Markup | None:
         if one.log is None or not (one.log.commands or any(not c.unused for c in one.log.channels)):
@@ -38,12 +28,7 @@ def inspection_page(inspected: Inspected, *, made: date | None = None) -> str:
     return page(
         "inspection.html.j2",
         inspected=inspected,
-        made=made or today(),
-        version=__version__,
         plot=plot,
-        cells=cells,
-        notes=lambda one: first_of(notes(one)),
-        unrecognised=lambda one: first_of(unrecognised(one)),
-        NOT_ENOUGH=NOT_ENOUGH,
-        UNDETERMINED=UNDETERMINED,
+        console=console_log,
+        first_of=first_of,
     )

@@ -4,9 +4,7 @@ import os
 import platform
 import re
 from collections.abc import Callable, Mapping
-from datetime import date
 from functools import partial
-from pathlib import Path
 
 import fmpy
 from markupsafe import Markup
@@ -14,13 +12,11 @@ from markupsafe import Markup
 from rov_fmu import __version__
 from rov_fmu.fmu.archive import META_DATA
 from rov_fmu.fmu.card import not_to_use, read_card
-from rov_fmu.io.output import Output, sealed
 from rov_fmu.prove.claims import Claim, Proof
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.report.console import shell_words
 from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
-from rov_fmu.report.report import today
 from rov_fmu.report.templates import number, page
 
 _SIZE = 3.7, 2.0
@@ -34,13 +30,8 @@ _PLOTS: Mapping[str, Callable[..., None]] = {
 _POWER = re.compile(r"(?<![\w.])\d(?:\.\d+)?e[-+]\d+")
 
 
-def proof_output(proof: Proof, path: Path) -> Output:
-    """Return the file of the page about an FMU's evidence."""
-    return Output(path, sealed(proof_page(proof), "<!-- {} -->", "prove").encode())
-
-
-def proof_page(proof: Proof, *, made: date | None = None) -> str:
-    """Return the page as HTML. The same evidence and date (today by default) give the same text on one machine."""
+def proof_page(proof: Proof) -> str:
+    """Return the page as HTML. It tells on which machine it was made."""
 
     def plot(claim: Claim, evidence: Evidence) -> Markup | None:
         if not evidence.curve:
@@ -54,7 +45,6 @@ def proof_page(proof: Proof, *, made: date | None = None) -> str:
         card=(card := read_card(proof.card)),
         not_to_use=not_to_use(card),
         meta_data=META_DATA,
-        made=made or today(),
         machine=f"{platform.system()} {platform.machine()}, {os.cpu_count()} processors, "
         f"Python {platform.python_version()}, FMPy {fmpy.__version__}, rov-fmu {__version__}",
         command=shell_words("rov-fmu", "prove", proof.fmu.name, "--report", "report.html"),

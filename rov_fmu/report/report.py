@@ -1,11 +1,8 @@
 """The identification report: one HTML file with the verdicts, the answers, the predictions, and all that is known."""
 
-import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from datetime import date, datetime, timezone
 from functools import partial
 from itertools import count
-from pathlib import Path
 
 from markupsafe import Markup
 
@@ -14,7 +11,6 @@ from rov_fmu.identify import findings
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
 from rov_fmu.io.messages import Progress, silent
-from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.plots.identification import plot_answers, plot_forces
 from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
@@ -34,20 +30,8 @@ _BROAD = 7.2
 """The width of the large picture on a wide page, inches."""
 
 
-def report_output(results: Identification, path: Path, on_progress: Progress = silent) -> Output:
-    """Return the file of the report of an identification."""
-    return Output(path, sealed(report_page(results, on_progress), "<!-- {} -->", "identify").encode())
-
-
-def today() -> date:
-    """Return today's date (UTC), or the date of SOURCE_DATE_EPOCH, which makes builds reproducible."""
-    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
-    now = datetime.fromtimestamp(int(epoch), timezone.utc) if epoch.isdecimal() else datetime.now(timezone.utc)
-    return now.date()
-
-
-def report_page(results: Identification, on_progress: Progress = silent, *, made: date | None = None) -> str:
-    """Return the report as HTML. The same identification and date (today by default) always give the same text."""
+def report_page(results: Identification, on_progress: Progress = silent) -> str:
+    """Return the report as HTML."""
     curves = {p.subject: [q for q in results.forces if q.subject == p.subject] for p in results.forces}
     shown = _shown(results.axes)
     drawn = count()
@@ -62,10 +46,7 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         "report.html.j2",
         vehicle=results.vehicle,
         results=results,
-        made=made or today(),
-        findings=findings.by_heading(results.findings),
-        next_tests=findings.next_tests(results),
-        repairs=findings.repairs(results),
+        findings=findings,
         shown=shown,
         forces=curves,
         plot=plot,
@@ -75,21 +56,11 @@ def report_page(results: Identification, on_progress: Progress = silent, *, made
         picture=_picture(results, shown, partial(plot, "Main prediction", "log")) if shown else None,
         script=inline_script("plots.js"),
         card=card(results.vehicle),
-        asides=[*findings.with_lag(results), *findings.driven_aside(results)],
-        extrapolated=findings.extrapolated(results),
-        assumed=findings.sentences(results.findings, "assumed thrust"),
-        assumed_vehicle=findings.sentences(results.findings, "assumed vehicle"),
-        scale=findings.assumed_scale(results),
-        scale_of=partial(findings.assumed_scale, results),
-        SHARES=findings.SHARES,
-        STOPPING=findings.STOPPING,
         KNOTS=KNOTS,
         KINDS=KINDS,
-        answer_at=findings.answer_at,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=relative_error,
-        size_in_words=findings.size_in_words,
         with_stop=with_stop,
         in_degrees=in_degrees,
     )

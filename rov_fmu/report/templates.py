@@ -2,13 +2,16 @@
 
 import base64
 import hashlib
+import os
 import re
 from dataclasses import dataclass
+from datetime import date, datetime, timezone
 from math import isfinite, isnan
 from pathlib import Path
 
 from markupsafe import Markup
 
+from rov_fmu import __version__
 from rov_fmu.io import numbers
 from rov_fmu.io.templates import render
 from rov_fmu.report import console
@@ -36,11 +39,23 @@ def inline_script(*names: str, folder: Path = _TEMPLATES) -> Script:
     return Script(Markup(text), f"; script-src 'sha256-{digest}'")
 
 
+def today() -> date:
+    """Return today's date (UTC), or the date of SOURCE_DATE_EPOCH, which makes builds reproducible."""
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    now = datetime.fromtimestamp(int(epoch), timezone.utc) if epoch.isdecimal() else datetime.now(timezone.utc)
+    return now.date()
+
+
 def page(template: str, **content: object) -> str:
-    """Return a page made from a template; the functions of this module are its filters."""
+    """Return a page made from a template; the functions of this module are its filters.
+
+    The same content gives the same page on the same day.
+    """
     return render(
         template,
         _TEMPLATES,
+        made=today(),
+        version=__version__,
         number=number,
         text=text,
         unit=pretty_unit,
@@ -109,5 +124,10 @@ def pretty_unit(unit: str) -> str:
 
 def in_words(quantity: str, unit: str) -> str:
     """Return the title of a panel: the quantity in words, and its unit if there is one."""
-    shown = pretty_unit(unit) if unit != "1" else ""
-    return f"{quantity[:1].upper()}{quantity[1:]}{f' ({shown})' if shown else ''}"
+    return with_unit(f"{quantity[:1].upper()}{quantity[1:]}", unit)
+
+
+def with_unit(name: str, unit: str) -> str:
+    """Return a name with its unit; either of them may be missing."""
+    words = "" if unit == "1" else pretty_unit(unit)
+    return f"{name} ({words})" if name and words else name or words

@@ -5,12 +5,12 @@ from pathlib import Path
 
 from rov_fmu.interface.model import load
 from rov_fmu.io.messages import FileError, StudyError
-from rov_fmu.io.output import Output, check_replaced, write_whole
+from rov_fmu.io.output import Output, check_replaced, page_output, write_whole
 from rov_fmu.report.console import print_end
 from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import vehicle_file
-from rov_fmu.study.results.page import PAGE, page_output
+from rov_fmu.study.results.page import PAGE, study_page
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.results.summary import print_summary
 from rov_fmu.study.run.run_study import run_study
@@ -39,7 +39,7 @@ def study_plan(
             StudyParts(shown).update,
             lambda message: shown.print(f"warning: {message}"),
         )
-    written = [page_output(results)]
+    written = [page_output(output / PAGE, study_page(results), "study")]
     write_whole(*written, force=force)
     print_summary(results, spent)
     if vehicle and run is not None:

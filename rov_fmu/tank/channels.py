@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.agreement import disagreement, offset_in_words
-from rov_fmu.tank.arrays import Array, Flags, spread
+from rov_fmu.tank.arrays import Array, Flags, rms, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
     EULER,
@@ -251,14 +251,14 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     paths = (cumulative_trapezoid(values, time, axis=0, initial=0.0) for values in rates.values())
     travelled = dict(zip(rates, (np.diff(path[ends], axis=0) for path in paths), strict=True))
     stated, other = sorted(rates, reverse=_is_of_earth(velocity))
-    error = _size(travelled[stated] - moved)
-    if error <= max(_CONTRADICTS * _size(moved), _LEAST_ERROR):
+    error = rms(travelled[stated] - moved)
+    if error <= max(_CONTRADICTS * rms(moved), _LEAST_ERROR):
         return ""
     against = "it contradicts the positions in the same messages"
-    if _size(travelled[other] - moved) < _EXPLAINED * error:
+    if rms(travelled[other] - moved) < _EXPLAINED * error:
         return f"{against}, unless it is in a frame of {other}, not of {stated}"
     mapped = travelled[stated] @ np.linalg.lstsq(travelled[stated], moved, rcond=None)[0]
-    is_explained = len(moved) >= _LEAST_COMPARED and _size(mapped - moved) < _EXPLAINED * error
+    is_explained = len(moved) >= _LEAST_COMPARED and rms(mapped - moved) < _EXPLAINED * error
     return f"{against} by its scale, signs or axes" if is_explained else ""
 
 
@@ -293,11 +293,6 @@ def _agreeing(
 def _at(attitude: Slerp, time: Array) -> Rotation:
     """Return the attitude at some times; before and after all that are known, the first and the last one."""
     return attitude(np.clip(time, *attitude.times[[0, -1]]))
-
-
-def _size(vectors: Array) -> float:
-    """Return the root mean square of all components."""
-    return float(np.sqrt(np.mean(np.square(vectors))))
 
 
 # ---- Channels --------------------------------------------------------------------------------------------------------

@@ -18,16 +18,15 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated
+from typing import Annotated, TypeVar
 
 import numpy as np
 from pydantic import Field
 
 from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
-from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import listed, shown
-from rov_fmu.io.toml_file import Strict
+from rov_fmu.io.toml_file import Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
 from rov_fmu.tank.channels import Topic, frames_of
@@ -74,6 +73,7 @@ class LogKeys(Strict):
 NO_KEYS = LogKeys()
 Series = tuple[Array, Array]
 """Times (s, ascending) and values."""
+_Sent = TypeVar("_Sent")
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,17 +220,14 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
                     if force.axis.is_rotation == (message.gives != FORCE):
                         series = topic.time, np.nan_to_num(values[:, force.axis.place])
                         found.setdefault(topic.source, {})[force.name] = series
-    chosen = {source: own for source, own in found.items() if keys.outputs in ("", source.topic)}
-    if found and not chosen:
-        known = listed(shown(source.topic) for source in found)
-        raise DataFileError(f"{path}: [logs] names the outputs {shown(keys.outputs)}, but the log has {known}")
-    if not chosen:
+    own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)
+    if not own:
         return Commanded()
-    best = max(chosen, key=lambda source: sum(spread(values) for _, values in chosen[source].values()))
-    others = [source.topic for source in chosen if source is not best]
+    best = max(own, key=lambda source: sum(spread(values) for _, values in found[source].values()))
+    others = [source.topic for source in own if source is not best]
     left = f"; not used: {listed(others)}" if others else ""
     findings = [about(path.name, "source of wrench", source=best.topic, others=left)]
-    return Commanded(chosen[best], best, topics={source.topic for source in found}, findings=findings)
+    return Commanded(found[best], best, topics={source.topic for source in found}, findings=findings)
 
 
 def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
@@ -283,12 +280,12 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
 
 
 def _named(
-    path: Path, key: str, wanted: str, candidates: Sequence[_Outputs], name_of: Callable[[_Outputs], str]
-) -> Sequence[_Outputs]:
-    """Return the outputs that a key of [logs] names, or all without a name. Raises DataFileError."""
-    found = [outputs for outputs in candidates if wanted in ("", name_of(outputs))]
+    path: Path, key: str, wanted: str, candidates: Sequence[_Sent], name_of: Callable[[_Sent], str]
+) -> Sequence[_Sent]:
+    """Return the outputs or wrenches that a key of [logs] names, or all without a name. Raises DataFileError."""
+    found = [one for one in candidates if wanted in ("", name_of(one))]
     if candidates and not found:
-        known = listed(dict.fromkeys(shown(name_of(outputs)) for outputs in candidates))
+        known = listed(dict.fromkeys(shown(name_of(one)) for one in candidates))
         raise DataFileError(f"{path}: [logs] names the {key} {shown(wanted)}, but the log has {known}")
     return found
 

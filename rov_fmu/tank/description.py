@@ -6,7 +6,7 @@ tables of rov.toml, or, without either, the form of the paper. The coefficients 
 
 import os
 import re
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -28,19 +28,20 @@ from rov_fmu.equation.catalogue import (
 )
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Part, VehicleAxis
-from rov_fmu.io.field_types import Finite
 from rov_fmu.io.messages import MOST, did_you_mean, lines_on, only, shown, similar
 from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
+    AS_TUPLE,
+    Finite,
     Strict,
     Toml,
-    as_tuple,
     folder_of,
     join_names,
     key_line,
     parse_toml,
     problem_lines,
     read_toml,
+    rule,
 )
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
@@ -64,28 +65,17 @@ _FILE_TABLES = ("columns", "topics", "valid", "dives", "logs")
 # ---- The keys of the file --------------------------------------------------------------------------------------------
 
 
-def _must_be(reason: str, is_allowed: Callable[[Any], bool]) -> AfterValidator:
-    """Check that a value is allowed; the reason ends the message about one that is not."""
-
-    def check(value: object) -> object:
-        if not is_allowed(value):
-            raise ValueError(f"must be {reason}")
-        return value
-
-    return AfterValidator(check)
-
-
 _Window = Annotated[
     tuple[Finite, Finite],
-    BeforeValidator(as_tuple),
-    _must_be(
-        "[low, high] within -1 ... 1, fractions of the full command: 20 % is 0.2",
+    AS_TUPLE,
+    rule(
+        "must be [low, high] within -1 ... 1, fractions of the full command: 20 % is 0.2",
         lambda window: -1.0 <= window[0] < window[1] <= 1.0,
     ),
 ]
 
 
-_Deviation = Annotated[Finite, _must_be("0 or above", lambda deviation: deviation >= 0.0)]
+_Deviation = Annotated[Finite, rule("must be 0 or above", lambda deviation: deviation >= 0.0)]
 
 
 def _find_vehicle(name: object, info: ValidationInfo) -> Path:
@@ -157,9 +147,9 @@ def _check_clocks(names: tuple[str, ...], info: ValidationInfo) -> tuple[str, ..
 class Dive(Strict):
     """A table [dives.x]: a dive whose commands and measurements are in several files, each with its own times."""
 
-    files: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_files)]
+    files: Annotated[tuple[str, ...], AS_TUPLE, AfterValidator(_check_files)]
     """The files, one of which has the commands."""
-    other_clock: Annotated[tuple[str, ...], BeforeValidator(as_tuple), AfterValidator(_check_clocks)] = ()
+    other_clock: Annotated[tuple[str, ...], AS_TUPLE, AfterValidator(_check_clocks)] = ()
     """The files whose times come from another clock than the times of the commands."""
 
 
@@ -172,18 +162,22 @@ def _as_fraction(value: object) -> object:
 class TankLimits(Strict):
     """The table [limits]: the limits of a proposed test."""
 
-    tank_length: Annotated[Finite, _must_be("the length of the tank in m, above 0", lambda length: length > 0.0)] = inf
+    tank_length: Annotated[
+        Finite, rule("must be the length of the tank in m, above 0", lambda length: length > 0.0)
+    ] = inf
     """The longest distance along surge, sway or heave, m."""
     command_max: Annotated[
         Finite,
         BeforeValidator(_as_fraction),
-        _must_be(
-            'above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes',
+        rule(
+            'must be above 0 and at most 1, a fraction of the full command: half is 0.5, or "50 %" in quotes',
             lambda fraction: 0.0 < fraction <= 1.0,
         ),
     ] = 1.0
     """The strongest command, a fraction of the full command."""
-    duration: Annotated[Finite, _must_be("the duration of a test in s, above 0", lambda duration: duration > 0.0)] = inf
+    duration: Annotated[
+        Finite, rule("must be the duration of a test in s, above 0", lambda duration: duration > 0.0)
+    ] = inf
     """The longest recording, s."""
 
 
@@ -199,7 +193,8 @@ def _check_quantities(names: tuple[str, ...]) -> tuple[str, ...]:
 
 _Flagged = Annotated[
     tuple[str, ...],
-    BeforeValidator(lambda value: (value,) if isinstance(value, str) else as_tuple(value)),
+    AS_TUPLE,
+    BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
     AfterValidator(_check_quantities),
 ]
 

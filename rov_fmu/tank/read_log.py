@@ -13,6 +13,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, DataFileError
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
@@ -119,11 +120,8 @@ def _log(
 
 def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
     """Move the pulses of outputs that rest elsewhere than at the usual neutral pulse to this one, and tell it."""
-    pulses: dict[str, list[Array]] = {}
-    for topic in (topic for piece in content.pieces for topic in piece.topics):
-        for field, values in topic.full_fields():
-            if field in entries and entries[field].is_pulse:
-                pulses.setdefault(field, []).append(values)
+    fields = (pair for piece in content.pieces for topic in piece.topics for pair in topic.full_fields())
+    pulses = grouped((field, values) for field, values in fields if field in entries and entries[field].is_pulse)
     rests, findings = at_rest(content.file, {field: np.concatenate(parts) for field, parts in pulses.items()})
     content.findings += findings
     for field, rest in rests.items():

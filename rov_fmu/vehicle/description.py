@@ -12,10 +12,9 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, Wit
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
-from rov_fmu.io.field_types import Name, Text, not_blank, printable
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import DEVICE, inside, inside_or_shipped
-from rov_fmu.io.toml_file import Strict, as_tuple, folder_of
+from rov_fmu.io.toml_file import AS_TUPLE, Name, Strict, Text, folder_of, printable, rule
 from rov_fmu.vehicle.quantity import Interval
 
 
@@ -89,7 +88,7 @@ class FileHead(Head):
     icon and the thrusters are always drawn from their geometry."""
 
 
-_Sentences = Annotated[tuple[Text, ...], BeforeValidator(as_tuple)]
+_Sentences = Annotated[tuple[Text, ...], AS_TUPLE]
 _Command = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
@@ -106,17 +105,16 @@ LEAST_RANGE = 1e-6
 """The least size of the larger end of a range, in SI units."""
 
 
-def _not_empty(ends: tuple[float, float]) -> tuple[float, float]:
-    """Return the ends of a range if they are in order and not both 0. Raises ValueError."""
-    if not (ends[0] <= ends[1] and max(map(abs, ends)) >= LEAST_RANGE):
-        raise ValueError(f"must be [low, high], and one of them at least {LEAST_RANGE:g} away from 0")
-    return ends
+_NOT_EMPTY = rule(
+    f"must be [low, high], and one of them at least {LEAST_RANGE:g} away from 0",
+    lambda ends: ends[0] <= ends[1] and max(map(abs, ends)) >= LEAST_RANGE,
+)
 
 
 class IdentifiedRange(Strict):
     """The range of a velocity, of an angle or of the depth over which the vehicle was identified."""
 
-    range: Annotated[Interval, AfterValidator(_not_empty)]
+    range: Annotated[Interval, _NOT_EMPTY]
     """The ends, [low, high]."""
     unit: Literal["m/s", "rad/s", "rad", "m"]
 
@@ -162,9 +160,9 @@ def _report(name: object, info: ValidationInfo) -> Path:
     """Return the path of the report if the file exists or is about to be written. Raises ValueError."""
     if not isinstance(name, str):
         raise ValueError("must be text in quotes")
-    if not name:
-        raise ValueError("must have at least 1 character")
-    path, coming = inside(folder_of(info), not_blank(printable(name))), (info.context or {})["coming"]
+    if not name.strip():
+        raise ValueError("must not be blank" if name else "must have at least 1 character")
+    path, coming = inside(folder_of(info), printable(name)), (info.context or {})["coming"]
     if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
         raise ValueError("there is no such file beside this one")
     return folder_of(info) / name

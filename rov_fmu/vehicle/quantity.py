@@ -7,26 +7,25 @@ instead of them.
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, ValidationInfo, WithJsonSchema
 
 from rov_fmu.equation.catalogue import AXES, Axis, Declaration, cross_name
-from rov_fmu.io.field_types import SYMBOL_SCHEMA, Finite, Text, symbol
-from rov_fmu.io.toml_file import Strict, as_tuple, table_of
+from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, table_of
 
 
 def _cross_symbol(text: str) -> str:
-    """Return the text if it can be the name of a coefficient of several axes. Raises ValueError."""
+    """Return the text if it is no derivative in the notation of other programs. Raises ValueError."""
     if "|" in text and (hint := derivative_hint(text)):
         raise ValueError(f"is not a coefficient of several axes{hint}")
-    return symbol(text)
+    return text
 
 
-CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), SYMBOL_SCHEMA]
+CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), SYMBOL, SYMBOL_SCHEMA]
 """A key of [cross], which is also a name in the FMU."""
 
 Interval = Annotated[
     tuple[Finite, Finite],
-    BeforeValidator(as_tuple),
+    AS_TUPLE,
     WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
 ]
 """The ends of an interval, `[low, high]` in a TOML file."""
@@ -54,8 +53,7 @@ class Quantity(Strict):
 def within(value: float, declaration: Declaration) -> float:
     """Return the value if it is within the bounds of its coefficient. Raises ValueError."""
     if not declaration.minimum <= value <= declaration.maximum:
-        unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-        raise ValueError(f"must be within {declaration.minimum:.12g} ... {declaration.maximum:.12g}{unit}")
+        raise ValueError(f"must be within {declaration.minimum:.12g} ... {declaration.written(declaration.maximum)}")
     return value
 
 

@@ -38,9 +38,21 @@ from rov_fmu.equation.catalogue import (
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import CurrentTable, SourcedVector, ThrustTable, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.field_types import Finite, Name, Symbol, Text, not_blank
 from rov_fmu.io.paths import inside_or_shipped
-from rov_fmu.io.toml_file import DOCUMENTED, Strict, Toml, folder_of, table_of, validate
+from rov_fmu.io.toml_file import (
+    DOCUMENTED,
+    NOT_BLANK,
+    Finite,
+    Name,
+    Strict,
+    Symbol,
+    Text,
+    Toml,
+    folder_of,
+    rule,
+    table_of,
+    validate,
+)
 from rov_fmu.vehicle.description import FileHead, Provenance, Validity
 from rov_fmu.vehicle.quantity import CrossSymbol, Quantity, derivative, derivative_hint, quantity
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
@@ -166,10 +178,13 @@ _Thrust = Annotated[InstanceOf[ThrustTable], _file_read_by(read_thrust), _TEXT]
 _Current = Annotated[InstanceOf[CurrentTable], _file_read_by(read_current), _TEXT]
 
 
+_Volts = Annotated[Finite, Field(ge=0.1, le=1000.0)]
+
+
 class TableAtVoltage(Strict):
     """A table of thrust that was measured at a voltage."""
 
-    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    voltage: _Volts
     """The voltage, V."""
     table: _Thrust
     """The name of the CSV file."""
@@ -180,17 +195,16 @@ class ElectricCurrent(Strict):
     and the `table`, a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it,
     or none."""
 
-    voltage: Annotated[Finite, Field(ge=0.1, le=1000.0)]
+    voltage: _Volts
     """The voltage, V."""
     table: _Current
     """The name of the CSV file."""
 
 
-def _rising(tables: list[TableAtVoltage]) -> list[TableAtVoltage]:
-    """Return the tables if there are at least two and their voltages rise. Raises ValueError."""
-    if len(tables) < 2 or any(low.voltage >= high.voltage for low, high in pairwise(tables)):
-        raise ValueError("must be at least two tables with rising voltages")
-    return tables
+_RISING = rule(
+    "must be at least two tables with rising voltages",
+    lambda tables: len(tables) > 1 and all(low.voltage < high.voltage for low, high in pairwise(tables)),
+)
 
 
 class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
@@ -208,7 +222,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     table: _Thrust | None = None
     """A CSV file with the columns `command [1]`, `[%]` or `[us]`, and `thrust [N]`, `[kgf]` or `[lbf]`. It replaces
     a_t, b_t and c_0."""
-    tables: Annotated[list[TableAtVoltage], AfterValidator(_rising), Field(max_length=MOST)] | None = None
+    tables: Annotated[list[TableAtVoltage], _RISING, Field(max_length=MOST)] | None = None
     """Tables at several voltages, which replace `table`."""
     lag: Lag = "force"
     """What follows the command with the time constant T: the force, or the speed n of the rotor, on which the force
@@ -264,13 +278,6 @@ def _vector(vector: object) -> object:
     return tuple(vector)
 
 
-def _near(vector: Vector) -> Vector:
-    """Return a position if it can be on a vehicle. Raises ValueError."""
-    if max(map(abs, vector)) > _FARTHEST:
-        raise ValueError(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m")
-    return vector
-
-
 def _unit_vector(direction: Vector) -> Vector:
     """Return a direction as a unit vector. Raises ValueError if its length is zero or extreme."""
     x, y, z = direction
@@ -282,6 +289,7 @@ def _unit_vector(direction: Vector) -> Vector:
     return x / length, y / length, z / length
 
 
+_NEAR = rule(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m", lambda at: max(map(abs, at)) <= _FARTHEST)
 _Vector = Annotated[
     tuple[Finite, Finite, Finite],
     BeforeValidator(_vector),
@@ -303,7 +311,7 @@ class Position(Strict):
     """The position from the origin of the body frame: forward, starboard, down. It is needed for roll, pitch and yaw,
     unless the thruster has the key `arm`, or only turns in yaw and acts straight up or down."""
 
-    value: Annotated[_Vector, AfterValidator(_near)]
+    value: Annotated[_Vector, _NEAR]
     """Three numbers: forward, starboard, down."""
     unit: Literal["m"]
     source: Text
@@ -499,7 +507,7 @@ class File(Tables, _Head, json_schema_extra=_needed_in_file):
 
     # Any table may be missing, so that others are read where one has a mistake. read_tables tells what lacks.
 
-    alternatives: dict[Annotated[str, AfterValidator(not_blank)], Alternative] = Field(default={})
+    alternatives: dict[Annotated[str, NOT_BLANK], Alternative] = Field(default={})
     """Other published coefficients."""
     estimates: dict[str, Estimated] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Standard errors and correlations of identified coefficients."""

@@ -15,6 +15,7 @@ from scipy.special import ndtri, stdtrit
 
 from rov_fmu.equation.catalogue import TUNING, Declaration
 from rov_fmu.equation.layout import Layout
+from rov_fmu.io.groups import grouped
 from rov_fmu.vehicle.schema import Estimated
 
 Array = NDArray[np.float64]
@@ -75,10 +76,7 @@ class Uncertainty:
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """The names in groups of correlated coefficients; coefficients of different groups are independent."""
         _, numbers = connected_components(self.correlation != 0.0)
-        groups: dict[int, list[str]] = {}
-        for name, number in zip(self.names, numbers.tolist(), strict=True):
-            groups.setdefault(number, []).append(name)
-        return tuple(map(tuple, groups.values()))
+        return tuple(map(tuple, grouped(zip(numbers.tolist(), self.names, strict=True)).values()))
 
     def part(self, names: Sequence[str]) -> "Uncertainty":
         """Return the distribution of some of the coefficients.

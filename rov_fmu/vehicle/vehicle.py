@@ -205,11 +205,10 @@ class Vehicle:
 
     def _by_hand(self, before: str, after: str = "") -> str:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
-        items = []
-        for name, declaration in self.layout.coefficients.items():
-            if self.sources.get(name) == BY_HAND:
-                unit = "" if declaration.unit == "1" else f" {declaration.unit}"
-                items.append(f"{name} = {self[name]:.12g}{unit}")
+        coefficients = self.layout.coefficients.items()
+        items = [
+            f"{name} = {one.written(self[name])}" for name, one in coefficients if self.sources.get(name) == BY_HAND
+        ]
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
 
     @property

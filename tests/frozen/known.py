@@ -5,7 +5,6 @@ import re
 import shutil
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
-from datetime import date
 from difflib import unified_diff
 from functools import partial
 from io import StringIO
@@ -118,11 +117,12 @@ def _ends(values: Any) -> str:
 
 @contextmanager
 def _without_plots() -> Iterator[None]:
-    """Replace the plots of pages by what they show, and pictures by nothing."""
+    """Replace the plots of pages by what they show, pictures by nothing, and the day by 23 November 2026."""
     with ExitStack() as patches:
         for module in ("report.report", "report.inspection_page", "report.page.fmu_page", "study.results.plots"):
             patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _plot))
         patches.enter_context(patch("rov_fmu.report.page.fmu_page.pictures", lambda _: {}))
+        patches.enter_context(patch.dict(os.environ, SOURCE_DATE_EPOCH="1795392000"))
         yield
 
 
@@ -134,7 +134,7 @@ def _text(page: str) -> str:
 def _report(result: Callable[[], Identification]) -> str:
     """Return what the terminal and the report tell of an identification."""
     with _without_plots():
-        page = _text(report_page(result(), made=date(2026, 11, 23)))
+        page = _text(report_page(result()))
     return f"{_said(lambda: print_identification(result()))}\n{page}"
 
 

@@ -8,12 +8,11 @@ import pytest
 from jinja2 import UndefinedError
 from pydantic import TypeAdapter, ValidationError
 
-from rov_fmu.io.field_types import Finite, Name, Symbol, Text
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, part, shown
 from rov_fmu.io.reading import read_bytes, root_of_xml
 from rov_fmu.io.templates import render
-from rov_fmu.io.toml_file import join_names
+from rov_fmu.io.toml_file import Finite, Name, Symbol, Text, join_names
 
 
 def test_long_texts_and_lists_are_cut() -> None:

@@ -5,7 +5,6 @@ import re
 from collections.abc import Callable
 from dataclasses import replace
 from datetime import date
-from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -16,9 +15,10 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.fmu.content import native_content, python_content
 from rov_fmu.identify.findings import driven_aside
-from rov_fmu.io.output import write_whole
-from rov_fmu.report import report
+from rov_fmu.io.output import page_output, write_whole
 from rov_fmu.report.page.fmu_page import documentation_page
+from rov_fmu.report.report import report_page
+from rov_fmu.report.templates import today
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_output
@@ -33,8 +33,6 @@ from tests.report.pages import (
 )
 from tests.report.results import FILES, example, prediction
 from tests.vehicles import extended
-
-report_page = partial(report.report_page, made=date(2026, 11, 23))
 
 
 @pytest.fixture(scope="module")
@@ -105,7 +103,7 @@ def test_progress_tells_each_plot_and_the_picture_shows_the_log_that_is_predicte
         report_page(replace(example(), axes=(unjudged,)))
     )
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
-    assert report.today() == date(1970, 1, 2)
+    assert today() == date(1970, 1, 2)
 
 
 @pytest.mark.usefixtures("without_plots")
@@ -138,7 +136,7 @@ def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A vehicle file that names its report, which is in a folder of its own."""
     leave_plots_out(monkeypatch)
     (tmp_path / "pages").mkdir()
-    page = report.report_output(example(), tmp_path / "pages" / "report.html")
+    page = page_output(tmp_path / "pages" / "report.html", report_page(example()), "identify")
     vehicle = load_vehicle(VIDEORAY)
     made = example().vehicle.provenance
     assert made

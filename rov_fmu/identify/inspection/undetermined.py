@@ -10,6 +10,7 @@ from rov_fmu.identify.beginning import layout_of
 from rov_fmu.identify.findings import how_to_measure, how_to_record, sentences
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words
 from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent
 from rov_fmu.tank.columns import COMMAND
@@ -47,10 +48,8 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
         driven[log], of_log = driven_axes(log, layout_of(log, layout if not log.axis else description.layout))
         findings += of_log
     tested = {axis for axes in driven.values() for axis in axes}
-    groups: dict[tuple[str, str], list[Axis]] = {}
-    for axis in (axis for axis in layout.bare_axes if axis not in tested):
-        groups.setdefault(_reason(axis, findings, logs), []).append(axis)
-    for (reason, sensor), axes in groups.items():
+    untested = [axis for axis in layout.bare_axes if axis not in tested]
+    for (reason, sensor), axes in grouped((_reason(axis, findings, logs), axis) for axis in untested).items():
         named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
         stays = f"{'stay those' if are_many else 'stays that'} of {base}" if base else "cannot be identified"
         why = reason.replace("{it}", named)

@@ -47,6 +47,10 @@ _SCRIPTS = (
 )
 
 
+Slider = tuple[str, str, float, float, float, str, str]
+"""A tunable coefficient: name, label, both ends of the slider, value in the vehicle file, unit, description."""
+
+
 @dataclass(frozen=True)
 class Flown:
     """A vehicle and its WebAssembly module."""
@@ -80,9 +84,8 @@ class Live:
     """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
     """The inputs that are not commands: name, end of the slider, unit."""
-    tunable: Mapping[str, Sequence[tuple[str, str, float, float, float, str, str]]]
-    """The tunable coefficients by the title of their group: name, label, both ends of the slider, value in the vehicle
-    file, unit, description."""
+    tunable: Mapping[str, Sequence[Slider]]
+    """The tunable coefficients by the title of their group."""
     can_level: bool
     """True when commands roll or pitch the vehicle, so that it can be held level."""
     title: str
@@ -312,7 +315,7 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
             yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)
 
 
-def _ballast(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
+def _ballast(vehicle: Vehicle) -> Iterator[Slider]:
     """Yield the sliders of the mass, the weight, the buoyancy, their centres, and the scales of tables of thrust."""
     for name in vehicle.layout.ballast:
         one = vehicle.layout.coefficients[name]
@@ -321,7 +324,7 @@ def _ballast(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, 
         yield name, name, *ends, value, "" if one.unit == "1" else pretty_unit(one.unit), one.description
 
 
-def _health(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
+def _health(vehicle: Vehicle) -> Iterator[Slider]:
     """Yield the sliders of the health of the thrusters, from dead to whole."""
     labels = _labels(vehicle)
     for thruster, name in vehicle.layout.health.items():
@@ -329,7 +332,7 @@ def _health(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, s
         yield name, labels[thruster] or thruster, 0.0, max(1.0, vehicle[name]), vehicle[name], "", description
 
 
-def _tuning(vehicle: Vehicle) -> Iterator[tuple[str, str, float, float, float, str, str]]:
+def _tuning(vehicle: Vehicle) -> Iterator[Slider]:
     """Yield the sliders of the tuning factors."""
     for key, letter in (("alpha", "α"), ("beta", "β")):
         for axis in vehicle.layout.bare_axes:

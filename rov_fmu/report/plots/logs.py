@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.identify.result import Prediction
+from rov_fmu.io.groups import grouped
 from rov_fmu.report.plots.svg import LIGHT, draw_commands, name_axes
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import in_degrees
@@ -27,14 +28,16 @@ _MOST_LINES = 8
 
 def height_of(log: Log | None, predictions: Sequence[Prediction] = (), *, measured: bool = True) -> float:
     """Return the height of the plot of a log, inches."""
-    panels = len(_by_quantity(predictions)) + (len(_unpredicted(log, predictions)) if log and measured else 0)
+    panels = len({(p.quantity, p.span) for p in predictions}) + (
+        len(_unpredicted(log, predictions)) if log and measured else 0
+    )
     return _EDGES + _PANEL * max(panels, 1)
 
 
 def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] = (), *, measured: bool = True) -> None:
     """Plot the predictions of a log with their bands, those of both halves of it in one panel, and, if `measured`, its
     other channels, above the commands of its thrusters."""
-    groups = _by_quantity(predictions)
+    groups = grouped(((p.quantity, p.span), p) for p in predictions).values()
     channels = _unpredicted(log, predictions) if log and measured else []
     commands = log.commands if log else None
     heights = [1.0] * (len(groups) + len(channels)) + [0.6] * bool(commands)
@@ -62,14 +65,6 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
 def _is_absolute(log: Log | None) -> bool:
     """Return True for the forces of a log before they are related to the largest ones of a folder."""
     return bool(log and log.commands and max(log.commands.largest.values(), default=0.0) > 1.0)
-
-
-def _by_quantity(predictions: Sequence[Prediction]) -> list[list[Prediction]]:
-    """Return the predictions of each quantity so far ahead together."""
-    groups: dict[tuple[str, float], list[Prediction]] = {}
-    for p in predictions:
-        groups.setdefault((p.quantity, p.span), []).append(p)
-    return [*groups.values()]
 
 
 def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:

@@ -27,6 +27,7 @@ from matplotlib.style import context
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief
 from rov_fmu.io.picture import read_svg
 from rov_fmu.report.palette import PALETTE
@@ -120,10 +121,7 @@ def draw_commands(ax: Axes, time: Any, commands: Mapping[str, Any], unit: str = 
     Equal commands share a line.
     """
     factor, shown = (100.0, "%") if unit == "1" else (1.0, unit)
-    groups: dict[bytes, list[str]] = {}
-    for name, values in commands.items():
-        groups.setdefault(np.asarray(values, float).tobytes(), []).append(name)
-    for names in groups.values():
+    for names in grouped((np.asarray(values, float).tobytes(), name) for name, values in commands.items()).values():
         label = ", ".join(names)
         ax.plot(time, factor * np.asarray(commands[names[0]]), linewidth=1.0, label=label, drawstyle="steps-post")
     name_axes(ax, "commands", shown)

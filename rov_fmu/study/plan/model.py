@@ -11,24 +11,12 @@ from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, did_you_mean, shown
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.prove.description import read_description
+from rov_fmu.prove.runs import NUMBERS
 from rov_fmu.prove.unpacking import unpack_fmu
 
 TYPES = {
     2: {"Real": "f8", "Integer": "i4", "Enumeration": "i4", "Boolean": "i4"},
-    3: {
-        "Float64": "f8",
-        "Float32": "f4",
-        "Enumeration": "i8",
-        "Boolean": "?",
-        "Int8": "i1",
-        "Int16": "i2",
-        "Int32": "i4",
-        "Int64": "i8",
-        "UInt8": "u1",
-        "UInt16": "u2",
-        "UInt32": "u4",
-        "UInt64": "u8",
-    },
+    3: {kind: kind.lower() for kind in NUMBERS if kind[-1].isdigit()} | {"Enumeration": "i8", "Boolean": "?"},
 }
 """The NumPy type of each numeric type of variable, by the version of FMI."""
 _WHOLE = ("Integer", "Enumeration", "Int")

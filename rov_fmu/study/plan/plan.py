@@ -1,7 +1,7 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import prod
 from pathlib import Path
@@ -12,11 +12,20 @@ import numpy.typing as npt
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
 from typing_extensions import Self
 
-from rov_fmu.io.field_types import Finite, Name, not_blank
 from rov_fmu.io.file_kinds import PLAN, check_suffix
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.paths import inside
-from rov_fmu.io.toml_file import Strict, as_tuple, folder_of, key_line, read_checked
+from rov_fmu.io.toml_file import (
+    AS_TUPLE,
+    NOT_BLANK,
+    Finite,
+    Name,
+    Strict,
+    folder_of,
+    key_line,
+    read_checked,
+    rule,
+)
 from rov_fmu.study.plan.figures import read_expression
 
 _MOST_RUNS = 100_000_000
@@ -31,23 +40,10 @@ class PlanError(FileError):
     """A plan cannot be carried out; the text has a line for each reason."""
 
 
-def _rule(words: str, holds: Callable[[Any], bool]) -> AfterValidator:
-    """Return a validator that raises ValueError with these words if a value does not keep a rule."""
-
-    def checked(given: Any) -> Any:
-        if not holds(given):
-            raise ValueError(words)
-        return given
-
-    return AfterValidator(checked)
-
-
-_SOME = _rule("must have an entry", bool)
+_SOME = rule("must have an entry", bool)
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
-_Limits = Annotated[
-    tuple[Finite, Finite], BeforeValidator(as_tuple), _rule("must be [low, high]", lambda ends: ends[0] < ends[1])
-]
-_List = Annotated[tuple[Finite, ...], BeforeValidator(as_tuple), _SOME]
+_Limits = Annotated[tuple[Finite, Finite], AS_TUPLE, rule("must be [low, high]", lambda ends: ends[0] < ends[1])]
+_List = Annotated[tuple[Finite, ...], AS_TUPLE, _SOME]
 
 
 class Normal(Strict):
@@ -126,18 +122,14 @@ def _as_number(given: Any) -> Any:
     return float(given) if isinstance(given, bool) else given
 
 
-def _points(given: Any) -> Any:
-    return tuple(map(as_tuple, given)) if isinstance(given, list) else given
-
-
-def _in_order(points: tuple[tuple[float, float], ...]) -> tuple[tuple[float, float], ...]:
+def _in_order(points: "Points") -> "Points":
     for before, after in pairwise(points):
         if after[0] < before[0]:
             raise ValueError(f"the time must not go back, as it does from {before[0]:g} to {after[0]:g}")
     return points
 
 
-Points = Annotated[tuple[tuple[Finite, Finite], ...], BeforeValidator(_points), _SOME, AfterValidator(_in_order)]
+Points = Annotated[tuple[Annotated[tuple[Finite, Finite], AS_TUPLE], ...], AS_TUPLE, _SOME, AfterValidator(_in_order)]
 """[time, value] pairs."""
 
 
@@ -160,7 +152,7 @@ class Signal(Strict):
         return self
 
     @property
-    def points(self) -> tuple[tuple[float, float], ...]:
+    def points(self) -> Points:
         """The points of either kind."""
         return self.steps or self.ramps or ()
 
@@ -196,14 +188,14 @@ class InputFile(Strict):
     """steps: a row is held until the next one; ramps: there are straight lines between the rows."""
 
 
-_ONCE = _rule("must name each variable once", lambda names: len({*names}) == len(names))
-_ASCENDING = _rule("must be times in ascending order", lambda times: [*times] == sorted({*times}))
+_ONCE = rule("must name each variable once", lambda names: len({*names}) == len(names))
+_ASCENDING = rule("must be times in ascending order", lambda times: [*times] == sorted({*times}))
 
 
 class Keep(Strict):
     """The trajectories that are kept; none without this table."""
 
-    outputs: Annotated[tuple[str, ...], BeforeValidator(as_tuple), _SOME, _ONCE]
+    outputs: Annotated[tuple[str, ...], AS_TUPLE, _SOME, _ONCE]
     """Names of variables."""
     every: Positive | None = None
     """The time between kept points, s; a multiple of the step. The default is every step."""
@@ -268,7 +260,7 @@ class Plan(Strict):
     keep: Keep | None = None
     """The trajectories that are kept."""
     figures: dict[
-        Annotated[str, AfterValidator(not_blank)],
+        Annotated[str, NOT_BLANK],
         Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
     ] = Field({})
     """Expressions over the outputs, by the names of their columns."""

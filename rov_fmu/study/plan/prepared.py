@@ -7,7 +7,6 @@ from typing import Any
 from uuid import uuid4
 
 import numpy as np
-import numpy.typing as npt
 
 from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
@@ -15,7 +14,7 @@ from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.estimates import Estimates, some_of
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
-from rov_fmu.study.plan.figures import meaning, read_expression, unusable
+from rov_fmu.study.plan.figures import Array, meaning, read_expression, unusable
 from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
 from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
 from rov_fmu.study.plan.sampling import Design
@@ -24,7 +23,6 @@ from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-Array = npt.NDArray[np.float64]
 _TRIALS = 8
 """The number of runs that are tried until one ends, to find out whether the FMU can be reset."""
 

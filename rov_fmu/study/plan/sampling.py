@@ -5,15 +5,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import isinf, log
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from rov_fmu.study.plan.model import Variable
 from rov_fmu.study.plan.plan import Plan, Varied
-from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
+from rov_fmu.vehicle.uncertainty import NOTHING, Array, Uncertainty
 
-Array = npt.NDArray[np.float64]
 _LARGEST = float(np.finfo(float).max)
 _Draw = Callable[[int, int], Array]
 """A function of the first run and the one after the last; it returns a row of numbers in 0 ... 1 for each run."""

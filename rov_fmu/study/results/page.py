@@ -8,7 +8,6 @@ import numpy as np
 import pandas as pd
 
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.output import Output, sealed
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
@@ -33,13 +32,8 @@ _CONSTANT = 1e-6
 """Values that vary by less than this share of the largest one count as constant."""
 
 
-def page_output(results: Results) -> Output:
-    """Return the page about the finished runs as a file in the folder of the study. Raises FileError."""
-    return Output(results.folder / PAGE, sealed(study_page(results), "<!-- {} -->", "study").encode())
-
-
 def study_page(results: Results) -> str:
-    """Return the page as HTML. It is the same for the same results."""
+    """Return the page about the finished runs as HTML. It is the same for the same results. Raises FileError."""
     runs, plan = results.runs, results.plan
     reasons = [*_failures(runs)]
     grid = _grid(results)
@@ -48,22 +42,11 @@ def study_page(results: Results) -> str:
     tables = {name: found for name, found in indices.items() if not isinstance(found, str)}
     rows = [row for found in tables.values() for row in found]
     outputs = results.outputs if len(results.failed) < len(runs) else ()
-    model = results.model.removesuffix(".fmu")
     return page(
         "study.html.j2",
-        title=results.title or model,
-        model=model,
-        fmu=results.fmu,
-        made_by=results.made_by,
-        done=len(runs),
-        planned=results.planned,
-        failed=len(results.failed),
-        incomplete=len(results.incomplete),
-        sampler=plan["sampler"],
-        seed=plan["seed"],
+        results=results,
         quantiles=QUANTILES,
         figures=figures,
-        plots=[figure["plot"] for figure in figures if figure["plot"]],
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
@@ -74,10 +57,8 @@ def study_page(results: Results) -> str:
             for name, rows in tables.items()
         ],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
-        blocks=results.planned // (len(results.groups) + 2),
         few=_FEW,
         bands=[_band(results, name) for name in outputs],
-        warnings=results.warnings,
         script=inline_script("plots.js"),
         correlated=[group for group in results.groups if len(group) > 1],
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],

@@ -12,7 +12,7 @@ from matplotlib.patches import Patch
 
 from rov_fmu.report.plots.steps import evenly
 from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_text, with_formulas
-from rov_fmu.report.templates import number, pretty_unit
+from rov_fmu.report.templates import number, with_unit
 from rov_fmu.study.results.results import Results
 
 _WIDTH = 3.7  # inches
@@ -35,12 +35,6 @@ _BAR = 0.34
 def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEIGHT) -> dict[str, Any]:
     """Return a plot with the name and the text above it. `label` is for screen readers; the height is in inches."""
     return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
-
-
-def axis_label(name: str, unit: str) -> str:
-    """Return a name with its unit; either of them may be missing."""
-    words = "" if unit == "1" else pretty_unit(unit)
-    return f"{name} ({words})" if name and words else name or words
 
 
 def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
@@ -70,9 +64,9 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
         marker = "o" if len(line) <= _MARKED else ""
         ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
     for other in others:
-        title = axis_label(other, results.units[other])
+        title = with_unit(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    ax.set_xlabel(axis_label(along, results.units[along]))
+    ax.set_xlabel(with_unit(along, results.units[along]))
     _set_ticks(ax)
 
 
@@ -87,7 +81,7 @@ def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
     for edge, label in ((low, "5 %"), (high, "95 %")):
         ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
     ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
-    ax.set(xlabel="time (s)", ylabel=axis_label("", unit))
+    ax.set(xlabel="time (s)", ylabel=with_unit("", unit))
     _set_ticks(ax)
 
 

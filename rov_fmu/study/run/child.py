@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
 from rov_fmu.prove.description import DISK, MEMORY
-from rov_fmu.prove.runs import RunError
+from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.run.simulator import Job, LoadError, Simulator
 
-Array = npt.NDArray[np.float64]
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
 _MANY = 10.0

@@ -15,11 +15,12 @@ from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
 from rov_fmu.io.messages import brief
-from rov_fmu.prove.runs import WARNING, RunError, forget_message, keep_message, last_message, status_word
+from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
 from rov_fmu.study.plan.model import TYPES, Model, Variable
 from rov_fmu.study.plan.plan import Plan
 
-Array = npt.NDArray[np.float64]
+_Call = Callable[..., int]
+"""A function of the FMU, which returns a status."""
 
 
 class LoadError(Exception):
@@ -50,8 +51,8 @@ class Job:
 class _Group:
     """Variables of one type with a table of their values: one row, or a row for each point in time."""
 
-    get: Callable[..., int]
-    set: Callable[..., int]
+    get: _Call
+    set: _Call
     names: Sequence[str]
     references: Any
     table: npt.NDArray[Any]
@@ -147,7 +148,7 @@ class Simulator:
         except FMICallException as error:
             _check(error.status, "initialization")
 
-    def _changing(self) -> dict[int, list[tuple[Callable[..., int], int, int, int]]]:
+    def _changing(self) -> dict[int, list[tuple[_Call, int, int, int]]]:
         """Return, by step, the calls that set the inputs which change at the beginning of this step."""
         found = defaultdict(list)
         for group in self._inputs:
@@ -215,7 +216,7 @@ def _check(status: int, what: str, time: float | None = None) -> None:
         raise _FailedError(f"{what}{'' if time is None else f' at {time:.6g} s'}: {status_word(status)}")
 
 
-def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
+def _functions(library: Any, version: int) -> dict[str, _Call]:
     """Return the FMU's functions that are called at every step, by name without the version.
 
     Unlike with FMPy, arrays are passed by address.
@@ -236,12 +237,12 @@ def _functions(library: Any, version: int) -> dict[str, Callable[..., int]]:
     return steps | {name: _sized(typed(name, pointer, size, pointer, size)) for name in names}
 
 
-def _sized(function: Callable[..., int]) -> Callable[..., int]:
+def _sized(function: _Call) -> _Call:
     """Wrap a function of FMI 3.0 for scalars, which have as many values as references."""
     return lambda component, references, count, values: function(component, references, count, values, count)
 
 
-def _step_of_3(function: Callable[..., int]) -> Callable[..., int]:
+def _step_of_3(function: _Call) -> _Call:
     flags = (ctypes.c_bool * 3)()
     last = ctypes.c_double()
     event, ends, early = (ctypes.addressof(flags) + n for n in range(3))

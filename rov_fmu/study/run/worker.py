@@ -12,17 +12,16 @@ from threading import current_thread, main_thread
 from time import perf_counter
 
 import numpy as np
-import numpy.typing as npt
 import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
 import pyarrow as pa
 import pyarrow.parquet as pq
 from distributed import Worker
 from distributed.diagnostics.plugin import WorkerPlugin
 
+from rov_fmu.prove.runs import Array
 from rov_fmu.study.run.child import FAILED, Child, Run
 from rov_fmu.study.run.simulator import Job
 
-Array = npt.NDArray[np.float64]
 RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
 """The columns that every study has."""
 

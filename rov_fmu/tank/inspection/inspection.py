@@ -1,19 +1,18 @@
 """List the content of logs before a vehicle is known, and the headers that rov.toml would have to explain."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from math import nan
 from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, read_columns, read_header
+from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_header
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
@@ -211,9 +210,7 @@ def _commands(log: Log) -> Iterator[Signal]:
 # ---- Columns of unknown names ----------------------------------------------------------------------------------------
 
 
-def _numbers(
-    path: Path, titles: Sequence[str], open_stream: Callable[[], TextIO]
-) -> tuple[dict[str, Array], dict[str, str]]:
+def _numbers(path: Path, titles: Sequence[str], open_stream: OpenStream) -> tuple[dict[str, Array], dict[str, str]]:
     """Return the numbers of every column as they stand in the file, and their range in words.
 
     A header that several columns share gets no numbers, because it is ambiguous.

@@ -52,6 +52,8 @@ def truth(text: str) -> float:
     return float((*_FALSE, *_TRUE).index(text.casefold()) >= len(_FALSE))
 
 
+_Meaning = tuple[Sequence[str], Callable[[Array], Array]]
+"""The quantities that a field tells, and the conversion of its numbers to SI units."""
 FLAG = Column({"1": 1.0}, optional=True, blanks=True, parse=truth)
 """The column of a flag of validity."""
 
@@ -134,12 +136,12 @@ def measured_only(
     return kept, findings
 
 
-def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, tuple[Sequence[str], Callable[[Array], Array]]]:
+def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, _Meaning]:
     """Return the quantities that each field of a topic tells, and the conversion of its numbers to SI units.
 
     Components of quaternions have no marks.
     """
-    meanings: dict[str, tuple[Sequence[str], Callable[[Array], Array]]] = {}
+    meanings: dict[str, _Meaning] = {}
     for message in reversed(MESSAGES):
         if message.gives != QUATERNION and topic.has(message):
             what = VECTORS.get(message.gives, (message.gives,)), partial(np.multiply, message.factor)

@@ -18,12 +18,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
 from time import monotonic
-from typing import Any, Concatenate, ParamSpec, TextIO, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
-from rov_fmu.io.csv_table import EMPTY, DataFileError, UnreadableFileError, open_text, read_header
+from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text, read_header
 from rov_fmu.io.messages import FileError, brief, listed
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
@@ -43,7 +43,7 @@ class Format:
     """Its name, with an article."""
     begins: bytes
     """A regular expression that matches the first bytes of such a file. The first format that matches counts."""
-    open: Callable[[Path], Callable[[], TextIO]] | None = None
+    open: Callable[[Path], OpenStream] | None = None
     """Return a function that opens the lines of a table."""
     read: Callable[[Path, Collection[str]], Content] | None = None
     """Read a log that is no table with a parser of somebody else, with the topics that rov.toml names."""
@@ -225,7 +225,7 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
 # ---- In the child process --------------------------------------------------------------------------------------------
 
 
-def open_table(path: Path) -> Callable[[], TextIO] | None:
+def open_table(path: Path) -> OpenStream | None:
     """Return a function that opens the lines of a table; None for another log. Raises DataFileError."""
     assert _PARSER.is_child, "only a guarded function may read a file"
     opens = format_of(path).open

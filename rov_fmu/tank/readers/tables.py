@@ -7,12 +7,12 @@ that cannot be used are left out and counted.
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from io import StringIO
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,7 @@ from rov_fmu.io.csv_table import (
     VALUE,
     Columns,
     DataFileError,
+    OpenStream,
     read_columns,
     read_header,
 )
@@ -103,7 +104,7 @@ def read_table(
     layout: Layout,
     axis: Axis | None,
     names: Names,
-    open_stream: Callable[[], TextIO],
+    open_stream: OpenStream,
     *,
     is_part: bool = False,
 ) -> tuple[Content, dict[str, Entry]]:
@@ -331,7 +332,7 @@ def _unlikely_rate(table: Columns, time: Array) -> Finding | None:
 # ---- Variables of MATLAB ---------------------------------------------------------------------------------------------
 
 
-def open_matlab(path: Path) -> Callable[[], TextIO]:
+def open_matlab(path: Path) -> OpenStream:
     """Return a function that opens the numeric variables of a .mat file as the lines of a CSV file: all vectors as long
     as the time.
 
