@@ -121,7 +121,7 @@ TESTS = {
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py frozen/test_known_results.py",
     "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
-    "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
+    "vehicle/test_properties.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
     "rov_fmu/cli.py": "interface/test_inspect_command.py fmu/test_build_failures.py cli study/test_page.py",
