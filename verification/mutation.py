@@ -115,7 +115,7 @@ TESTS = {
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
-    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_edges.py tank/test_tank_tests.py "
+    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "
     "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_experiments.py study/test_plans.py "
     "cli/test_messages.py io",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
