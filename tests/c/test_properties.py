@@ -20,17 +20,21 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.c.stepper import LaneStepper, Stepper
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.often import often
 from tests.vehicles import (
     EVERYTHING,
+    FINNED,
     HEAVY,
     SIX,
     SIX_AXES,
     THRUST_EFFECTS,
     VIDEORAY,
     random_body,
+    random_case,
     random_inputs,
     random_state,
     random_vehicle,
+    with_rotors,
 )
 
 Array = NDArray[np.float64]
@@ -49,7 +53,8 @@ def late(rov: Vehicle) -> Vehicle:
 
 
 KNOWN = {"VideoRay": VIDEORAY, "lag": HEAVY, "six axes": SIX, "everything": load_vehicle(EVERYTHING)}
-KNOWN |= {"dead time, lag, tables": load_vehicle(THRUST_EFFECTS), "attitude": load_vehicle(SIX_AXES)}
+KNOWN |= {"dead time, lag, tables": load_vehicle(THRUST_EFFECTS), "attitude": load_vehicle(SIX_AXES), "fins": FINNED}
+KNOWN |= {"rotors": with_rotors(SIX), "slow rotors": with_rotors(SIX).with_(T_t200=2.5)}
 LONG = {"attitude, lag, dead time": late(SIX), "dead time alone": late(KNOWN["attitude"])}
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n)]
 
@@ -69,7 +74,8 @@ class Run:
         cuts = [rng.uniform(*rng.choice([*zip(self.time, self.time[1:], strict=False)])) for _ in range(2 * CHANGES)]
         self.fine = np.union1d(self.time, cuts)
         inputs = [[random_inputs(rng, rov) for _ in self.time] for _ in range(VEHICLES)]
-        self.inputs = {name: np.array([[now[name] for now in own] for own in inputs]) for name in self.layout.inputs}
+        back = {name: np.array([[now[name] for now in own[::-1]] for own in inputs]) for name in self.layout.inputs}
+        self.inputs = {name: rows[:, ::-1] for name, rows in back.items()}  # with negative strides
         states = [random_state(rng, rov) for _ in range(VEHICLES)]
         drawn = {name: [[rov[name] * rng.uniform(0.8, 1.2)] for _ in range(VEHICLES)] for name in rov.coefficients}
         self.start = {name: np.array(value) for name, value in drawn.items()}
@@ -103,6 +109,7 @@ def near(found: Array, expected: Array, scale: float = SCALE) -> None:
 def check(rng: random.Random, rov: Vehicle) -> None:
     run = Run(rng, rov)
     alone = run.simulated(run.fine)
+    np.testing.assert_array_equal(run.simulated(run.fine, workers=1), alone)
     near(alone[:, :, np.searchsorted(run.fine, run.time)], run.simulated(run.time))
     order = rng.sample(range(VEHICLES), VEHICLES)
     for some in (order, order[:1]):
@@ -165,24 +172,21 @@ def test_a_vehicle_that_cannot_be_computed_affects_no_other_and_the_next_one_tak
     np.testing.assert_allclose(found.values[:, others], good[:, others], rtol=1e-12, atol=1e-14)
 
 
-@pytest.mark.parametrize("name", ["dead time, lag, tables", "attitude", "lag"])
-def test_steps_in_python_may_be_cut_anywhere_and_are_those_of_the_engine(name: str) -> None:
+@often("cases", 10, 100, 1000)
+@pytest.mark.parametrize("name", KNOWN)
+def test_a_step_in_python_may_be_cut_and_is_that_of_the_engine(name: str, cases: int) -> None:
     """Commands act at once, unless others are given that act after the dead time."""
     rng, rov = random.Random(name), KNOWN[name]
-    inputs, before = random_inputs(rng, rov), random_state(rng, rov)
-    before |= dict.fromkeys(rov.layout.continued, 0.0)
-    acting = {delayed_name(name): rng.uniform(-1.0, 1.0) for name in rov.layout.commands if rov.layout.has_dead_time}
-    for given in ({}, acting):
-        whole = rov.step(inputs | given, before, 0.7)
-        pieces = before
-        for h in (0.2, 0.1, 0.4):
-            pieces = rov.step(inputs | given, pieces, h)
-        assert pieces == pytest.approx(whole, rel=1e-12, abs=1e-12)
-        if given or not acting:
-            continue
-        present = {delayed_name(name): inputs[name] for name in rov.layout.commands}
-        stepper = Stepper(rov, before | present, [*whole])
-        assert stepper.step([*inputs.values()], 0.7) == pytest.approx([*whole.values()], rel=1e-12, abs=1e-12)
+    late = rov.layout.commands if rov.layout.has_dead_time else ()
+    for _ in range(cases):
+        _, inputs, before, h = random_case(rng, rov, longest=0.0)
+        before |= dict.fromkeys(rov.layout.continued, 0.0)
+        for given in ({}, {delayed_name(name): rng.uniform(-1.0, 1.0) for name in late}):
+            whole, half = rov.step(inputs | given, before, h), rov.step(inputs | given, before, 0.3 * h)
+            assert rov.step(inputs | given, half, 0.7 * h) == pytest.approx(whole, rel=1e-12, abs=1e-12)
+            if not given:
+                engine = Stepper(rov, before | {delayed_name(name): inputs[name] for name in late}, [*whole])
+                assert engine.step([*inputs.values()], h) == pytest.approx([*whole.values()], rel=1e-12, abs=1e-12)
 
 
 def test_a_motion_that_cannot_be_computed_is_told() -> None:

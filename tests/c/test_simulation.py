@@ -68,29 +68,6 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
     np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
 
 
-def _variations(vehicles: int, times: int) -> dict[str, Array]:
-    rng = np.random.default_rng(3)
-    return {
-        "u_l": rng.uniform(-1.0, 1.0, times),  # the same for all vehicles
-        "u_r": rng.uniform(-1.0, 1.0, (vehicles, times))[:, ::-1],  # with a negative stride
-        "u_t": rng.uniform(-1.0, 1.0, (times, vehicles)).T,
-        "a_d_u": rng.uniform(5.0, 20.0, (vehicles, 1)),
-        "psi": rng.uniform(-3.0, 3.0, (vehicles, 1)),
-    }
-
-
-def test_the_number_of_threads_and_vehicles_changes_no_bit() -> None:
-    vehicles, times = 37, np.linspace(0.0, 3.0, 31)
-    values = _variations(vehicles, len(times))
-    expected = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=1).values
-    for workers in (2, 3, 64, None):
-        found = simulate(VIDEORAY, times, values, vehicles=vehicles, workers=workers).values
-        np.testing.assert_array_equal(found, expected)
-    for vehicle in (0, 17, 36):
-        alone = {name: np.broadcast_to(value, (vehicles, len(times)))[vehicle] for name, value in values.items()}
-        np.testing.assert_array_equal(simulate(VIDEORAY, times, alone).values[:, 0], expected[:, vehicle])
-
-
 def test_calculated_variables_agree_with_python() -> None:
     rng = random.Random(3)
     for rov in (VIDEORAY, load_vehicle(EVERYTHING), SIX):
