@@ -190,7 +190,7 @@ def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     return folder
 
 
-def _folder_of(name: str, vehicle: Callable[[], Vehicle], fmi: int = 2) -> Any:
+def _folder_of(name: str, vehicle: Callable[[], Vehicle], fmi: int) -> Any:
     """Return a fixture: the folder with the unzipped FMU of a vehicle."""
 
     @pytest.fixture(scope="session")
@@ -200,27 +200,13 @@ def _folder_of(name: str, vehicle: Callable[[], Vehicle], fmi: int = 2) -> Any:
     return folder
 
 
-def _everything() -> Vehicle:
-    return load_vehicle(EVERYTHING)
-
-
-def _thrust() -> Vehicle:
-    return load_vehicle(THRUST_EFFECTS)
-
-
-def _six() -> Vehicle:
-    return a_vehicle(SIX)
-
-
-def _rotors() -> Vehicle:
-    return a_vehicle(with_rotors(SIX))
-
-
-heavy_dir, heavy3_dir = _folder_of("heavy", lambda: HEAVY), _folder_of("heavy3", lambda: HEAVY, 3)
-everything_dir, everything3_dir = _folder_of("everything", _everything), _folder_of("everything3", _everything, 3)
-thrust_dir, thrust3_dir = _folder_of("thrust", _thrust), _folder_of("thrust3", _thrust, 3)
-six_dir, outside3_dir = _folder_of("six", _six), _folder_of("outside3", lambda: OUTSIDE, 3)
-rotors_dir, rotors3_dir = _folder_of("rotors", _rotors), _folder_of("rotors3", _rotors, 3)
+heavy_dir, heavy3_dir = (_folder_of(f"heavy{fmi}", lambda: HEAVY, fmi) for fmi in (2, 3))
+everything_dir, everything3_dir = (
+    _folder_of(f"everything{fmi}", lambda: load_vehicle(EVERYTHING), fmi) for fmi in (2, 3)
+)
+thrust_dir, thrust3_dir = (_folder_of(f"thrust{fmi}", lambda: load_vehicle(THRUST_EFFECTS), fmi) for fmi in (2, 3))
+rotors_dir, rotors3_dir = (_folder_of(f"rotors{fmi}", lambda: a_vehicle(with_rotors(SIX)), fmi) for fmi in (2, 3))
+six_dir, outside3_dir = _folder_of("six", lambda: a_vehicle(SIX), 2), _folder_of("outside", lambda: OUTSIDE, 3)
 
 
 @pytest.fixture(scope="module")

@@ -91,7 +91,7 @@ TESTS = {
     "rov_fmu/prove/check.py": "prove/test_properties.py fmu/results/test_evidence.py",
     "rov_fmu/prove/signature.py": "fmu/results/test_evidence.py",
     "rov_fmu/prove/*": "prove",
-    "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_osp.py fmu/test_terminals.py fmu",
+    "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_properties.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/log.py": "tank identify/likelihood/test_records.py identify/test_identify.py",

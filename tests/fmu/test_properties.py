@@ -1,4 +1,4 @@
-"""The model description of any vehicle is valid, the same in both versions of FMI, and has the right dependencies."""
+"""Any vehicle has a valid description, the same in both versions of FMI, with the right groups and dependencies."""
 
 import random
 from collections.abc import Sequence
@@ -12,8 +12,12 @@ from fmpy.validation import validate_model_description
 from lxml import etree
 
 from rov_fmu.c import compile as build_options
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
+from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.model_description import build_description, model_description
-from rov_fmu.fmu.variables import variables
+from rov_fmu.fmu.osp import osp_model_description
+from rov_fmu.fmu.terminals import terminals_and_icons
+from rov_fmu.fmu.variables import unit_of, variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import (
     EVERYTHING,
@@ -147,6 +151,109 @@ def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> N
     assert len({*attributes}) == len(attributes) == len(root.findall("TypeDefinitions/*")), "one for each of its kind"
     assert {*types} == {v.get("declaredType") for v in variables_of}
     assert not {*types} & {v.get("name") for v in variables_of}, "the names of types and variables differ"
+
+
+# ---- Terminals, and the groups of OSP-IS 1.0.1 ----
+
+
+def terminals_of(document: bytes) -> dict[str, etree._Element]:
+    """Return the terminals of a document by name, after a check against the schema."""
+    root = etree.fromstring(document)
+    schema("fmi3/fmi3TerminalsAndIcons.xsd").assertValid(root)
+    found = root.findall("Terminals/Terminal")
+    named = {terminal.get("name"): terminal for terminal in found}
+    assert len(named) == len(found)
+    return named
+
+
+def members(terminal: etree._Element) -> list[str]:
+    return [member.get("variableName") for member in terminal.iter("TerminalMemberVariable")]
+
+
+@pytest.mark.parametrize("kind", ROVS)
+def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
+    """The members of a terminal have the same causality, and its name is unique."""
+    declared = {v.name: v.causality for v in variables(ROVS[kind])}
+    found = terminals_of(terminals_and_icons(ROVS[kind].layout))
+    grouped = [name for terminal in found.values() for name in members(terminal)]
+    assert sorted(grouped) == sorted(name for name, causality in declared.items() if causality in {"input", "output"})
+    for terminal in found.values():
+        assert len({declared[member] for member in members(terminal)}) == 1
+        assert terminal.get("terminalKind") is None
+        variable_names = terminal.findall("TerminalMemberVariable")
+        assert {v.get("variableKind") for v in variable_names} == {"signal"}
+        assert len({v.get("memberName") for v in variable_names}) == len(variable_names)
+
+
+NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
+
+# The elements for motion in the sequence of the schema, with the dimension of their variables.
+SEQUENCE = {
+    "Generic": {},
+    "Force": {"kg": 1, "m": 1, "s": -2},
+    "Torque": {"kg": 1, "m": 2, "s": -2},
+    "LinearVelocity": {"m": 1, "s": -1},
+    "AngularVelocity": {"rad": 1, "s": -1},
+    "LinearDisplacement": {"m": 1},
+    "AngularDisplacement": {"rad": 1},
+}
+
+
+LETTERS = {
+    name: letter
+    for letter, names in {
+        "x": "u p x phi X_ext K_ext V_N",
+        "y": "v q y theta Y_ext M_ext V_E",
+        "z": "w r z psi Z_ext N_ext V_D",
+    }.items()
+    for name in names.split()
+}
+"""The axis along or about which each variable acts, in the body frame or in NED; torques of curves act about z."""
+
+
+def groups_of(layout: Layout) -> list[etree._Element]:
+    root = etree.fromstring(osp_model_description(layout))
+    assert root.tag == f"{NAMESPACE}OspModelDescription"
+    assert dict(root.attrib) == {"version": "1.0"}
+    (parent,) = root
+    assert parent.tag == f"{NAMESPACE}VariableGroups"
+    return list(parent)
+
+
+def references(group: etree._Element) -> list[str]:
+    assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
+    return [variable.get("ref") for variable in group]
+
+
+@pytest.mark.parametrize("kind", ROVS)
+def test_every_input_and_output_is_in_one_group(kind: str) -> None:
+    """The variables of a group have the same causality and unit, and different axes."""
+    rov = ROVS[kind]
+    groups = groups_of(rov.layout)
+    declared = {v.name: v for v in variables(rov)}
+    grouped = sorted(name for group in groups for name in references(group))
+    assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
+    names = [group.get("name") for group in groups]
+    assert all(names)
+    assert len(set(names)) == len(names)
+    for group in groups:
+        members = [declared[name] for name in references(group)]
+        assert 1 <= len(members) <= 3
+        assert len({v.causality for v in members}) == 1
+        assert [v.unit for v in members] == [variable.get("unit") for variable in group]
+        (unit,) = {v.unit for v in members}
+        of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == unit_of(unit).exponents] or ["Generic"]
+        assert of_unit == [group.tag.removeprefix(NAMESPACE)]
+    order = [[*SEQUENCE].index(group.tag.removeprefix(NAMESPACE)) for group in groups]
+    assert order == sorted(order)
+    axes = {variable.get("ref"): variable.get("axis") for group in groups for variable in group}
+    directions = {f"F_{one.name}": map(one.effect, (SURGE, SWAY, HEAVE)) for one in rov.layout.thrusters}
+    along = {
+        name: next((letter for letter, x in zip("xyz", parts, strict=True) if abs(x) > 0.999), None)
+        for name, parts in directions.items()
+    }
+    about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
+    assert axes == {name: (LETTERS | along | about).get(name) for name in axes}
 
 
 # ---- Dependencies, against slopes of the equations of the reference ----

@@ -113,7 +113,7 @@ def drawn(path: Path, rng: random.Random) -> Vehicle:
         data=None,
         pictures=None,
         alternatives={},
-        intervals=rov.intervals | {name: (values[name] * (1.0 - 1e-9) / 3.0, 3.0 * values[name]) for name in known},
+        intervals={**rov.intervals, **{n: (values[n] * (1.0 - 1e-9) / 3.0, 3.0 * values[n]) for n in known}},
         estimates={n: row.model_copy(update={"error": row.error * 1.1}) for n, row in rov.estimates.items()},
         provenance=Provenance(
             tool="tool", method="heave: a\nyaw: b", inputs={"ä.csv": HASH}, warnings=("a warning",), facts=("b", "c")

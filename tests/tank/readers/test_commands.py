@@ -146,7 +146,7 @@ def test_several_vehicles_are_told() -> None:
 
 def test_outputs_beside_those_of_the_thrusters() -> None:
     """A thruster whose fraction is never a number has no output; one that is always 0 has. Rare changes are a light."""
-    rows = [[0, 1, 0, 1, 0], [np.nan] * 5, [0] * 5, [1, 0, 1, 0, 1], [0, 0, 0, 0, 1]]
+    rows: list[Rows] = [[0, 1, 0, 1, 0], [np.nan] * 5, [0] * 5, [1, 0, 1, 0, 1], [0, 0, 0, 0, 1]]
     commands = commanded([array("/cmd", *rows)], "abc")
     assert (commands.without_pulse, [*commands.without_thruster]) == (["b"], ["output 4"])
     assert commanded([servos([0, 0])]).without_pulse == [], "no pulse at all is no thrust at all"
@@ -159,21 +159,22 @@ def sent(rng: random.Random) -> tuple[dict[str, float], dict[str, float], dict[s
     """Draw parameters, keys of [logs], commands of some thrusters, and the pulses that ArduSub makes of them.
 
     Parameters of the motors, of each servo, or keys of [logs] say what a pulse means. Where none tells it, all may rest
-    elsewhere. In every third row they rest.
+    elsewhere. In every third row they rest, and no other pulse is 1500 us by chance.
     """
-    kind, low, high = rng.choice([None, 0.0, 8.0, 9.0]), rng.randint(1000, 1200), rng.randint(1800, 2000)
+    kind, low, high = rng.choice([None, 0.0, 8.0, 9.0]), rng.uniform(1000.0, 1200.0), rng.uniform(1800.0, 2000.0)
     has_range, has_servos = rng.random() < 0.5, kind in (8.0, 9.0) or rng.random() < 0.5
     by_servo = kind in (8.0, 9.0) or (kind is None and has_servos and (not has_range or rng.random() < 0.5))
-    keys = rng.choice([{}, {}, {"neutral": 1520.0}, {"span": 300.0}])
+    keys: dict[str, float] = rng.choice([{}, {}, {"neutral": 1520.0}, {"span": 300.0}])
     told = {"MOT_PWM_MIN": low if has_range else 0.0, "MOT_PWM_MAX": high if has_range else 0.0}
     told |= {} if kind is None else {"MOT_PWM_TYPE": kind}
-    low, high = (low, high) if has_range else (1100, 1900)
-    moved = 0 if has_servos else rng.choice([-1, 0, 1]) * rng.randint(40, 60)  # so that no pulse is 1500 us by chance
-    commands, pulses = {}, []
+    low, high = (low, high) if has_range else (1100.0, 1900.0)
+    moved = 0.0 if has_servos else rng.choice([-1, 0, 1]) * rng.uniform(40.0, 60.0)
+    commands: dict[str, list[float]] = {}
+    pulses = []
     for n, name in enumerate("abc"[: rng.randint(1, 3)], start=1):
-        ends = low + moved, 1500 + moved, high + moved
+        ends = low + moved, 1500.0 + moved, high + moved
         if has_servos:
-            servo = rng.randint(1000, 1200), rng.randint(1503, 1560), rng.randint(1800, 2000)
+            servo = rng.uniform(1000.0, 1200.0), rng.uniform(1503.0, 1560.0), rng.uniform(1800.0, 2000.0)
             told |= zip([f"SERVO{n}_{end}" for end in ("MIN", "TRIM", "MAX")], servo, strict=True)
             ends = servo if by_servo else ends
         if keys:
