@@ -178,14 +178,20 @@ def test_a_step_in_python_may_be_cut_and_is_that_of_the_engine(name: str, cases:
     """Commands act at once, unless others are given that act after the dead time."""
     rng, rov = random.Random(name), KNOWN[name]
     late = rov.layout.commands if rov.layout.has_dead_time else ()
+    names = [*rov.layout.calculated, *(f"der({name})" for name in rov.layout.state)]
     for _ in range(cases):
         _, inputs, before, h = random_case(rng, rov, longest=0.0)
         before |= dict.fromkeys(rov.layout.continued, 0.0)
+        acting = {delayed_name(name): inputs[name] for name in late}
+        rates = {f"der({name})": rate for name, rate in rov.derivatives(inputs, before).items()}
+        found = simulate(rov, [0.0, h], inputs | before | acting, names).values[:, 0, 0]
+        now = rov.calculated(inputs, before) | rates
+        assert found == pytest.approx(np.array([now[name] for name in names]), rel=1e-12, abs=1e-12)
         for given in ({}, {delayed_name(name): rng.uniform(-1.0, 1.0) for name in late}):
             whole, half = rov.step(inputs | given, before, h), rov.step(inputs | given, before, 0.3 * h)
             assert rov.step(inputs | given, half, 0.7 * h) == pytest.approx(whole, rel=1e-12, abs=1e-12)
             if not given:
-                engine = Stepper(rov, before | {delayed_name(name): inputs[name] for name in late}, [*whole])
+                engine = Stepper(rov, before | acting, [*whole])
                 assert engine.step([*inputs.values()], h) == pytest.approx([*whole.values()], rel=1e-12, abs=1e-12)
 
 

@@ -136,23 +136,25 @@ def test_every_vehicle_is_read_back_to_the_last_bit(times: int, tmp_path: Path) 
     assert [*tmp_path.iterdir()] == [path]
 
 
-def _value(text: str) -> Callable[[str], str]:
-    return lambda toml: toml.replace("value = 0.22", f"value = {text}")
-
-
-def _name(text: str) -> Callable[[str], str]:
-    return lambda toml: toml.replace('name = "VideoRay Pro 4"', f"name = {text}")
+def _changed(old: str, new: str) -> Callable[[str], str]:
+    return lambda text: text.replace(old, new)
 
 
 # Mistakes that fuzzing rarely finds: how the text is changed, and what the line must contain.
 RARE: dict[str, tuple[Callable[[str], str], tuple[str, ...]]] = {
-    "a number of 5000 hexadecimal digits": (_value("0x" + "f" * 5000), ("arm.R.value", "0xfff")),
-    "a key of 3000 parts": (
-        lambda text: text.replace('name = "', "name" + ".a" * 3000 + ' = "'),
-        ("name.a", "most 20"),
+    "a decimal comma": (_changed("value = 6.57", "value = 6,57"), ("not TOML", "(a number needs a decimal point)")),
+    "no TOML": (_changed("[body]", "[body"), ("not TOML", "line ", ": [body")),
+    "an integer larger than a double": (_changed("2.711", "1" + 400 * "0"), ("curves.rear.b_t", "at most 308 dig")),
+    "a number of 5000 hexadecimal digits": (
+        _changed("value = 0.22", "value = 0x" + "f" * 5000),
+        ("arm.R.value", "0xfff"),
     ),
+    "a key of 3000 parts": (_changed('name = "', "name" + ".a" * 3000 + ' = "'), ("name.a", "most 20")),
     "tables in tables": (lambda text: text + "deep = " + "{a=" * 50_000, ("not TOML",)),
-    "a control character": (_name(r'"Video\u001b[31mRay"'), ("vehicle.name", r"\x1b", "control character")),
+    "a control character": (
+        _changed('"VideoRay Pro 4"', r'"Video\u001b[31mRay"'),
+        ("vehicle.name", r"\x1b", "control character"),
+    ),
 }
 
 
