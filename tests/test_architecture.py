@@ -60,6 +60,7 @@ LARGER_FOLDERS = {
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,
     "rov_fmu/tank": 13,
+    "tests/identify": 13,
     "tests/tank": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
@@ -106,6 +107,12 @@ def _imports(module: str) -> set[str]:
             name = name.rpartition(".")[0]  # noqa: PLW2901 (the last part is not a module)
         found.add(name)
     return found - {"", module}
+
+
+def test_each_folder_has_a_module_of_properties() -> None:
+    """It says what must be true of everything that is drawn, or stands in a table."""
+    folders = [part for part in PARTS if (ROOT / "rov_fmu" / part).is_dir()]
+    assert [part for part in folders if not (ROOT / "tests" / part / "test_properties.py").exists()] == []
 
 
 @pytest.fixture(scope="module")

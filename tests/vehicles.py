@@ -238,6 +238,18 @@ SIX = numbered(
 """A vehicle with six axes and every effect."""
 
 
+_AFT = (-0.5, 0.05, 0.1)
+FINNED = numbered(
+    replace(SIX.layout, fins=(fin("rudder", (0.0, 0.6, 0.8), _AFT, True), fin("plane", (0.0, 0.0, 1.0), _AFT))),
+    lift_rudder=9.0,
+    drag_rudder=4.0,
+    angle_max_rudder=0.4,
+    lift_plane=7.0,
+    angle_max_plane=0.3,
+)
+"""The vehicle SIX with fins."""
+
+
 def with_axes(axes: str) -> Vehicle:
     """Return the vehicle SIX with only some of its axes, nothing between them, and no weight."""
     forms = tuple(form for form in SIX.layout.axes if form.axis.velocity in axes)

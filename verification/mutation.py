@@ -64,8 +64,8 @@ TESTS = {
     "rov_fmu/equation/alone.py": "equation/test_alone.py equation/test_rov.py report/test_published.py",
     "rov_fmu/equation/[cl]a*.py": "equation/table frozen/test_known_results.py docs/test_docs.py equation/test_rov.py "
     "vehicle equation",
-    "rov_fmu/equation/dependencies.py": "frozen/test_known_results.py fmu/test_dependencies.py",
-    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_equations.py equation "
+    "rov_fmu/equation/dependencies.py": "frozen/test_known_results.py fmu/test_properties.py",
+    "rov_fmu/equation/expression.py": "equation/table/test_expression.py report/test_properties.py equation "
     "fmu/calls/test_derivatives.py",
     "rov_fmu/equation/[pt]*.py": "equation/test_rov.py equation fmu/results/test_outside.py fmu/test_python_flavour.py",
     "rov_fmu/equation/*": "equation/test_rov.py equation/test_step.py equation/test_symmetries.py equation "
@@ -77,7 +77,7 @@ TESTS = {
     "rov_fmu/vehicle/checks.py": "vehicle/test_checks.py vehicle tank/test_description_mistakes.py",
     "rov_fmu/vehicle/description.py": "vehicle fmu/results/test_outside.py tank/test_description_mistakes.py",
     "rov_fmu/vehicle/shipped.py": "interface/test_model.py cli/test_messages.py",
-    "rov_fmu/vehicle/uncertainty.py": "vehicle/test_uncertainty.py study/test_samples.py vehicle",
+    "rov_fmu/vehicle/uncertainty.py": "vehicle/test_uncertainty.py study/test_properties.py vehicle",
     "rov_fmu/vehicle/*": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_writer.py vehicle",
     "rov_fmu/identify/tuning.py": "identify/test_tuning.py identify",
     "rov_fmu/identify/likelihood/*": "identify/likelihood docs/test_identify_pages.py identify",
@@ -89,10 +89,10 @@ TESTS = {
     "rov_fmu/fmu/card.py": "frozen/test_known_results.py fmu/results/test_card.py report/test_card.py fmu",
     "rov_fmu/prove/experiments.py": "prove/test_experiments.py cli/test_prove.py",
     "rov_fmu/prove/proof.py": "cli/test_prove.py prove",
-    "rov_fmu/prove/check.py": "prove/test_archive.py fmu/results/test_evidence.py",
+    "rov_fmu/prove/check.py": "prove/test_properties.py fmu/results/test_evidence.py",
     "rov_fmu/prove/signature.py": "fmu/results/test_evidence.py",
     "rov_fmu/prove/*": "prove",
-    "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_osp.py fmu/test_terminals.py fmu",
+    "rov_fmu/fmu/*": "frozen/test_known_results.py fmu/test_properties.py fmu/test_terminals.py fmu",
     "rov_fmu/tank/description.py": "tank/test_description.py tank/test_description_mistakes.py "
     "identify/test_next_test.py identify/test_wrench.py tank",
     "rov_fmu/tank/readers/*": "tank/readers/test_one_dive.py tank frozen/test_known_results.py identify/test_wrench.py",
@@ -103,27 +103,27 @@ TESTS = {
     "rov_fmu/report/plots/*": "frozen/test_known_results.py report/plots report/test_pictures.py report",
     "rov_fmu/report/page/live.py": "report/fly/test_flown.py report/test_fmu_page.py report",
     "rov_fmu/report/page/recording.py": "tank/test_several_files.py report/fly",
-    "rov_fmu/report/page/*": "frozen/test_known_results.py report/test_equations.py report/test_fmu_page.py report",
+    "rov_fmu/report/page/*": "frozen/test_known_results.py report/test_properties.py report/test_fmu_page.py report",
     "rov_fmu/report/proof_page.py": "prove",
     "rov_fmu/report/console_log.py": "frozen/test_known_results.py interface/test_inspect_command.py",
     "rov_fmu/report/console_results.py": "frozen/test_known_results.py identify/test_tuning.py",
     "rov_fmu/report/console.py": "report/test_console.py cli/test_prove.py fmu/results/test_evidence.py",
     "rov_fmu/report/progress.py": "report/test_console.py cli/test_terminal.py",
     "rov_fmu/report/*": "frozen/test_known_results.py report/test_report.py report",
-    "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_samples.py study",
+    "rov_fmu/study/plan/*": "study/test_plans.py study/test_closed_figures.py study/test_properties.py study",
     "rov_fmu/study/*": "frozen/test_known_results.py study/test_study.py study/test_figures.py study",
     "rov_fmu/interface/sitl_command.py": "bridges/test_sitl.py cli/test_targets.py",
     "rov_fmu/interface/export_command.py": "interface/test_export_command.py bridges",
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
-    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_edges.py tank/test_tank_tests.py "
+    "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "
     "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_experiments.py study/test_plans.py "
     "cli/test_messages.py io",
     "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py frozen/test_known_results.py",
     "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
-    "vehicle/test_fuzzed_vehicles.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
+    "vehicle/test_properties.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",
     "rov_fmu/io/*": "io cli/test_messages.py cli/test_inputs.py cli",
     "rov_fmu/build.py": "fmu/test_build.py fmu/test_build_failures.py cli/test_targets.py fmu",
     "rov_fmu/cli.py": "interface/test_inspect_command.py fmu/test_build_failures.py cli study/test_page.py",

@@ -14,7 +14,7 @@ import rov_fmu
 from rov_fmu.bridges import arrays
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.bridges.test_arrays import ALL, Array, by_engine, cases, check
+from tests.bridges.test_properties import ALL, Array, by_engine, cases, check
 
 
 def by_jax(rov: Vehicle, inputs: dict[str, Array], states: dict[str, Array]) -> Any:

@@ -263,20 +263,6 @@ def test_a_body_that_a_constraint_welds_to_the_origin_adds_its_mass(angle: float
     assert np.polyfit(0.001 * np.arange(60), speeds, 1)[0] == pytest.approx(expected, rel=2e-4)
 
 
-def test_the_figures_of_the_heavy() -> None:
-    """10 N forward give 10 / (13.5 + 6.36) m/s²; at 45° of pitch, half of the inverse of each mass counts."""
-    _, package = loaded("bluerov2_heavy")
-    found = []
-    for tilt, push in (("level", 0.0), ("level", 10.0), ("45° bow up", 0.0), ("45° bow up", 10.0)):
-        rov = package.load()
-        turned(rov, TILTS[tilt])
-        rov.data.xfrc_applied[rov.body, 0] = push
-        rov.step()
-        found.append(rov.data.qacc[0])
-    assert found[1] - found[0] == pytest.approx(0.50352, abs=1e-5)
-    assert found[3] - found[2] == pytest.approx(0.40714, abs=1e-5)
-
-
 @pytest.mark.parametrize("tilt", TILTS)
 @pytest.mark.parametrize("name", ["bluerov2_heavy", "six_axes"])
 def test_a_wall_feels_mass_and_added_mass(name: str, tilt: str) -> None:

@@ -10,110 +10,75 @@ import pytest
 
 from rov_fmu.build import build
 from rov_fmu.cli import _commands, main
-from rov_fmu.identify import identify as identification
 from rov_fmu.io.output import Output, WriteError, check_replaced, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, COMMANDS, WRITING, without_progress
-from tests.folders import small_folder
+from tests.commands import BARE, COMMANDS, FEW_TESTS, WRITING, without_progress
 
 Capsys = pytest.CaptureFixture[str]
 
 
-@pytest.fixture(scope="module")
-def tank_tests(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A small folder of tank tests."""
-    return small_folder(tmp_path_factory.mktemp("tests"))
+FOREIGN = "is not as rov-fmu wrote it: it may have been made or changed by hand"
+CHANGED = "has changed since rov-fmu wrote it"
+FILES = ("rov.toml", "r.html")
+"""What `_identify` writes."""
 
 
-@pytest.fixture(scope="module")
-def made(tank_tests: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the files that the command writes."""
-    folder = tmp_path_factory.mktemp("made")
-    assert _identify(tank_tests, folder) == 0
-    return folder
+def _identify(folder: Path, *options: str) -> int:
+    vehicle, report = (str(folder / name) for name in FILES)
+    return main(["identify", str(FEW_TESTS), "-o", vehicle, "--report", report, *options])
 
 
-@pytest.fixture
-def folder(made: Path, tmp_path: Path) -> Path:
-    """A copy of the folder that a test may change."""
-    return Path(shutil.copytree(made, tmp_path / "copy"))
-
-
-def _identify(tank_tests: Path, folder: Path, *options: str) -> int:
-    return main(
-        ["identify", str(tank_tests), "-o", str(folder / "rov.toml"), "--report", str(folder / "r.html"), *options]
-    )
-
-
-def _edited(path: Path) -> bytes:
-    """Change a file as somebody would by hand, and return its new content."""
-    changed = path.read_bytes().replace(b"Mine", b"My own", 1)
-    path.write_bytes(changed)
-    return changed
-
-
-def test_unchanged_files_are_replaced_and_reported(tank_tests: Path, folder: Path, capsys: Capsys) -> None:
-    before = {path.name: path.read_bytes() for path in folder.iterdir()}
-    capsys.readouterr()
-    assert _identify(tank_tests, folder) == 0
-    out, err = capsys.readouterr()
-    assert without_progress(err) == ""
-    assert out.splitlines()[:2] == [
-        f"{folder / name}: replaced the result of an earlier run" for name in ("rov.toml", "r.html")
-    ]
-    assert {path.name: path.read_bytes() for path in folder.iterdir()} == before
-    assert load_vehicle(folder / "rov.toml").provenance
-
-
-@pytest.mark.parametrize("name", ["rov.toml", "r.html"])
+@pytest.mark.parametrize("name", FILES)
 @pytest.mark.parametrize(
-    ("own", "reason"),
+    ("is_of_ours", "before", "after", "reason"),
     [
-        (b"", "has changed since rov-fmu wrote it"),
-        (b"\xff my notes", "is not as rov-fmu wrote it: it may have been made or changed by hand"),
-        (b"%s\xff damaged", "is not UTF-8 text, at byte {}"),
+        (True, b"my", b"our", CHANGED),
+        (True, b"my", b"\xff", "is not UTF-8 text, at byte {}"),
+        (False, b"my", b"\xff", FOREIGN),
     ],
 )
 def test_the_work_of_others_is_refused_before_anything_is_computed(
     name: str,
-    own: bytes,
+    is_of_ours: bool,
+    before: bytes,
+    after: bytes,
     reason: str,
-    tank_tests: Path,
-    folder: Path,
+    tmp_path: Path,
     capsys: Capsys,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """An empty text stands for the file with a change, and %s for its first line."""
-    if own:
-        own = own.replace(b"%s", (folder / name).read_bytes().splitlines(keepends=True)[0])
-        (folder / name).write_bytes(own)
-    else:
-        own = _edited(folder / name)
-    monkeypatch.setattr(identification, "identify", lambda *_: pytest.fail("it is computed before it is refused"))
+    path = tmp_path / name
+    seal = ("# {}", "<!-- {} -->")[FILES.index(name)]
+    text = sealed("my notes", seal, "identify") if is_of_ours else "my notes"
+    own = text.encode().replace(before, after)
+    path.write_bytes(own)
+    monkeypatch.setattr(
+        "rov_fmu.interface.identify_command.identify", lambda *_: pytest.fail("it is computed before it is refused")
+    )
     monkeypatch.setattr("rov_fmu.tank.folder.read_rows", lambda *_: pytest.fail("tests are read before it is refused"))
-    capsys.readouterr()
-    assert _identify(tank_tests, folder) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    reason = reason.format(own.find(b"\xff"))
-    assert err == f"rov-fmu: {folder / name}: cannot be written: the file there {reason}; --force replaces it\n"
-    assert (folder / name).read_bytes() == own
-    assert len([*folder.iterdir()]) == 2
+    assert _identify(tmp_path) == 2
+    reason = reason.format(own.find(after))
+    line = f"rov-fmu: {path}: cannot be written: the file there {reason}; --force replaces it\n"
+    assert capsys.readouterr() == ("", line)
+    assert [*tmp_path.iterdir()] == [path]
+    assert path.read_bytes() == own
 
 
-def test_force_replaces_the_work_of_others_and_reports_it(
-    tank_tests: Path, made: Path, folder: Path, capsys: Capsys
-) -> None:
-    _edited(folder / "rov.toml")
-    (folder / "r.html").write_text("my notes", encoding="utf-8")
-    capsys.readouterr()
-    assert _identify(tank_tests, folder, "--force") == 0
-    assert capsys.readouterr().out.splitlines()[:2] == [
-        f"{folder / 'rov.toml'}: replaced a file that has changed since rov-fmu wrote it",
-        f"{folder / 'r.html'}: replaced a file that is not as rov-fmu wrote it: it may have been made or changed by "
-        "hand",
-    ]
-    assert [path.read_bytes() for path in sorted(folder.iterdir())] == [p.read_bytes() for p in sorted(made.iterdir())]
+def test_an_identification_tells_what_it_replaces(tmp_path: Path, capsys: Capsys) -> None:
+    paths = [tmp_path / name for name in FILES]
+    assert _identify(tmp_path) == 0
+    first, reasons = [path.read_bytes() for path in paths], ["the result of an earlier run"] * 2
+    for options in ([], ["--force"]):
+        capsys.readouterr()
+        assert _identify(tmp_path, *options) == 0
+        out, err = capsys.readouterr()
+        assert without_progress(err) == ""
+        told = [f"{path}: replaced {reason}" for path, reason in zip(paths, reasons, strict=True)]
+        assert out.splitlines()[:2] == told
+        assert [path.read_bytes() for path in paths] == first
+        paths[0].write_bytes(first[0] + b"\n")
+        paths[1].write_text("my notes", encoding="utf-8")
+        reasons = [f"a file that {CHANGED}", f"a file that {FOREIGN}"]
 
 
 def _check(paths: Sequence[Path]) -> list[str]:

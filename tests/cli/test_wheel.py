@@ -162,7 +162,7 @@ def lowest(folder: Path) -> Path:
 PARTS = [
     "cli/test_start.py",
     "fmu/test_build.py",
-    "fmu/test_osp.py",
+    "fmu/test_properties.py",
     "report",
     "vehicle/test_vehicle.py",
     *(f"vehicle/test_{part}.py" for part in ("writer", "json_schema", "bluerov2")),

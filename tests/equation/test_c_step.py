@@ -1,6 +1,5 @@
-"""A step of the FMU agrees with the step in Python, with and without lag and coupling, also in special cases."""
+"""A step of the FMU is right also for the smallest and the largest numbers."""
 
-import random
 from functools import partial
 
 import pytest
@@ -8,8 +7,7 @@ import pytest
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu, in_python
 from tests.fmi2 import Fmu
-from tests.often import often
-from tests.vehicles import EVERYTHING, VIDEORAY, at_rest, random_case, still
+from tests.vehicles import EVERYTHING, VIDEORAY, at_rest, still
 
 
 @pytest.fixture(scope="module", params=["videoray", "everything"])
@@ -17,18 +15,6 @@ def vehicle(request: pytest.FixtureRequest) -> tuple[Vehicle, Step]:
     """A vehicle, and the step of its FMU."""
     rov = {"videoray": VIDEORAY, "everything": load_vehicle(EVERYTHING)}[request.param]
     return rov, partial(in_fmu, Fmu(request.getfixturevalue(f"{request.param}_dir")))
-
-
-@often("cases", 8, 100, 1000)
-def test_a_step_in_c_agrees_with_the_step_in_python(vehicle: tuple[Vehicle, Step], cases: int) -> None:
-    rov, step = vehicle
-    rng = random.Random(cases)
-    for _ in range(cases):
-        _, inputs, state, h = random_case(rng, rov, longest=3.0)
-        found, expected = step(rov, inputs, state, h), rov.step(inputs, state, h)
-        for name, value in expected.items():
-            room = 1e-13 * (1.0 + 10.0 * h) if name in rov.layout.pose else 1e-13 * (1.0 + abs(value))
-            assert abs(found[name] - value) <= room, (name, inputs, state, h)
 
 
 def test_the_smallest_velocity_is_turned_back(vehicle: tuple[Vehicle, Step]) -> None:

@@ -13,13 +13,11 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.often import often
 from tests.vehicles import (
     SIX,
     Values,
     at_rest,
     random_body,
-    random_case,
     random_inputs,
     random_state,
     still,
@@ -81,20 +79,6 @@ def test_a_step_is_exact(axes: str) -> None:
 def in_c(rov: Vehicle, inputs: Values, state: Values, times: ArrayLike) -> Array:
     """Return the states and the heading at the times; the second axis is time."""
     return simulate(rov, times, {**inputs, **state}, [*rov.layout.state, "psi"], workers=1).values[:, 0]
-
-
-@often("cases", 25, 300, 2000)
-def test_a_step_in_c_agrees_with_python_and_50_digits(cases: int) -> None:
-    rng = random.Random(cases)
-    for n in range(cases):
-        rov, inputs, state, h = random_case(rng, SIX, longest=0.5)
-        expected = rov.step(inputs, state, h)
-        found = dict(zip([*rov.layout.state, "psi"], in_c(rov, inputs, state, [0.0, h])[:, 1].tolist(), strict=True))
-        assert found == pytest.approx(expected, rel=1e-13, abs=1e-13), (inputs, state, h)
-        if n % 25 == 0:
-            exact = rigid_vehicle.step(rov, inputs, state, 0.01 * h)
-            near = rov.step(inputs, state, 0.01 * h)
-            assert gap(compared(rov, places(rov, near)), compared(rov, exact)) <= 1e-13
 
 
 # ---- The heading ----

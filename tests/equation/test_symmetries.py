@@ -17,6 +17,7 @@ from tests.vehicles import (
     Case,
     State,
     Values,
+    frictionless,
     random_case,
     random_vehicle,
     still,
@@ -88,7 +89,7 @@ def test_without_thrust_and_load_energy_only_falls(vehicle: str) -> None:
 
 def test_coupling_does_no_work() -> None:
     """Without drag, the energy is constant, and (M_u u)^2 + (M_v v)^2 is an invariant of Kirchhoff's equations."""
-    rov = HEAVY.with_(**{name: 0.0 for name in HEAVY.coefficients if name.startswith(("a_d", "b_d", "F_0"))})
+    rov = frictionless(HEAVY)
     M_u, M_v = (rov.effective_inertia(rov.layout.by_name[name]) for name in ("surge", "sway"))
     rng = random.Random(12)
     for _ in range(10):

@@ -24,8 +24,9 @@ from tests.tank.readers.motion import DIVE, TIME
 from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_tlog
 
 Capsys = pytest.CaptureFixture[str]
-
+Inspect = Callable[..., tuple[str, str]]
 DEPTH: Array = motion.DEPTH
+THRUSTERS = [*motion.THRUSTERS.values()]
 
 
 def three_files(folder: Path) -> Path:
@@ -43,9 +44,6 @@ def one_file(folder: Path) -> Path:
     return folder / "log_a.csv"
 
 
-THRUSTERS = [*motion.THRUSTERS.values()]
-
-
 def of_format(suffix: str) -> Callable[[Path], object]:
     return lambda folder: LOGS[suffix](folder, DIVE)
 
@@ -56,9 +54,7 @@ FILES: dict[str, tuple[Callable[[Path], object], set[str]]] = {
     "three files": (three_files, {"heave", "yaw"}),
     "one file": (one_file, {"heave"}),
 }
-
-
-Inspect = Callable[..., tuple[str, str]]
+"""What is written, and the axes that it shows at least."""
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""CSV files are read as spreadsheets save them; mistakes are reported as they stand in the file, in its own units."""
+"""Mistakes in a CSV file are told as they stand in it, in its own units; rows may grow, and files may be large."""
 
 import tracemalloc
 from collections.abc import Callable
@@ -18,10 +18,6 @@ def _file(folder: Path, text: str) -> Path:
     path = folder / "some.csv"
     path.write_text(text, encoding="utf-8")
     return path
-
-
-def _values(table: Columns) -> dict[str, list[float]]:
-    return {name: [*values] for name, values in table.values.items()}
 
 
 @pytest.mark.parametrize(
@@ -52,25 +48,6 @@ LENGTH, MAYBE = Column({"m": 1.0, "cm": 100.0}), Column({"s": 1.0}, blanks=True)
 
 def _table(folder: Path, text: str, **also: Column) -> Columns:
     return read_columns(_file(folder, text), {"length": LENGTH, **also})
-
-
-@pytest.mark.parametrize(
-    "text",
-    [
-        "length [m];time [s]\n0,5;1,25\n1e3;-2\n",
-        "length [m]\ttime [s]\n0,5\t1.25\n1e3\t-2\n",
-        '"length [m]";"time [s]"\n"0,5";"1,25"\n\n;\n1000;-2\n',
-        "LENGTH[M],Time  [ S ]\n 0.5 , 1.25 \n1e3,-2\n",
-    ],
-)
-def test_separators_decimal_commas_case_and_spaces(text: str, tmp_path: Path) -> None:
-    assert _values(_table(tmp_path, text, time=MAYBE)) == {"length": [0.5, 1000.0], "time": [1.25, -2.0]}
-
-
-def test_blank_cells_are_nan_where_they_are_allowed(tmp_path: Path) -> None:
-    table = _table(tmp_path, "length [m],time [s]\n1,\n2,-\n3,nan\n4,NaN\n5,0\n", time=MAYBE)
-    assert [isnan(value) for value in table.values["time"]] == [True, True, True, True, False]
-    assert [*table.texts("time")] == [("",), ("",), ("",), ("",), ("0",)]
 
 
 @pytest.mark.parametrize(
@@ -122,42 +99,6 @@ def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> No
     ]
     assert len(read_columns(_file(tmp_path, "length [m]\n1,2\n3\n"), {"length": LENGTH}, loose=True).lines) == 1
     assert ({name: [*rows] for name, rows in table.unread.items()}, table.torn) == ({"length": [1], "time": []}, 1)
-
-
-# ---- Dialects --------------------------------------------------------------------------------------------------------
-
-PLAIN = "angle [°];pulse [µs]\n0,5;1500\n1,5;1600\n"
-BEFORE = {  # what may stand before the header, and the number of lines that are told
-    "a separator for Excel": ("sep=;\n", 0),
-    "the same in quotes": ('"SEP=;"\n\n', 0),
-    "a title": ("Tank of Odense\n", 1),
-    "prose with commas": ("Recorded on Monday, with a DVL, and a tether\n\n", 1),
-    "as many commas as the table has separators": ("Location: Odense, Denmark\n", 1),
-    "comments": ("# rate, 10 Hz\n#\n# 1;2\n", 3),
-    "keys and values of an instrument": ("Instrument;CTD\nRate [Hz];10\nDate;2024-05-11\n\nNote;\n", 4),
-    "a quotation mark": ('Diameter 5" tube\n', 1),
-    "both": ("sep=;\n# by hand\n", 1),
-}
-ENCODINGS = {"utf-8": 0, "utf-8-sig": 0, "utf-16": 0, "cp1252": 1}
-
-
-@pytest.mark.parametrize("before", BEFORE)
-@pytest.mark.parametrize("encoding", ENCODINGS)
-@pytest.mark.parametrize("header", ["angle", "# angle"])
-def test_the_form_of_a_file_is_found_and_what_was_assumed_is_told(
-    before: str, encoding: str, header: str, tmp_path: Path
-) -> None:
-    lines, count = BEFORE[before]
-    path = tmp_path / "some.csv"
-    for end in ("\n", "\r\n"):
-        path.write_bytes((lines + PLAIN).replace("angle", header).replace("\n", end).encode(encoding))
-        table = read_columns(path, {"angle": Column({"°": 1.0}), "pulse": Column({"µs": 1.0})})
-        assert _values(table) == {"angle": [0.5, 1.5], "pulse": [1500.0, 1600.0]}
-        assert [*table.lines] == [lines.count("\n") + 2, lines.count("\n") + 3]
-        assert ("code page" in table.assumed) == ENCODINGS[encoding]
-        assert table.assumed.get("lines before header", {}).get("count", 0) == count
-    with pytest.raises(DataFileError, match=f"line {lines.count(chr(10)) + 2}, column 'pulse .µs.' = '1500': must be"):
-        read_columns(path, {"angle": Column({"°": 1.0}), "pulse": Column({"µs": 1.0}, maximum=2.0)})
 
 
 def test_a_row_is_never_skipped(tmp_path: Path) -> None:

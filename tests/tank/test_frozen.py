@@ -47,27 +47,26 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
     assert used(found, "voltage").values.tolist() == voltage.values.tolist()
 
 
-SENSORS = {
-    "with noise": "0.01 0.001 99 99 60 -",
-    "one sensor": "0.01 0.001 30 99 60 -",
-    "within 2 s": "0.01 0.001 32 30 60 29.9",
-    "at different times": "0.01 0.001 30 32.1 60 -",
-    "for a fifth of the log": "0.01 0.001 48 48 60 47.9",
-    "for less than a fifth of the log": "0.01 0.001 48.1 48.1 60 -",
-    "for 5 s": "0.01 0.001 9.8 9.8 14.9 9.7",
-    "for less than 5 s": "0.01 0.001 9.8 9.8 14.7 -",
-    "at rest": "0.001 0.01 99 99 60 -",
-    "steps of the resolution": "0.006 0.01 30 30 60 -",
-}
-"""The noise and the resolution of two sensors, the times at which they freeze and at which the log ends, and the time
-that is told, if they are said to be frozen."""
-
-
-@pytest.mark.parametrize("case", SENSORS)
-def test_sensors_that_froze_together_are_told(case: str) -> None:
-    *numbers, start = SENSORS[case].split()
-    noise, step, first, second, end = map(float, numbers)
-    told = [[float(start)]] if start != "-" else []
+@pytest.mark.parametrize(
+    ("noise", "step", "first", "second", "end", "start"),
+    [
+        pytest.param(0.01, 0.001, 99, 99, 60, None, id="with noise"),
+        pytest.param(0.01, 0.001, 30, 99, 60, None, id="one sensor"),
+        pytest.param(0.01, 0.001, 32, 30, 60, 29.9, id="within 2 s"),
+        pytest.param(0.01, 0.001, 30, 32.1, 60, None, id="at different times"),
+        pytest.param(0.01, 0.001, 48, 48, 60, 47.9, id="for a fifth of the log"),
+        pytest.param(0.01, 0.001, 48.1, 48.1, 60, None, id="for less than a fifth of the log"),
+        pytest.param(0.01, 0.001, 9.8, 9.8, 14.9, 9.7, id="for 5 s"),
+        pytest.param(0.01, 0.001, 9.8, 9.8, 14.7, None, id="for less than 5 s"),
+        pytest.param(0.001, 0.01, 99, 99, 60, None, id="at rest"),
+        pytest.param(0.006, 0.01, 30, 30, 60, None, id="steps of the resolution"),
+    ],
+)
+def test_sensors_that_froze_together_are_told(
+    noise: float, step: float, first: float, second: float, end: float, start: float | None
+) -> None:
+    """Two sensors freeze at two times; where they are said to be frozen, it is from the start on."""
+    told = [] if start is None else [[start]]
     check(told, *(frozen(noisy(n, noise, step), at)[: round(10 * end)] for n, at in ((1, first), (2, second))))
 
 

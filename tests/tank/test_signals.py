@@ -1,6 +1,6 @@
 """Times and values of commands, headings that wrap, gaps, and scales of sensors."""
 
-from math import pi
+from math import nan, pi
 
 import numpy as np
 import pytest
@@ -30,17 +30,18 @@ def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() 
     assert unwrapped(channel("heading", STEPS, values)).tolist() == values.tolist()
 
 
-RANGES = {
-    "nan": "empty",
-    "2 2 nan": "always 2",
-    "1.5 -0.2": "-0.2 to 1.5",
-    "1e6 1000001": "1000000 to 1000001",
-    "1 1.000000000001": "1 to 1.0000000000010001",
-}
-
-
-def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart() -> None:
-    assert [range_in_words(np.array(values.split(), float)) for values in RANGES] == [*RANGES.values()]
+@pytest.mark.parametrize(
+    ("values", "words"),
+    [
+        ([nan], "empty"),
+        ([2.0, 2.0, nan], "always 2"),
+        ([1.5, -0.2], "-0.2 to 1.5"),
+        ([1e6, 1000001.0], "1000000 to 1000001"),
+        ([1.0, 1.000000000001], "1 to 1.0000000000010001"),
+    ],
+)
+def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart(values: list[float], words: str) -> None:
+    assert range_in_words(np.array(values)) == words
 
 
 def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:

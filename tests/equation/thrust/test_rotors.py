@@ -2,7 +2,6 @@
 
 import random
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -12,7 +11,6 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.parts import Curve
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import in_engine
-from tests.often import often
 from tests.vehicles import (
     SIX,
     VEHICLES,
@@ -103,16 +101,6 @@ def test_random_steps_are_exact(name: str) -> None:
         assert max(errors(rov, inputs, state, h)) <= TOLERANCE, (inputs, state, h)
 
 
-@often("cases", 15, 300)
-def test_a_step_in_c_agrees_with_the_step_in_python(cases: int) -> None:
-    rng = random.Random(cases)
-    for _ in range(cases):
-        rov = rng.choice([ROTORS["six axes"], SLOW["six axes"]])
-        _, inputs, state, h = random_case(rng, rov, longest=1.0)
-        expected = {name: x for name, x in rov.step(inputs, state, h).items() if name in rov.layout.state}
-        assert in_engine(rov, inputs, state, h) == pytest.approx(expected, rel=1e-12, abs=1e-12), (inputs, state, h)
-
-
 @pytest.mark.long
 def test_commands_that_arrive_after_the_dead_time_turn_rotors_back_within_steps() -> None:
     commands = 12
@@ -198,7 +186,7 @@ def test_the_steady_motion_is_that_of_the_law_of_the_force() -> None:
         assert four.response(axis, 0.5) == pytest.approx(force.response(axis, 0.5), rel=1e-14)
 
 
-# ---- States and cuts ----
+# ---- Next to nothing ----
 
 
 @pytest.mark.parametrize("n", [1e-17, -1e-17, 1e-300, -5e-324, 30.0])
@@ -208,25 +196,3 @@ def test_a_speed_that_is_next_to_nothing_or_large_is_a_speed(n: float) -> None:
     near = at_rest(SURGE) if abs(n) < 1.0 else starts
     found, expected = in_engine(SURGE, inputs, starts, 0.5), SURGE.step(inputs, near, 0.5)
     assert found == pytest.approx({name: expected[name] for name in found}, rel=1e-12, abs=1e-12)
-
-
-@often("cases", 3, 30)
-def test_a_step_that_is_cut_anywhere_is_the_same_step(cases: int) -> None:
-    rov, rng = ROTORS["six axes"], random.Random(cases)
-    for _ in range(cases):
-        inputs, state = turning(rng, rov, 1.4)
-        once, cut = in_engine(rov, inputs, state, 1.4), dict(state)
-        for _ in range(7):
-            cut = in_engine(rov, inputs, cut, 0.2)
-        assert cut == pytest.approx(once, rel=1e-12, abs=1e-13)
-
-
-@pytest.mark.long
-def test_lanes_follow_the_engine_through_reversals() -> None:
-    rng = random.Random(8)
-    rov, times = ROTORS["six axes"], np.linspace(0.0, 1.0, 11)
-    tables = {
-        name: np.array([[rng.uniform(-1.0, 1.0) for _ in times] for _ in range(20)]) for name in rov.layout.commands
-    }
-    run = partial(simulate, rov, times, tables, [*rov.layout.lagging, *rov.layout.velocities, "F_a"], vehicles=20)
-    assert run(lanes=True).values == pytest.approx(run(workers=1).values, rel=1e-12, abs=1e-12)

@@ -20,13 +20,12 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine
 from tests.vehicles import (
     EVERYTHING,
+    FINNED,
     SIX,
     THRUST_EFFECTS,
     VIDEORAY,
     at_rest,
     extended,
-    fin,
-    numbered,
     random_inputs,
     random_state,
 )
@@ -35,16 +34,6 @@ from verification.references.equations import steady_forces
 from verification.references.rigid_vehicle import compared, places
 
 ROV = load_vehicle(THRUST_EFFECTS)
-_AFT = (-0.5, 0.05, 0.1)
-FINNED = numbered(
-    replace(SIX.layout, fins=(fin("rudder", (0.0, 0.6, 0.8), _AFT, True), fin("plane", (0.0, 0.0, 1.0), _AFT))),
-    lift_rudder=9.0,
-    drag_rudder=4.0,
-    angle_max_rudder=0.4,
-    lift_plane=7.0,
-    angle_max_plane=0.3,
-)
-"""A vehicle with six axes and every effect of the velocities."""
 
 
 def immediate(rov: Vehicle) -> Vehicle:
@@ -167,15 +156,6 @@ def test_a_step_is_exact(rov: Vehicle) -> None:
         found = compared(rov, places(rov, rov.step(inputs, state, h)))
         for x, y in zip(found, compared(rov, rigid_vehicle.step(rov, inputs, state, h)), strict=True):
             assert abs(x - y) <= 1e-13 * (1.0 + abs(y)), h
-
-
-@pytest.mark.parametrize("rov", [NOW, FINNED], ids=["four axes", "six axes"])
-def test_c_agrees_with_python(rov: Vehicle) -> None:
-    rng = random.Random(4)
-    for _ in range(15):
-        case = inputs_of(rng, rov), random_state(rng, rov), 10.0 ** rng.uniform(-3.0, 0.0)
-        expected = {name: x for name, x in rov.step(*case).items() if name in rov.layout.state}
-        assert in_engine(rov, *case) == pytest.approx(expected, rel=1e-13, abs=1e-14)
 
 
 # ---- Dead time ----

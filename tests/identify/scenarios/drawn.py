@@ -33,7 +33,6 @@ _NOISE = {"surge": 0.008, "yaw": np.radians(0.4), "heave": 0.006}
 """The noise of the sensors: surge velocity (m/s), heading (rad), and depth (m)."""
 _HEADERS = {"surge": "surge velocity [m/s]", "yaw": "heading [deg]", "heave": "depth [m]"}
 _PLACE = 'position = {{ value = [-0.15, {0}, 0.0], unit = "m", source = "drawn" }}\n'
-_AXES = {"surge": "[axes.surge]\n", "yaw": "[axes.yaw]\n", "heave": "[axes.heave]\n"}
 
 
 @dataclass(frozen=True)
@@ -207,7 +206,7 @@ class Drawn:
             hardware += THRUSTER.format(name=name, x=1.0, y=0.0, z=0.0).replace("t200", "main") + _PLACE.format(y)
         if "heave" in self.axes:
             hardware += THRUSTER.format(name="top", x=0.0, y=0.0, z=1.0).replace("t200", "main")
-        hardware += "".join(_AXES[axis] for axis in self.axes)
+        hardware += "".join(f"[axes.{axis}]\n" for axis in self.axes)
         at = {"V_0_main": Given(VOLTAGE, "V")} if self.has_voltage else {}
         write_folder(folder, tables, hardware=hardware, known=at, fit=["voltage"] * self.has_voltage)
 

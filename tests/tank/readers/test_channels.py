@@ -30,24 +30,21 @@ def found(topics: Sequence[Topic], quantity: str) -> Channel:
     return channel
 
 
-FRAMES = {
-    "; ": "ENU FLU",
-    "map; base_link": "ENU FLU",
-    "world_ned; ": "NED NED",
-    "world_ned; base_link_flu": "NED FLU",
-    "map; base_link_frd": "ENU NED",
-    "; imu_frd": "NED NED",
-    "; imu_ned": "NED NED",
-}
-"""The names of the frames of the earth and of the body, and which they are; that of the sea is NED for both."""
-
-
-@pytest.mark.parametrize("names", FRAMES)
-def test_names_of_frames(names: str) -> None:
-    earth, body = names.split("; ")
-    matrices = {"ENU": ENU, "FLU": FLU, "NED": NED}
-    expected = [matrices[word].tolist() for word in FRAMES[names].split()]
-    assert [matrix.tolist() for matrix in frames_of(Source("/odom", frames=(earth, body)))] == expected
+@pytest.mark.parametrize(
+    ("names", "earth", "body"),
+    [
+        (("", ""), ENU, FLU),
+        (("map", "base_link"), ENU, FLU),
+        (("world_ned", ""), NED, NED),
+        (("world_ned", "base_link_flu"), NED, FLU),
+        (("map", "base_link_frd"), ENU, NED),
+        (("", "imu_frd"), NED, NED),
+        (("", "imu_ned"), NED, NED),
+    ],
+)
+def test_names_of_frames(names: tuple[str, str], earth: Array, body: Array) -> None:
+    """Of the earth and of the body; those of the sea are NED for both."""
+    np.testing.assert_equal(frames_of(Source("/odom", frames=names)), [earth, body])
 
 
 QUATERNION = Rotation.from_matrix(DIVE.rotation).as_quat(scalar_first=True)
@@ -188,23 +185,23 @@ def test_of_several_barometers_the_one_in_the_water_tells_the_depth() -> None:
 
 AIR = 101325.0
 WATER = AIR + 9806.65 * motion.DEPTH
-PRESSURES = {
-    "100 1003.1": "its pressures of 100 ... 1003 are below 1 % of an atmosphere, so they are not in Pa",
-    "100 1023.4": "",
-    "106094.9 106289.9": "its pressure changes by only 20 mm of water and is that of the air",
-    "96165.1 96360.1": "its pressure changes by only 20 mm of water and is that of the air",
-    "106297.6 106492.6": "",
-    "101128 101325": "",
-}
-"""The lowest and the highest pressure, Pa, and why they tell no depth."""
 
 
-@pytest.mark.parametrize("pressures", PRESSURES)
-def test_pressures_that_tell_no_depth(pressures: str) -> None:
-    ends = np.array(pressures.split(), float)
-    pressure, depth = of_scalar(QUANTITIES["pressure"], Source("p"), np.arange(2.0), ends)
+@pytest.mark.parametrize(
+    ("low", "high", "reason"),
+    [
+        (100.0, 1003.1, "its pressures of 100 ... 1003 are below 1 % of an atmosphere"),
+        (100.0, 1023.4, ""),
+        (106094.9, 106289.9, "its pressure changes by only 20 mm of water and is that of the air"),
+        (96165.1, 96360.1, "its pressure changes by only 20 mm of water and is that of the air"),
+        (106297.6, 106492.6, ""),
+        (101128.0, 101325.0, ""),
+    ],
+)
+def test_pressures_that_tell_no_depth(low: float, high: float, reason: str) -> None:
+    pressure, depth = of_scalar(QUANTITIES["pressure"], Source("p"), np.arange(2.0), np.array([low, high]))
     assert not pressure.unused
-    assert depth.unused.partition(", so the")[0] == PRESSURES[pressures].partition(", so the")[0]
+    assert depth.unused.partition(", so the")[0] == reason
 
 
 def test_values_that_no_sensor_shows_are_left_out_and_repeated_times_merged() -> None:

@@ -16,16 +16,14 @@ import zstandard
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, Writer
 from scipy.io import savemat
 
-from rov_fmu.interface.command_files import read_inputs
 from rov_fmu.io.child_process import Limits
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers import parsers
-from rov_fmu.tank.readers.parsers import FORMATS, Format, budget, format_of, header_of, one_parser, read_topics
-from rov_fmu.tank.readers.tank_tables import read_rows
+from rov_fmu.tank.readers.parsers import budget, format_of, header_of, one_parser, read_topics
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
-from tests.tank.readers.writers import SEEDS, Ros, bag, flash
+from tests.tank.readers.writers import Ros, bag, flash
 
 
 def read(path: Path) -> object:
@@ -107,31 +105,6 @@ def test_a_small_file_that_exhausts_the_machine_is_one_line(
     good = bag(".db3")(tmp_path / "good", DIVE)
     assert read_topics(good, ()).pieces
     assert not [*temporary.iterdir()]
-
-
-@pytest.mark.parametrize("kind", FORMATS, ids=lambda kind: kind.name)
-def test_every_format_is_read_in_the_guarded_process_alone(
-    kind: Format, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Whatever a command wants of a file, it gets nothing without a budget. A new format needs a writer in SEEDS."""
-    path = SEEDS[kind.name](tmp_path, DIVE)
-    assert format_of(path) is kind
-    assert bool(kind.open) + bool(kind.read) + bool(kind.unpack) == 1
-    for in_this_process in (parsers.open_table, lambda path: parsers.read_content(path, ())):
-        with pytest.raises(AssertionError, match="only a guarded function"):
-            in_this_process(path)
-    assert inspect(path, [BLUEROV2])
-    monkeypatch.setattr(parsers, "budget", lambda _: Limits(time=0.0))
-    uses: list[Callable[[], object]] = [
-        lambda: read_log(path, BLUEROV2),
-        lambda: inspect(path, [BLUEROV2]),
-        lambda: header_of(path),
-        lambda: read_rows(path, "thrust"),
-        lambda: read_inputs(path, BLUEROV2),
-    ]
-    for use in uses:
-        with pytest.raises(DataFileError, match="needs more than 0 s to be read"):
-            use()
 
 
 def test_all_that_reads_a_file_shares_one_budget(tmp_path: Path) -> None:

@@ -1,14 +1,12 @@
-"""The plots of an identification report, and of the evidence about an FMU."""
+"""The plots of the evidence about an FMU."""
 
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import FillBetweenPolyCollection
 from matplotlib.figure import Figure
 
 from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
-from rov_fmu.tank.arrays import Array
 
 
 def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
@@ -16,28 +14,10 @@ def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
     return {str(line.get_label()): tuple(np.asarray(part).tolist() for part in line.get_data()) for line in ax.lines}
 
 
-def bands(ax: Axes) -> list[Array]:
-    """The corners of each shaded band."""
-    return [
-        np.asarray(band.get_paths()[0].vertices)
-        for band in ax.collections
-        if isinstance(band, FillBetweenPolyCollection)
-    ]
-
-
 def bars(ax: Axes) -> list[tuple[float, float, float]]:
     """Where each bar or shaded range begins, its width and its height."""
     patches: Any = ax.patches
     return [(patch.get_x(), patch.get_width(), patch.get_height()) for patch in patches]
-
-
-# ---- Predictions -----------------------------------------------------------------------------------------------------
-
-
-# ---- Over the command ------------------------------------------------------------------------------------------------
-
-
-# ---- Evidence about an FMU -------------------------------------------------------------------------------------------
 
 
 def test_deviations_are_shown_below_or_above_what_is_allowed_and_steps_by_their_duration() -> None:
