@@ -301,17 +301,22 @@ def how_to_measure(axis: Axis, name: str) -> str:
 def _next_tests(identification: Identification) -> list[str]:
     tests = sorted((r.next_test for r in identification.axes if r.next_test), key=lambda test: -test.now)
     useful = [
-        f"{test.axis.name}: {test.words}. {test.target[:1].upper()}{test.target[1:]}, now ±{percent(test.now, '>')}, "
-        f"becomes ±{percent(test.then, '>')}."
+        f"{test.axis.name}: {test.words}. {test.target[:1].upper()}{test.target[1:]}, now {_known_to(test.now)}, "
+        f"becomes {_known_to(test.then)}."
         for test in tests
         if test.is_useful
     ]
     nothing = (
-        "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, ±{}."
+        "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, {}."
     )
     if not useful and repairs(identification):
         return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
-    return useful or [nothing.format(test.axis.name, test.target, percent(test.now, ">")) for test in tests[:1]]
+    return useful or [nothing.format(test.axis.name, test.target, _known_to(test.now)) for test in tests[:1]]
+
+
+def _known_to(half_width: float) -> str:
+    """Return how well a number is known: `±12%`, or `not known` where its interval is wider than its value."""
+    return f"±{half_width:.0%}" if half_width <= 1.0 else "not known"
 
 
 def repairs(identification: Identification) -> list[str]:

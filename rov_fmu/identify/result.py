@@ -363,8 +363,8 @@ class NextTest:
 
     @property
     def is_useful(self) -> bool:
-        """True if the interval would become at least a tenth narrower, and in whole percent, too."""
-        return self.then < 0.9 * self.now and f"{self.then:.0%}" != f"{self.now:.0%}"
+        """True if the number would be known, with an interval at least a tenth narrower, and in whole percent, too."""
+        return self.then < min(0.9 * self.now, 1.0) and f"{self.then:.0%}" != f"{self.now:.0%}"
 
 
 @dataclass(frozen=True)

@@ -44,9 +44,9 @@ def significant(number: float, digits: int) -> str:
     return _plain(Decimal(f"{number:.{digits - 1}e}")) if number and isfinite(number) else f"{number:g}"
 
 
-def percent(share: float, beyond: str = "more than ") -> str:
+def percent(share: float) -> str:
     """Return a share in percent: `17%`; how far it is above 100 % tells nobody more: `more than 100%`."""
-    return f"{share:.0%}" if share <= 1.0 else f"{beyond}100%"
+    return f"{share:.0%}" if share <= 1.0 else "more than 100%"
 
 
 def _plain(number: Decimal) -> str:

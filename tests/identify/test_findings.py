@@ -362,21 +362,22 @@ def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
 def test_the_next_tests_begin_with_the_widest_interval() -> None:
     tests = [
         NextTest(axis, f"do {n}", "the speed at 50%", now, 0.1)
-        for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 0.5), (YAW, 0.1)))
+        for n, (axis, now) in enumerate(((SURGE, 0.2), (HEAVE, 1.5), (YAW, 0.1)))
     ]
     axes = [replace(one, next_test=test) for one, test in zip(example().axes, tests, strict=True)]
     assert next_tests(replace(example(), axes=tuple(axes))) == [
-        "heave: do 1. The speed at 50%, now ±50%, becomes ±10%.",
+        "heave: do 1. The speed at 50%, now not known, becomes ±10%.",
         "surge: do 0. The speed at 50%, now ±20%, becomes ±10%.",
     ]
     only = three(), replace(three(), slips=(Slip("log_3.csv", "depth", "is it in cm", 20.0),))
     fine, odd = (replace(one, axes=(replace(one.axes[0], next_test=tests[2]),)) for one in only)
     nothing = "no single test would make an interval up to half command a tenth narrower."
-    widest = nothing + " The widest is that of {}: the speed at 50%, ±{}%."
+    widest = nothing + " The widest is that of {}: the speed at 50%, {}."
     assert not replace(tests[0], now=0.034, then=0.026).is_useful, "both are told as 3 %"
+    assert not replace(tests[0], now=9.0, then=1.1).is_useful, "the speed is not known before and after it"
     useless = [replace(axis, next_test=replace(test, then=test.now)) for axis, test in zip(axes, tests, strict=True)]
-    assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", 50)]
-    assert next_tests(fine) == [widest.format("yaw", 10)]
+    assert next_tests(replace(example(), axes=tuple(useless))) == [widest.format("heave", "not known")]
+    assert next_tests(fine) == [widest.format("yaw", "±10%")]
     assert next_tests(odd)[0].startswith("first repair what disagrees, and identify again")
     assert next_tests(three()) == []
 
