@@ -7,11 +7,11 @@ from math import inf, pi
 import numpy as np
 
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import Variant, lost_in_words, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import MOST_OF_ROW, Variant, lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
-from rov_fmu.identify.likelihood.records import SampledChannel
+from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
 
@@ -44,6 +44,9 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         of, words = listed(one.variant.of), dict[str, str]()
         if kind == "momentary commands":
             words = _lost(fit, one.variant.of)
+        elif kind == "unsettled velocity":
+            (log,) = (log for log in objective.logs if log.log.file in one.variant.of)
+            of = f"{of} (until {log.settled - log.record.told[0]:.1f} s)"
         elif one.variant.acting:
             of = listed(_acting(fit, one.variant))
         elif kind in ("health", "reversed commands"):
@@ -56,6 +59,16 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
             value, low, high = (np.exp(ends) if p.is_log else ends).tolist()
             structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
         yield structure
+    if files := [one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)]:
+        yield Structure("momentary commands", listed(files), 1.0, words=tuple(_lost(fit, files).items()))
+
+
+def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
+    """Return True if commands that hold surely change within more than half of the time between two rows."""
+    place = fit.posterior.table.place("logging width", one.log.file)
+    if one.is_momentary or place is None:
+        return False
+    return around(float(fit.posterior.z[place]), fit.posterior.errors[place])[0] > MOST_OF_ROW
 
 
 def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:

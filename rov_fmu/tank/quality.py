@@ -5,6 +5,7 @@ from dataclasses import replace
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.io.messages import MOST, first_of, listed
@@ -29,10 +30,13 @@ is more than the third number times the smallest change, which is the resolution
 _TOGETHER = 2.0
 """Sensors froze together if they froze within this time, s."""
 _LEAST_JUMP = 0.2
-"""The smallest jump that is told, m or rad."""
+"""The smallest jump, m, rad or m/s."""
 _FASTER = 5.0
-"""A position jumps where it changes this many times as fast as around there and as 95 % of the time, by this many usual
-steps, and stays there: its median over three samples changes by half of the jump or more."""
+"""A quantity jumps where it changes this many times as fast as around there, by this many usual steps, and stays there:
+its median over three samples changes by half of the jump or more."""
+_USUALLY = {False: _FASTER, True: 2.0}
+"""How many times as fast as 95 % of the time a quantity changes where it jumps: False for positions, and True for
+velocities, which thrusters change quickly."""
 
 
 def checked(log: Log) -> Log:
@@ -132,26 +136,35 @@ def unwrapped(channel: Channel) -> Array:
 
 def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
-    from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
-
     axis, unit = channel.quantity.axis, channel.quantity.unit
     time, values = replace(channel, values=unwrapped(channel)).samples
-    steps = np.diff(values)
-    if unit not in ("m", "rad") or len(values) < LEAST_SAMPLES or not steps.any():
-        return None
-    rates = np.abs(steps) / np.diff(time)
-    beside = maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
-    least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
-    sudden = (np.abs(steps) > least) & (rates > _FASTER * np.maximum(beside, np.quantile(rates, 0.95)))
-    around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
-    places = np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
-    if not len(places):
+    if unit not in ("m", "rad") or not len(places := jumps(time, values)):
         return None
     factor, shown_unit = in_degrees(unit)
-    told = [f"{factor * steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
-    jumps = ", ".join(first_of(told, MOST))
+    steps = factor * np.diff(values)
+    told = [f"{steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
     name = axis.name if axis else ""
-    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=jumps, count=len(places))
+    words = ", ".join(first_of(told, MOST))
+    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(places))
+
+
+def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[np.intp]:
+    """Return the indices of the samples after which a quantity jumps, as by a reset of a filter or of a sensor.
+
+    `values` are in m, rad or m/s, without jumps of a full turn.
+    """
+    from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
+
+    steps = np.diff(values)
+    if len(values) < LEAST_SAMPLES or not steps.any():
+        return np.zeros(0, np.intp)
+    rates = np.abs(steps) / np.diff(time)
+    beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
+    usual = _USUALLY[is_velocity] * np.quantile(rates, 0.95)
+    least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
+    sudden = (np.abs(steps) > least) & (rates > np.maximum(beside, usual))
+    around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
+    return np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
 
 
 def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:

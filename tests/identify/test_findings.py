@@ -145,6 +145,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
+        "unsettled velocity",
+        quiet(structures=(Structure("unsettled velocity", "a.csv (until 33.7 s)", 0.98),)),
+        "a.csv (until 33.7 s): the measured velocity is not that of the vehicle before it jumps, as of an estimator",
+        quiet(),
+    ),
+    (
         "rotor lag",
         quiet(structures=(Structure("rotor lag", "", 0.98),)),
         "the speed of the rotors lags behind",

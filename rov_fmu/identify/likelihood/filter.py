@@ -46,6 +46,11 @@ class Sensor:
     over_ground: bool = True
     """False for a velocity through the water."""
 
+    @property
+    def is_horizontal_velocity(self) -> bool:
+        """True for a velocity over ground ahead or to starboard."""
+        return self.is_velocity and self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+
 
 @dataclass(frozen=True, eq=False)
 class Record:

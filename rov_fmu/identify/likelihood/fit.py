@@ -11,7 +11,15 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, lateness, structure, with_shared
+from rov_fmu.identify.likelihood.hypotheses import (
+    Adopted,
+    Model,
+    explained,
+    structure,
+    unseen_errors,
+    windows,
+    with_shared,
+)
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -132,6 +140,7 @@ def fit_all(
     show = moving(on_progress, "all samples", 0.3, 0.7)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
     on_progress("hypotheses", 0.65)
+    held = windows(full, near.z)
     best_model = explained(model, full, near, _search)
     model, full, near = best_model.model, best_model.objective, best_model.minimum
     known = model.known
@@ -164,14 +173,15 @@ def fit_all(
         file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
         show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
         least = minimise(file, best.z, show, near=best.data, enough=_QUICK)
-    errors, late = with_shared(known.layout, structure(full, best)), lateness(full, best.z)
+    errors = with_shared(known.layout, structure(full, best))
+    unseen = unseen_errors(full, best.z, held)
     of_file = without_weak_effects(file, least)
     return Fit(
         known,
         full,
         best,
-        posterior.widened(errors, late),
-        replace(of_file, posterior=of_file.posterior.widened(errors, late)),
+        posterior.widened(errors, unseen),
+        replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
         float(difference),
         best_model.adopted,
         best_model.rivals,

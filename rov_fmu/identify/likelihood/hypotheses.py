@@ -18,7 +18,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow
+from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, TableRow, cost
 from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.prior import Prior
@@ -46,9 +46,15 @@ _SMALL = 1e-3
 """An unknown force, relative to full thrust, that explains itself."""
 _MOST = 3
 """The most hypotheses that may hold at once."""
-_LATE, _HALF = 0.05, 0.5
-"""How much earlier or later commands that change between rows act along an axis, relative to the time between two rows
-(standard error), and the command whose time constant this changes."""
+_LATE, _NARROWEST, _HALF = 0.05, 0.2, 0.5
+"""How much earlier or later commands that change between rows act along an axis (standard error), relative to the
+window in which they change; the narrowest window, relative to the time between two rows; and the command whose time
+constant this changes."""
+MOST_OF_ROW = 0.5
+"""Commands that change within more than this part of the time between two rows are momentary values: they change at any
+time."""
+_SCALE = 0.01
+"""The standard error of the scale of a sensor in a log of an autopilot, whose estimates it has."""
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
 _IDLE_STEP = 0.1
@@ -88,6 +94,8 @@ class Hypothesis:
     to thinned logs."""
     has_times: bool = False
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
+    is_first: bool = False
+    """True if it leaves out samples, which would mislead all others. So it is tried before these."""
 
 
 @dataclass(frozen=True)
@@ -123,6 +131,12 @@ def _with_parameter(kind: str) -> Change:
 def _momentary(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
     coefficients, full = known.coefficients, known.full
     return known, [one.with_lines(coefficients, full) if one.log.file in variant.of else one for one in logs]
+
+
+def _settled(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+    return known, [
+        one.settled_at(at) if one.log.file in variant.of and (at := one.jump) is not None else one for one in logs
+    ]
 
 
 def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
@@ -197,6 +211,11 @@ def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
         yield tuple(files)
 
 
+def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield each file in which a horizontal velocity jumps."""
+    yield from ((one.log.file,) for one in logs if one.jump is not None)
+
+
 def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
     """Return how much of the command along which axis is lost between rows that are so far apart, s."""
     axis = max(lost, key=lambda one: lost[one])
@@ -257,6 +276,17 @@ def _lagging(known: Prior, logs: Logs) -> Iterator[Of]:
 
 
 HYPOTHESES = {
+    "unsettled velocity": Hypothesis(
+        0.05,
+        _with_jumps,
+        _settled,
+        sentence=(
+            "{of}: the measured velocity is not that of the vehicle before it jumps, as of an estimator without a "
+            "position{odds}. It is left out until then. Begin a dive when the estimator has its position"
+        ),
+        changes_thrust=False,
+        is_first=True,
+    ),
     "momentary commands": Hypothesis(
         0.2,
         _momentary_files,
@@ -381,22 +411,37 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
     return quiet
 
 
-def lateness(objective: Objective, z: Array) -> dict[str, float]:
-    """Return the standard error of the inertia of each axis by the time at which commands act, relatively.
+def windows(objective: Objective, z: Array) -> dict[str, float]:
+    """Return the part of the time between two rows in which a command may change, of each log that loses commands."""
+    found = {one.log.file: objective.table.get(z, "logging width", one.log.file) for one in objective.logs if one.lost}
+    return {file: 1.0 if width > MOST_OF_ROW else max(float(width), _NARROWEST) for file, width in found.items()}
 
-    Where commands change between rows, these tell when to some hundredths of the time between them, and along each axis
-    in its own way: a stick moves it otherwise than a controller. The axis answers so much earlier or later, which is
-    the more of its time constant the faster it is.
+
+def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -> Array:
+    """Return the covariance of the parameters by errors that logs do not show whose commands change between rows.
+
+    Along each axis, commands act a small part of their window earlier or later: a stick moves it otherwise than a
+    controller. The axis answers so much earlier or later, as if its inertia were other: the more so the faster it is.
+    And such logs have the estimates of an autopilot, whose scale is not exact either. With a scale s, all velocities v
+    are s v, as if the drag were a/s² and b/s, and the inertia m/s.
+
+    `before` has the windows of the fit without hypotheses: straight lines between rows leave them open.
     """
-    late = _LATE * max((one.interval for one in objective.logs if one.lost), default=0.0)
-    if not late:
-        return {}
+    now, parameters = windows(objective, z), objective.table.parameters
+    widths = [one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.lost]
+    found = np.zeros((len(z), len(z)))
+    if not widths:
+        return found
     vehicle, shapes = objective.table.model(z)
-    times = {
-        axis.name: float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
-        for axis in vehicle.layout.bare_axes
-    }
-    return {name: late / time for name, time in times.items() if 0.0 < time < inf}
+    powers = {"quadratic drag": 2.0, "linear drag": 1.0, "inertia": 1.0}
+    for axis in vehicle.layout.bare_axes:
+        time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
+        own = np.array([powers.get(p.kind, 0.0) * (p.of == axis.name) for p in parameters])
+        found += _SCALE**2 * np.outer(own, own)
+        if 0.0 < time < inf:
+            is_inertia = np.array([p.kind == "inertia" and p.of == axis.name for p in parameters])
+            found += np.diag(is_inertia * (_LATE * max(widths) / time) ** 2)
+    return found
 
 
 def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
@@ -467,7 +512,7 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
 
     `near` is the minimum of `full`. `search` fits thinned logs from a start with much noise.
     """
-    now = Explained(model, full, near)
+    now = _begun(Explained(model, full, near), search)
     for _ in range(_MOST):
         fits = [_fitted(now, one, z) for one, z in _likely(now, search)]
         if not (fits := [one for one in fits if one]):
@@ -479,6 +524,29 @@ def explained(model: Model, full: Objective, near: Minimum, search: Search) -> E
             return replace(now, rivals=tuple(posteriors))
         now = best
     return now
+
+
+def _begun(now: Explained, search: Search) -> Explained:
+    """Return the model with what must be known before other hypotheses are compared."""
+    if max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0) <= ALARM:
+        return now
+    for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
+        for variant in [Variant(kind, of) for of in HYPOTHESES[kind].variants(now.model.known, now.model.logs)]:
+            with suppress(DivergedError):
+                quick = search(now.model.applied(variant).objective(thinned=True), {})
+                other = _fitted(now, variant, quick)
+                now = other if other and other.adopted[-1].odds > WINS else now
+    return now
+
+
+def _left_out(now: Explained, objective: Objective) -> float:
+    """Return the part of J of the samples that another objective leaves out. Only J of the others is compared."""
+    total = 0.0
+    for old, new, data in zip(now.objective.records, objective.records, now.minimum.data, strict=False):
+        if len(new.time) < len(old.time):
+            gone = ~np.isin(old.time + 1j * old.sensor, new.time + 1j * new.sensor)
+            total += cost(data.innovations[gone], data.variances[gone])
+    return total
 
 
 def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]:
@@ -494,7 +562,7 @@ def _likely(now: Explained, search: Search) -> Iterator[tuple[Variant, Minimum]]
     variants = {
         Variant(kind, of): [*hypothesis.starts] or [nan]
         for kind, hypothesis in HYPOTHESES.items()
-        if (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
+        if not hypothesis.is_first and (filtered if hypothesis.changes_thrust else predicted) > hypothesis.alarm
         for of in hypothesis.variants(model.known, model.logs)
     }
     unknown = (
@@ -637,7 +705,8 @@ def _fitted(now: Explained, one: Variant, quick: Minimum) -> Explained | None:
     except DivergedError:
         return None
     count = sum(1 for _ in hypothesis.variants(now.model.known, now.model.logs))
-    odds = _evidence(objective, end) - _evidence(now.objective, now.minimum) + 2.0 * log(hypothesis.probability / count)
+    gained = _evidence(objective, end) - _evidence(now.objective, now.minimum) - _left_out(now, objective)
+    odds = gained + 2.0 * log(hypothesis.probability / count)
     return Explained(model, objective, end, (*now.adopted, Adopted(one, odds)))
 
 

@@ -54,23 +54,17 @@ class Posterior:
         covariance[np.ix_(free, free)] = root @ root.T
         return cls(table, z, covariance, frozenset(absent))
 
-    def widened(self, ratios: Mapping[Axis, float], late: Mapping[str, float]) -> "Posterior":
+    def widened(self, ratios: Mapping[Axis, float], unseen: Array) -> "Posterior":
         """Return the posterior with larger errors of what concerns axes whose structure is wrong.
 
         `ratios` are the errors R of predictions along each axis, relative to the noise. As with Birge's ratio (Birge
         1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1): what the structure
         lacks is the same in n samples in turn, while noise differs from sample to sample.
 
-        `late` are the standard errors of the inertia of axes, by their names, because commands act at other times than
-        the model says.
+        `unseen` is the covariance of the parameters by errors that the data do not show.
         """
-        return self._with_less_information(ratios)._with_errors_of_inertia(late)
-
-    def _with_errors_of_inertia(self, late: Mapping[str, float]) -> "Posterior":
-        if not late:
-            return self
-        errors = np.array([late.get(p.of, 0.0) if p.kind == "inertia" else 0.0 for p in self.table.parameters])
-        return replace(self, covariance=self.covariance + np.diag(errors**2))
+        wider = self._with_less_information(ratios)
+        return replace(wider, covariance=wider.covariance + unseen) if unseen.any() else wider
 
     def _with_less_information(self, ratios: Mapping[Axis, float]) -> "Posterior":
         layout, worst = self.table.layout, max(ratios.values(), default=0.0)

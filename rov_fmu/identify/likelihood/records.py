@@ -20,7 +20,7 @@ from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
-from rov_fmu.tank.quality import gaps, unwrapped
+from rov_fmu.tank.quality import gaps, jumps, unwrapped
 from rov_fmu.vehicle.vehicle import Vehicle
 
 FASTEST = 20.0
@@ -80,6 +80,8 @@ class SampledLog:
     """The share of the command along each axis that is lost between its rows, by the axis."""
     is_momentary: bool = False
     """True if its rows have the commands of a moment, between which they follow a straight line, on the average."""
+    settled: float = -inf
+    """The time from which its horizontal velocities count, s: before, their sensor did not know them."""
 
     @property
     def horizon(self) -> float:
@@ -90,6 +92,42 @@ class SampledLog:
         """Return the log with other commands in its rows."""
         record, thinned = (replace(some, inputs=inputs) for some in (self.record, self.thinned))
         return replace(self, record=record, thinned=thinned)
+
+    @property
+    def jump(self) -> float | None:
+        """The time of the first sample after the largest jump of a horizontal velocity, s; None if there is none."""
+        found = [
+            (abs(channel.values[n + 1] - channel.values[n]), float(channel.time[n + 1]))
+            for channel in (m.channel for m in self.measured if m.sensor.is_horizontal_velocity)
+            for n in jumps(channel.time, channel.values, is_velocity=True)
+        ]
+        return max(found)[1] if found else None
+
+    def settled_at(self, time: float) -> "SampledLog":
+        """Return the log without the horizontal velocities before a time, s."""
+
+        def counts(m: SampledChannel) -> SampledChannel:
+            later = m.channel.time >= time
+            if not m.sensor.is_horizontal_velocity:
+                return m
+            left = replace(m, channel=replace(m.channel, time=m.channel.time[later], values=m.channel.values[later]))
+            return replace(left, noise=_least_noise(left)) if self.lost else left
+
+        def some(record: Record) -> Record:
+            horizontal = np.array([sensor.is_horizontal_velocity for sensor in record.sensors])
+            kept = (record.time >= time) | ~horizontal[record.sensor]
+            names = [s.axis.velocity for s in record.sensors if s.is_horizontal_velocity]
+            return replace(
+                record,
+                time=record.time[kept],
+                value=record.value[kept],
+                sensor=record.sensor[kept],
+                start={**record.start, **dict.fromkeys(names, 0.0)},
+                errors={**record.errors, **dict.fromkeys(names, _CALM)},
+            )
+
+        measured = tuple(counts(m) for m in self.measured)
+        return replace(self, measured=measured, record=some(self.record), thinned=some(self.thinned), settled=time)
 
     def refined(self, interval: float) -> "SampledLog":
         """Return the log with rows that are at most so far apart, s, and have the same commands."""
@@ -112,9 +150,7 @@ class SampledLog:
     @property
     def has_velocities(self) -> bool:
         """True if a horizontal velocity over ground is measured."""
-        return any(
-            s.is_velocity and s.over_ground and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors
-        )
+        return any(s.is_horizontal_velocity for s in self.record.sensors)
 
     def vehicle(self, coefficients: Mapping[str, float]) -> Vehicle:
         """Return the part of a vehicle that the log concerns."""

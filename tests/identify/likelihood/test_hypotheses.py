@@ -20,10 +20,11 @@ from rov_fmu.identify.likelihood.hypotheses import (
     Model,
     Unknown,
     Variant,
-    lateness,
     probability,
     structure,
     twins,
+    unseen_errors,
+    windows,
 )
 from rov_fmu.identify.likelihood.objective import Data
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -65,6 +66,8 @@ class Fault:
     value: float | None = None
     rotor_lag: float = 0.0
     """The time constant of the rotors' speeds, s."""
+    settled: float = 0.0
+    """Until when the measured velocities drift away, s."""
 
 
 def faults(names: list[str]) -> dict[str, Fault]:
@@ -116,7 +119,10 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     for title, variable in OUTPUTS.items():
         if variable in motion:
             values = np.degrees(motion[variable]) if "deg" in title else motion[variable]
-            columns[title] = values + NOISE[title] * rng.standard_normal(n)
+            drift = (
+                0.6 * (time < fault.settled) * time / fault.settled if fault.settled and "velocity" in title else 0.0
+            )
+            columns[title] = values + NOISE[title] * rng.standard_normal(n) + drift
     rows = np.column_stack([time, *columns.values()]).tolist()
     lines = [",".join(f"{value:.5g}" for value in row) for row in rows]
     return "\n".join([",".join(["time [s]", *columns]), *lines]) + "\n"
@@ -315,22 +321,61 @@ def test_lines_between_momentary_commands_are_wrong_where_their_second_differenc
     assert 0.05 < np.sqrt(np.mean((lacking / size)[busy] ** 2)) < 0.6  # the prior: 0.25, within a factor of e
 
 
-def test_only_the_inertia_of_fast_axes_suffers_from_the_time_of_commands_between_rows(model: Model) -> None:
-    """The time constant of an axis is its inertia times a function of drag and thrust: a shift of it is one of this."""
+def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_scale_of_sensors(model: Model) -> None:
+    """Of a vehicle whose velocities are all 1 % larger, and whose time constants are longer by a shift of commands."""
     z = np.array([p.mean for p in model.table.parameters])
-    assert lateness(model.objective(), z) == {}
+    assert not unseen_errors(model.objective(), z, {}).any()
     objective = replace(model, logs=[replace(one, lost={"yaw": 0.1}) for one in model.logs]).objective()
-    z = np.array([p.mean for p in objective.table.parameters])
-    late = lateness(objective, z)
-    interval = max(one.interval for one in objective.logs)
-    vehicle, shapes = objective.table.model(z)
-    for form in vehicle.layout.axes:
-        _, time = shapes.motions(vehicle, form.axis, np.array([0.5])).response()
-        assert late[form.axis.name] == pytest.approx(0.05 * interval / time[0])
-    narrow = Posterior(objective.table, z, np.diag(np.full(len(z), 1e-4)))
-    wide = narrow.widened({}, late)
-    for p, before, after in zip(objective.table.parameters, narrow.errors, wide.errors, strict=True):
-        assert after == pytest.approx(np.hypot(before, late.get(p.of, 0.0) if p.kind == "inertia" else 0.0))
+    table, (one,) = objective.table, objective.logs
+    place, file = table.place("logging width", one.log.file), one.log.file
+    assert place is not None
+    z = np.array([p.mean for p in table.parameters])
+    vehicle, shapes = table.model(z)
+    for width, window in ((0.05, 0.2), (0.4, 0.4), (0.6, 1.0)):  # beyond a half, commands change at any time
+        z[place] = width
+        assert windows(objective, z) == {file: pytest.approx(window)}
+        found = unseen_errors(objective, z, {})
+        assert np.array_equal(found, found.T)
+        for axis in vehicle.layout.bare_axes:
+            own = {p.kind: n for n, p in enumerate(table.parameters) if p.of == axis.name}
+            _, time = shapes.motions(vehicle, axis, np.array([0.5])).response()
+            late = 0.05 * window * one.interval / time[0]
+            assert found[own["inertia"], own["inertia"]] == pytest.approx(0.01**2 + late**2)
+            larger = z.copy()  # by a standard error of the scale
+            for kind in ("quadratic drag", "linear drag", "inertia"):
+                larger[own[kind]] -= found[own[kind], own["linear drag"]] / 0.01
+            before, after = (
+                np.array([part[0] for part in sh.motions(v, axis, np.array([0.5])).response()])
+                for v, sh in (table.model(z), table.model(larger))
+            )
+            if not vehicle[axis.coefficient("F_0")]:  # a load is no part of the thrust
+                assert after / before == pytest.approx([1.01, 1.0], abs=2e-4)
+    narrow = Posterior(table, z, np.diag(np.full(len(z), 1e-4)))
+    assert np.allclose(narrow.widened({}, found).covariance, narrow.covariance + found)
+    assert narrow.widened({}, np.zeros_like(found)) is narrow
+
+
+def test_velocities_before_they_jump_are_left_out(model: Model, tmp_path: Path) -> None:
+    """An estimator without a position drifts away until it gets one. All else in the log stays."""
+    assert not [*HYPOTHESES["unsettled velocity"].variants(model.known, model.logs)]
+    drifting = folder(tmp_path, "videoray", Fault("", settled=16.5))
+    other = Model(*begin(load_tests(drifting)))
+    (of,) = HYPOTHESES["unsettled velocity"].variants(other.known, other.logs)
+    left = other.applied(Variant("unsettled velocity", of))
+    ((one,), (whole,)) = left.logs, other.logs
+    assert of == ("dive_0.csv",)
+    assert one.settled == pytest.approx(16.5)
+    assert one.jump is None
+    assert left.table.parameters == other.table.parameters
+    for record, old in ((one.record, whole.record), (one.thinned, whole.thinned)):
+        is_velocity = np.array([s.is_horizontal_velocity for s in old.sensors])[old.sensor]
+        kept = ~is_velocity | (old.time >= 16.5)
+        assert 0 < np.sum(~kept) < np.sum(is_velocity)
+        for name in ("time", "value", "sensor"):
+            assert np.array_equal(getattr(record, name), getattr(old, name)[kept])
+        assert np.array_equal(record.inputs, old.inputs)
+        assert record.start["u"] == 0.0
+        assert record.errors["u"] > old.errors["u"]
 
 
 @pytest.mark.parametrize("health", [1.0, 0.5])
@@ -365,14 +410,15 @@ def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(mo
     deviation = np.array([p.deviation for p in table.parameters])
     narrow = Posterior(table, np.array([p.mean for p in table.parameters]), np.diag((0.01 * deviation) ** 2))
     axes = [form.axis for form in model.known.layout.axes]
-    assert narrow.widened(dict.fromkeys(axes, 1.4), {}) is narrow
-    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes}, {})
+    nothing = np.zeros((len(deviation), len(deviation)))
+    assert narrow.widened(dict.fromkeys(axes, 1.4), nothing) is narrow
+    wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes}, nothing)
     for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
         if p.kind == "inertia":
             factor = np.sqrt(1.0 + 2.0 * 24.0) if p.of == "heave" else 1.0
             assert after == pytest.approx(factor * before, rel=0.02)
         assert after <= prior * (1.0 + 1e-6)
-    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf), {}).errors <= deviation * (1.0 + 1e-6))
+    assert np.all(narrow.widened(dict.fromkeys(axes, np.inf), nothing).errors <= deviation * (1.0 + 1e-6))
 
 
 def test_a_probability_follows_from_the_odds() -> None:
@@ -404,6 +450,12 @@ def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
 @pytest.mark.long
 def test_rotors_whose_speed_lags_are_told_from_a_lag_of_the_force(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["rotors"], 1, 1)
+
+
+@pytest.mark.long
+def test_velocities_of_an_estimator_without_a_position_are_named(tmp_path: Path) -> None:
+    fault = Fault("unsettled velocity", "dive_0.csv (until 16.5 s)", settled=16.5)
+    check(tmp_path, "videoray", fault, 1, 1)
 
 
 @pytest.mark.weekly
