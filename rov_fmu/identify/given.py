@@ -197,7 +197,8 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
     if layout.has_wrench or not any(axis.is_rotation for axis in shown) or len(axes) == len(layout.axes):
         return vehicle
     layout = with_axes_alone(wide, axes)
-    return Vehicle(layout, {name: base.get(name, UNKNOWN) for name in layout.coefficients} | vehicle.coefficients)
+    values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}
+    return Vehicle(layout, {**values, **vehicle.coefficients})
 
 
 def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:
