@@ -57,10 +57,10 @@ class Posterior:
     def widened(self, ratios: Mapping[Axis, float], late: Mapping[str, float]) -> "Posterior":
         """Return the posterior with larger errors of what concerns axes whose structure is wrong.
 
-        `ratios` are the errors R of predictions along each axis, relative to the noise; 0 where nothing tells. As with Birge's ratio (Birge
-        1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1): what the structure
-        lacks is the same in n samples in turn, while noise differs from sample to sample. What thrusters lack shows
-        along all axes that they drive.
+        `ratios` are the errors R of predictions along each axis, relative to the noise; 0 where nothing tells. As with
+        Birge's ratio (Birge 1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1):
+        what the structure lacks is the same in n samples in turn, while noise differs from sample to sample. What
+        thrusters lack shows along all axes that they drive.
 
         `late` are the standard errors of the inertia of axes, by their names, because commands act at other times than
         the model says.
