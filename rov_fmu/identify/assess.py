@@ -21,8 +21,6 @@ COMMANDS = (0.3, -0.3, 0.5, -0.5)
 """The commands whose answers the verdict needs."""
 ANSWERED = (*COMMANDS, 1.0, -1.0)
 """The commands of all answers."""
-_OF_THRUST = 0.7
-"""The relative change of V_ss by that of the thrust: between 0.5, if drag is quadratic, and 1, if it is linear."""
 _EXPONENT = 0.15
 """The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
 of the command and the velocity that are known to about a tenth each."""
@@ -109,7 +107,6 @@ def answers(
     of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes, with_lag=with_lag)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
-    of_gain = np.array([1.0, 1.0, 0.0, 1.0])[: own.shape[1]]
     narrowest = np.array([least, EXACT, EXACT, EXACT])[: own.shape[1]]
     beyond = (_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2
     ends = [own - narrowest, own + narrowest]
@@ -119,7 +116,7 @@ def answers(
             slopes = posterior.slopes(fitted)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
-        variances += _variance_of_gain(posterior) * of_gain + beyond[:, None]
+        variances += beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
         ends += [middle - half, middle + half]
@@ -130,11 +127,6 @@ def answers(
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
     return _finite(axis, of_file, low, high)
-
-
-def _variance_of_gain(posterior: Posterior) -> float:
-    """Return the variance of ln V_ss and of ln Tau by thrust that changes slowly: V_ss² grows like the thrust."""
-    return float((_OF_THRUST * posterior.table.get(posterior.z, "slow gain")) ** 2)
 
 
 def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone
+from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone, with_unseen_axes
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.posterior import QUANTILE
@@ -172,9 +172,11 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
     dives = [log for log in tests.folder.logs if not log.axis]
     shown = {axis for log in dives for axis in shown_axes(log, tests.vehicle.layout)}
-    vehicle = _extended(tests.vehicle, measured, tests, shown)
+    vehicle = _extended(with_unseen_axes(tests, shown), measured, tests, shown)
     logs = [one for log in tests.folder.logs if (one := recorded(log, layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
+    moved = {form.axis for one in logs for form in one.layout.axes}
+    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
     driving = {t.curve for axis in fitted for t in vehicle.layout.thrusters_along(axis)}
     given_thrust = {name for name, quantity in tests.description.known.items() if not quantity.interval}
     driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
@@ -191,11 +193,10 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     vehicle = Vehicle(vehicle.layout, values)
     full = {form.axis.name: vehicle.strongest(form.axis) for form in vehicle.layout.axes}
     guessed = []
-    for axis in fitted:
+    for axis in (*fitted, *unseen):
         if any(axis.coefficient(key) not in tests.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
-    moved = {form.axis for one in logs for form in one.layout.axes}
     known = Prior(
         vehicle.layout,
         values,
@@ -208,7 +209,7 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         deviations=deviations,
         exact=_exact(tests, vehicle.layout, measured, moved, shown),
         thrust_errors=_thrust_errors(tests, curves),
-        unseen=[form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}],
+        unseen=unseen,
         has_times=bool(tests.folder.astern("time_constant")),
         bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )

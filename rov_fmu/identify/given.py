@@ -180,6 +180,27 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, mix=kept, thrusters=thrusters, curves=curves_left)
 
 
+def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
+    """Return the vehicle, also with the axes about which nothing is known but on whose motion those shown depend.
+
+    The thrusters that turn a vehicle in a dive move it along these axes, too, and this motion takes thrust from them.
+    Without a turn, such an axis takes thrust from no other. An axis is left out where more thrusters push along it.
+    """
+    vehicle, base = tests.vehicle, tests.base
+    layout, wide = vehicle.layout, _without_unknown_options(tests.description.layout, tests.known)
+
+    def is_unseen(axis: Axis) -> bool:
+        pushing = {*wide.thrusters_along(axis)}
+        return not axis.is_rotation and axis.inertia in base and bool(pushing) and pushing <= {*layout.thrusters}
+
+    axes = [form.axis for form in wide.axes if layout.has(form.axis) or is_unseen(form.axis)]
+    if layout.has_wrench or not any(axis.is_rotation for axis in shown) or len(axes) == len(layout.axes):
+        return vehicle
+    layout = with_axes_alone(wide, axes)
+    values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}
+    return Vehicle(layout, {**values, **vehicle.coefficients})
+
+
 def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:
     """Yield a finding for each part that is described or tested but not in the layout."""
     for name in description.axes:

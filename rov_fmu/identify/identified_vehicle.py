@@ -281,12 +281,12 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     file = fit.file.posterior
     table = file.table
     present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in file.absent}
-    base, own = tests.base, tests.description.known
+    base, given = tests.base, tests.description.known
     coefficients: dict[str, float] = table.coefficients(file.z)
 
     def has(part: Part, key: str) -> bool:
         name = part.coefficient(key)
-        if key not in part.keys or name in own:
+        if key not in part.keys or name in given:
             return key in part.keys
         if key in ("V_0", "n_V"):
             return with_voltage
@@ -300,13 +300,15 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
     with_voltage = tests.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
-    kept = layout.with_keys(has)
+    kept, own = layout.with_keys(has), tests.vehicle.layout
     return replace(
         kept,
+        axes=tuple(form for form in kept.axes if own.has(form.axis)),
+        coupled=own.coupled,
         curves=tuple(curve if curve.has_lag else replace(curve, lag="force") for curve in kept.curves),
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
-        mix=tests.vehicle.layout.mix,
+        mix=own.mix,
     )
 
 

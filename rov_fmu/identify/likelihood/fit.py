@@ -68,7 +68,7 @@ class Fit:
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
     structure: Mapping[Axis, float] = field(default_factory=dict)
-    """The error R along each axis or one that shares thrusters, relative to what noise explains."""
+    """The error R along each axis, relative to what noise explains."""
 
     @property
     def posteriors(self) -> tuple[Posterior, Posterior]:

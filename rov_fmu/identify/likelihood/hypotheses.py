@@ -445,12 +445,15 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -
 
 
 def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
-    """Return the largest error of each axis and of those that share a thruster: what it lacks, it lacks in both."""
+    """Return the error of each axis. Where nothing measures one, it is the largest of those that share a thruster.
+
+    Where both are measured, a fault of the thrusters shows in both. What shows in one alone acts on this one alone,
+    such as waves or a tether.
+    """
     return {
-        axis: max(
-            (error for other, error in errors.items() if other is axis or layout.shares_thrusters(axis, other)),
-            default=0.0,
-        )
+        axis: errors[axis]
+        if axis in errors
+        else max((error for other, error in errors.items() if layout.shares_thrusters(axis, other)), default=0.0)
         for axis in layout.bare_axes
     }
 

@@ -57,9 +57,10 @@ class Posterior:
     def widened(self, ratios: Mapping[Axis, float], unseen: Array) -> "Posterior":
         """Return the posterior with larger errors of what concerns axes whose structure is wrong.
 
-        `ratios` are the errors R of predictions along each axis, relative to the noise. As with Birge's ratio (Birge
-        1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1): what the structure
-        lacks is the same in n samples in turn, while noise differs from sample to sample.
+        `ratios` are the errors R of predictions along each axis, relative to the noise; 0 where nothing tells. As with
+        Birge's ratio (Birge 1932, doi:10.1103/PhysRev.40.207), the information of the data falls, by 1 + n (R² - 1):
+        what the structure lacks is the same in n samples in turn, while noise differs from sample to sample. What
+        thrusters lack shows along all axes that they drive.
 
         `unseen` is the covariance of the parameters by errors that the data do not show.
         """
@@ -70,9 +71,9 @@ class Posterior:
         layout, worst = self.table.layout, max(ratios.values(), default=0.0)
         of = {axis.name: ratio for axis, ratio in ratios.items()}
         for t in layout.thrusters:
-            along = [ratio for axis, ratio in ratios.items() if t in layout.thrusters_along(axis)]
-            for name in (t.name, t.curve):
-                of[name] = max([of.get(name, 0.0), *along])
+            along = [ratio for axis, ratio in ratios.items() if ratio and t in layout.thrusters_along(axis)]
+            for name in (t.name, t.curve) if along else ():
+                of[name] = min([of.get(name, _WORST), *along])
         parameters = self.table.parameters
         errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
         factors = np.sqrt(1.0 + np.where(errors > USUAL, _ALIKE * (errors**2 - 1.0), 0.0))

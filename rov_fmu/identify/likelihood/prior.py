@@ -33,7 +33,8 @@ class Prior:
     thrust_errors: Mapping[str, float] = field(default_factory=dict)
     """The relative standard error of a curve's forces, by its name, where rov.toml gives it."""
     unseen: Sequence[Axis] = ()
-    """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given."""
+    """The axes along which the dives move, and that no test shows. Their drag and inertia are about those given, or
+    guessed from the thrust."""
     has_times: bool = False
     """True if there are tables of time constants, which contain the lag."""
     assumed: tuple[tuple[str, str], ...] = ()

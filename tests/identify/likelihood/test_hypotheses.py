@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import rov_fmu
-from rov_fmu.equation.catalogue import CURVE, SURGE
+from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.hypotheses import (
@@ -25,6 +25,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     twins,
     unseen_errors,
     windows,
+    with_shared,
 )
 from rov_fmu.identify.likelihood.objective import Data
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -37,6 +38,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import HEAD, folder_of
+from tests.vehicles import VIDEORAY
 from verification.references.autopilot.flights import flown
 
 SECONDS, INTERVAL = 45.0, 0.1
@@ -465,3 +467,10 @@ def test_velocities_of_an_estimator_without_a_position_are_named(tmp_path: Path)
 def test_faults_are_named(vehicle: str, names: list[str], name: str, seed: int, tmp_path: Path) -> None:
     assert vehicle in SHIPPED
     check(tmp_path, vehicle, faults(names)[name], seed, 2)
+
+
+def test_what_shows_along_one_axis_alone_is_no_fault_of_its_thrusters() -> None:
+    """Nothing measures heave here, and no other axis of the VideoRay has its thruster."""
+    measured = {SURGE: 7.0, YAW: 0.2}
+    assert with_shared(VIDEORAY.layout, measured) == {**measured, HEAVE: 0.0}
+    assert with_shared(VIDEORAY.layout, {SURGE: 7.0}) == {SURGE: 7.0, YAW: 7.0, HEAVE: 0.0}

@@ -1,4 +1,4 @@
-"""Axes of the base that no test shows: they do not decide about the others, and every surface says so."""
+"""Axes that no test shows: they do not decide about the others, and every surface says so."""
 
 from collections.abc import Iterator, Mapping
 from io import StringIO
@@ -23,6 +23,8 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.folders import HEAD, folder_of, read, responses
+from tests.identify.scenarios.drawn import Drawn
+from tests.identify.scenarios.verdicts import RIGHT
 from tests.report.pages import text_of
 from tests.report.test_report import leave_plots_out
 from tests.vehicles import VIDEORAY
@@ -90,6 +92,33 @@ def test_the_drag_and_the_inertia_of_what_a_dive_with_a_heading_does_not_show_ar
     own = "".join(f'{n}_u = {{ value = 9.0, unit = "{u}", source = "s" }}\n' for n, u in DRAG.items())
     exact, _, _ = begin(load_tests(folder_of(tmp_path, f'base = "{base}"\n{HEAD}[known]\n{own}', {})))
     assert {"a_d_u", "b_d_u"} <= exact.exact
+
+
+@pytest.mark.parametrize(("sensors", "unseen"), [(("yaw", "heave"), [SURGE]), (("yaw",), [SURGE]), (("heave",), [])])
+def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
+    sensors: tuple[str, ...], unseen: list[Axis], tmp_path: Path
+) -> None:
+    """Its speed takes thrust from the thrusters that turn the vehicle. The file does not have it."""
+    Drawn(("surge", "heave", "yaw"), sensors, seconds=10.0).write(0, tmp_path / "dives")
+    tests = load_tests(tmp_path / "dives")
+    known, logs, _ = begin(tests)
+    assert {form.axis.name for form in tests.vehicle.layout.axes} == {*sensors}
+    assert known.unseen == unseen
+    assert all({form.axis.name for form in one.layout.axes} == {*sensors, *(a.name for a in unseen)} for one in logs)
+
+
+@pytest.mark.long
+def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> None:
+    drawn = RIGHT["no velocity sensor"]
+    drawn.write(502, tmp_path / "dives")
+    result, truths = identify(load_tests(tmp_path / "dives")), drawn.truths(502)
+    assert {axis.axis for axis in result.axes} == {HEAVE, YAW}
+    assert not result.vehicle.layout.has(SURGE)
+    speeds = {one.command: one.steady for axis in result.axes if axis.axis is YAW for one in axis.answers}
+    for command, (value, (low, high)) in speeds.items():
+        truth = truths["yaw", f"V_ss {100.0 * command:g} %"]
+        assert abs(value / truth - 1.0) < 0.005
+        assert low < truth < high
 
 
 # ---- What every surface says -----------------------------------------------------------------------------------------
