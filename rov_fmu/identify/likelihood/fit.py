@@ -11,12 +11,13 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import Adopted, Model, explained, lateness, structure, with_shared
+from rov_fmu.identify.likelihood.hypotheses import Model
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.likelihood.search import Adopted, StructureSearch, lateness, structure, with_shared
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
@@ -132,7 +133,8 @@ def fit_all(
     show = moving(on_progress, "all samples", 0.3, 0.7)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
     on_progress("hypotheses", 0.65)
-    best_model = explained(model, full, near, _search)
+    of_quick = evidence(quick, ends[0].value, ends[0].information)
+    best_model = StructureSearch(model, full, near, of_quick, _search).explained()
     model, full, near = best_model.model, best_model.objective, best_model.minimum
     known = model.known
     for n, curve in enumerate(known.measured_curves):
