@@ -54,8 +54,9 @@ _ADAPTS = (
     "current",
     "logging offset",
 )
-"""The kinds of parameters that adapt to a hypothesis there, each by so many deviations of its prior."""
+"""The kinds of parameters that adapt to a hypothesis there."""
 _FARTHEST = 3.0
+"""The most by which they adapt, in deviations of their priors."""
 _LATE, _HALF = 0.05, 0.5
 """How much earlier or later commands that change between rows act along an axis, relative to the time between two rows
 (standard error), and the command whose time constant this changes."""
