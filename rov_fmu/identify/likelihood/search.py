@@ -35,6 +35,8 @@ SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
 _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
+_FITTED = 2
+"""The most hypotheses that change the thrust that are fitted in a round, for each place at which J compares them."""
 _FAR = 100.0
 """Where one has won, others are not fitted whose J is so much above its own. Nor is one that does not change the thrust
 fitted to all samples if its evidence of thinned logs, which hardly tell it, is so much below the largest one."""
@@ -392,7 +394,7 @@ class StructureSearch:
     def _promising(self) -> Iterator[tuple[Starts, float]]:
         """Yield the sets that are worth a fit, with by how much J falls at the better of two places before any fit.
 
-        These are the best one at each place of those that change the thrust, and then all others, whose gain is -inf.
+        These are the best ones at each place of those that change the thrust, and then all others, whose gain is -inf.
         """
         now = self.now
         predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
@@ -414,8 +416,14 @@ class StructureSearch:
         if shown:
             at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
             gains = np.array([[_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in shown])
-            best = {n: gains[n].max() for n in gains.argmax(axis=0).tolist() if gains[n].max() > 0.0}
-            yield from {frozenset(shown[n]): (shown[n], float(gain)) for n, gain in best.items()}.values()
+            chosen = dict[frozenset[Variant], int]()
+            for gain in gains.T.tolist():
+                own = dict[frozenset[Variant], int]()
+                for n in sorted((n for n, one in enumerate(gain) if one > 0.0), key=gain.__getitem__, reverse=True):
+                    own.setdefault(frozenset(shown[n]), n)
+                chosen = {**dict([*own.items()][:_FITTED]), **chosen}
+            best = sorted(((float(gains[n].max()), n) for n in chosen.values()), reverse=True)
+            yield from ((shown[n], gain) for gain, n in best)
         yield from ((some, -inf) for some in others if frozenset(some) not in self.tried)
 
     def _fitted(self, starts: Starts, fits: Iterable[Trial], least: float) -> Trial | None:
