@@ -7,11 +7,12 @@ from math import inf, pi
 import numpy as np
 
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import MOST_OF_ROW, Variant, lost_in_words, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import Variant, lost_in_words, probability, twins
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
+from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
 from rov_fmu.io.messages import listed
 

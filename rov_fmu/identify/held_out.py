@@ -16,11 +16,11 @@ from rov_fmu.identify.beginning import table_rows
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import SETTLING
 from rov_fmu.identify.likelihood.objective import Objective, Part, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.records import unchanged
+from rov_fmu.identify.likelihood.search import SETTLING
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
 from rov_fmu.identify.result import Point, Prediction
 from rov_fmu.io.groups import grouped

@@ -398,7 +398,7 @@ class AxisResult:
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
     structure: float = 0.0
-    """The error R of the fit to all data, relative to what noise explains (`hypotheses.structure`)."""
+    """The error R of the fit to all data, relative to what noise explains (`search.structure`)."""
 
     @property
     def main(self) -> Prediction | None:

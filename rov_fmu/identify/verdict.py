@@ -51,7 +51,7 @@ class Evidence:
     misfits: Sequence[str] = ()
     """The logs whose motors are not the thrusters along the axis."""
     structure: float = 0.0
-    """The error R of the fit to all data, relative to what noise explains (`hypotheses.structure`)."""
+    """The error R of the fit to all data, relative to what noise explains (`search.structure`)."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
     is_assumed: bool = False

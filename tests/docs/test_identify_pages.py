@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.findings import acting
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood import hypotheses, objective, records
+from rov_fmu.identify.likelihood import objective, records, search
 from rov_fmu.identify.likelihood.kinds import EFFECTS, SLOW
 from rov_fmu.identify.result import MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
@@ -91,7 +91,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     page, least = text(METHOD), held_out._LEAST_CURRENT
     assert f"faster than {records.FASTEST:g} per second are averaged" in page
     assert f"up to |u| = c = {objective.OUTLYING:g}, and" in page
-    assert f"The filter reads the first {hypotheses.SETTLING:g} s" in page
+    assert f"The filter reads the first {search.SETTLING:g} s" in page
     assert f"positions and headings over {records.AHEAD:g} s" in page
     assert f"never claimed to better than {100.0 * assess.EXACT:g} %" in page
     assert f"a change of thrust of at least {100.0 * held_out._LEAST_GAIN:g} %" in page

@@ -16,7 +16,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests
-from rov_fmu.identify.likelihood.hypotheses import Variant
+from rov_fmu.identify.likelihood.hypotheses import Model, Variant
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded
@@ -206,7 +206,9 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
     begins = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
     off = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values()))
-    training, test = ([_recording(known, log) for log in some] for some in (logs, off.applied(known, unseen)[1]))
+    training, test = (
+        [_recording(known, log) for log in some] for some in (logs, Model(known, unseen, rows).applied(off).logs)
+    )
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)

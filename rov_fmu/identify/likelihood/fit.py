@@ -11,20 +11,22 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import (
-    Adopted,
-    Model,
-    explained,
-    structure,
-    unseen_errors,
-    windows,
-    with_shared,
-)
+from rov_fmu.identify.likelihood.hypotheses import Model
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.likelihood.search import (
+    Adopted,
+    StructureSearch,
+    Trial,
+    settled,
+    structure,
+    unseen_errors,
+    windows,
+    with_shared,
+)
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, minimise, scaled
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
@@ -120,28 +122,16 @@ def fit_all(
     model = Model(known, logs, rows)
     quick, full = model.objective(thinned=True), model.objective()
     table = full.table
-    starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
-    ends: list[Minimum] = []
-    for n, start in enumerate(starts):
-        is_enough = len(ends) == n and not any(_is_loud(table, end.z) for end in ends)
-        if ends and (n == len(STARTS) or is_enough):
-            break
-
-        words = f"start {n + 1}" if n < len(STARTS) else "a more careful start"
-        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
-        try:
-            ends.append(_least(quick, start, show, _QUICK))
-        except DivergedError:
-            continue
-    if not ends:
-        raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
-    ends.sort(key=lambda end: end.value)
-
+    ends, is_enough = _from_starts(folder, quick, on_progress)
     show = moving(on_progress, "all samples", 0.3, 0.7)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
     on_progress("hypotheses", 0.65)
-    held = windows(full, near.z)
-    best_model = explained(model, full, near, _search)
+    of_quick = evidence(quick, ends[0].value, ends[0].information)
+    plain = Trial({}, model, full, near, evidence(full, near.value, near.information), of_quick)
+    plain, first = settled(plain, _search)
+    held = windows(plain.objective, plain.minimum.z)
+    best_model = StructureSearch(plain, _search).explained()
+    adopted = (*first, *best_model.adopted)
     model, full, near = best_model.model, best_model.objective, best_model.minimum
     known = model.known
     for n, curve in enumerate(known.measured_curves):
@@ -166,7 +156,7 @@ def fit_all(
         for n in posterior.of_vehicle
         if (place := table.place(*full.table.parameters[n].key)) is not None
     ]
-    if max(apart, default=0.0) < 2.0 or best_model.adopted:  # other vehicles had the wrong structure
+    if max(apart, default=0.0) < 2.0 or adopted:  # other vehicles had the wrong structure
         difference = 0.0
     file, least = full, best
     if known.bent:
@@ -183,10 +173,30 @@ def fit_all(
         posterior.widened(errors, unseen),
         replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
         float(difference),
-        best_model.adopted,
+        adopted,
         best_model.rivals,
         errors,
     )
+
+
+def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
+    """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
+    starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
+    ends: list[Minimum] = []
+    for n, start in enumerate(starts):
+        is_enough = len(ends) == n and not any(_is_loud(quick.table, end.z) for end in ends)
+        if ends and (n == len(STARTS) or is_enough):
+            break
+
+        words = f"start {n + 1}" if n < len(STARTS) else "a more careful start"
+        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
+        try:
+            ends.append(_least(quick, start, show, _QUICK))
+        except DivergedError:
+            continue
+    if not ends:
+        raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
+    return sorted(ends, key=lambda end: end.value), is_enough
 
 
 def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:

@@ -89,7 +89,8 @@ class SampledLog:
         return _ROWS_AHEAD * self.interval if self.lost else AHEAD
 
     def with_inputs(self, inputs: Array) -> "SampledLog":
-        """Return the log with other commands in its rows."""
+        """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
+        assert not self.is_momentary
         record, thinned = (replace(some, inputs=inputs) for some in (self.record, self.thinned))
         return replace(self, record=record, thinned=thinned)
 

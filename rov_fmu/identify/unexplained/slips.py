@@ -29,10 +29,11 @@ from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
 from rov_fmu.identify.likelihood.fit import STARTS, start_of
-from rov_fmu.identify.likelihood.hypotheses import Adopted, Model
+from rov_fmu.identify.likelihood.hypotheses import Model
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
+from rov_fmu.identify.likelihood.search import Adopted
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
 from rov_fmu.tank.arrays import Array
@@ -194,9 +195,7 @@ def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Ar
     scales = {one.channel: scale for one, scale in scaling}
     logs = [_corrected(one, scales) for one in tests.folder.logs]
     known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
-    model = Model(known, recorded, rows)
-    for one in adopted:
-        model = model.applied(one.variant)
+    model = Model(known, recorded, rows).applied(*(one.variant for one in adopted))
     quick = model.objective(thinned=True)
     try:
         value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value

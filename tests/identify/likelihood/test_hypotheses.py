@@ -6,6 +6,7 @@ from the log to the thrusters. So what is named is what was done.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -15,22 +16,24 @@ import rov_fmu
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood.hypotheses import (
-    HYPOTHESES,
-    Model,
-    Unknown,
-    Variant,
-    probability,
+from rov_fmu.identify.likelihood.fit import STARTS, _search, start_of
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order, probability, twins
+from rov_fmu.identify.likelihood.objective import Data, Objective
+from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
+from rov_fmu.identify.likelihood.search import (
+    Comparison,
+    StructureSearch,
+    Trial,
+    fitted,
+    rough,
     structure,
-    twins,
+    timed,
     unseen_errors,
     windows,
     with_shared,
 )
-from rov_fmu.identify.likelihood.objective import Data
-from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.records import beside_lines, lost_between_rows
-from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
 from rov_fmu.identify.result import ALARM, USUAL
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank import log as tank_log
@@ -168,6 +171,49 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     assert sum(one.probability for one in HYPOTHESES.values()) < 0.6
 
 
+def with_jump(one: SampledLog) -> SampledLog:
+    """The log, whose horizontal velocities jump by 2 m/s after a third of it."""
+
+    def jumping(m: SampledChannel) -> SampledChannel:
+        values = m.channel.values + 2.0 * (np.arange(len(m.channel.values)) > len(m.channel.values) // 3)
+        return replace(m, channel=replace(m.channel, values=values)) if m.sensor.is_horizontal_velocity else m
+
+    return replace(one, measured=tuple(map(jumping, one.measured)))
+
+
+def one_of_each(model: Model) -> list[Variant]:
+    """One variant of each hypothesis about a model whose log has momentary commands and a velocity that jumps."""
+    told = model.logs[0].record.told
+    found = []
+    for kind, hypothesis in HYPOTHESES.items():
+        of = next(hypothesis.variants(model.known, model.logs))
+        found.append(Variant(kind, of, ((told[5], np.inf),) * len(of) if hypothesis.has_times else ()))
+    return found
+
+
+def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(model: Model) -> None:
+    """Lines between momentary commands are those of the commands that act, and a slew limit repeats none of them."""
+    lossy = replace(model, logs=[with_jump(replace(one, lost={"yaw": 0.1})) for one in model.logs])
+    every = one_of_each(lossy)
+    for first, second in combinations(every, 2):
+        (one,), (other,) = lossy.applied(first, second).logs, lossy.applied(second, first).logs
+        assert (one.is_momentary, one.layout) == (other.is_momentary, other.layout)
+        for key in ("told", "since", "inputs", "beside"):
+            assert np.array_equal(getattr(one.record, key), getattr(other.record, key)), (first, second, key)
+        assert lossy.applied(first, second).table.parameters == lossy.applied(second, first).table.parameters
+    assert in_order(reversed(every)) == every
+    (momentary,) = (one for one in every if one.kind == "momentary commands")
+    for variant in every[: every.index(momentary)]:
+        acting = lossy.applied(variant)
+        (lines,) = lossy.applied(momentary, variant).logs
+        (expected,) = (log.with_lines(acting.known.coefficients, acting.known.full) for log in acting.logs)
+        assert lines.record.beside is not None
+        assert expected.record.beside is not None
+        assert np.array_equal(lines.record.beside, expected.record.beside)
+    with pytest.raises(AssertionError):  # the lines would be those of other commands
+        lines.with_inputs(lines.record.inputs)
+
+
 def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
     """The commands that act are those of a loop written out separately."""
     (one,) = model.logs
@@ -239,7 +285,7 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
     (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
     variant = Variant("idle commands", of)
     z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
-    found = Unknown(model, model.objective(), z).timed(variant)
+    found = timed(model, model.objective(), z, variant)
     assert found.of == (of if start > 0.0 or end < SECONDS else ())
     for begins, ends in found.acting:
         assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
@@ -250,7 +296,7 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
         assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
     (one,) = model.logs
     against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
-    assert not Unknown(against, against.objective(), z).timed(variant).of
+    assert not timed(against, against.objective(), z, variant).of
 
 
 @pytest.mark.parametrize(
@@ -427,6 +473,48 @@ def test_a_probability_follows_from_the_odds() -> None:
     assert probability(0.0) == 0.5
     assert probability(2.0 * np.log(19.0)) == pytest.approx(0.95)
     assert probability(-1e9) < 1e-9
+
+
+# ---- The search ------------------------------------------------------------------------------------------------------
+
+
+REVERSED, DEAD = Variant("reversed commands", ("r",)), Variant("health", ("r",))
+
+
+@pytest.fixture(scope="module")
+def reversed_model(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """A dive with a reversed thruster, which looks dead as long as the other thruster is taken for the whole."""
+    fault = faults(["l", "r"])["reversed"]
+    return Model(*begin(load_tests(folder(tmp_path_factory.mktemp("reversed"), "videoray", fault, 2))))
+
+
+def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> None:
+    at = Comparison(reversed_model, {}, rough(reversed_model.table))
+    values = {
+        (kind, of): min(at.value({Variant(kind, of): start}) for start in one.starts or (None,))
+        for kind, one in HYPOTHESES.items()
+        if one.changes_thrust and not one.has_times
+        for of in one.variants(reversed_model.known, reversed_model.logs)
+    }
+    assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
+    assert values["health", ("r",)] < at.value({})
+
+
+@pytest.mark.long
+def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+    """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays."""
+    quick = reversed_model.objective(thinned=True)
+    near = minimise(quick, start_of(quick, STARTS[0]), enough=8.0, last=False)
+    start = evidence(quick, near.value, near.information)
+    search = StructureSearch(Trial({}, reversed_model, quick, near, start, start), _search)
+    monkeypatch.setattr(Model, "objective", lambda self, **_: Objective(self.table, self.logs, self.rows, thinned=True))
+    dead = fitted(reversed_model, {DEAD: 0.0}, 0.0, _search)
+    assert dead
+    assert dead.score > search.now.score
+    search.tried[frozenset({DEAD})] = search.now = dead
+    found = search.explained()
+    assert [one.variant for one in found.adopted] == [REVERSED]
+    assert max(structure(found.objective, found.minimum).values()) < ALARM
 
 
 # ---- What wins -------------------------------------------------------------------------------------------------------

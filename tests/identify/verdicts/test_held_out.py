@@ -15,9 +15,9 @@ from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, u
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import structure
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.search import structure
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import score_of
 from tests.folders import DOWN, SPEED, folder_of, pulled
