@@ -1,20 +1,19 @@
 """The optional effects with their evidence, and what the fit found about loggers and sensors."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 from math import inf, pi
 
 import numpy as np
 
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import Variant, lost_in_words, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
-from rov_fmu.io.messages import listed
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -41,18 +40,8 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
     """Yield the hypotheses about the structure that won, with the numbers of their parameters."""
     posterior, objective = fit.posterior, fit.objective
     for one in fit.adopted:
-        kind, place = one.variant.kind, posterior.table.place(*one.variant.parameter)
-        of, words = listed(one.variant.of), dict[str, str]()
-        if kind == "momentary commands":
-            words = _lost(fit, one.variant.of)
-        elif kind == "unsettled velocity":
-            (log,) = (log for log in objective.logs if log.log.file in one.variant.of)
-            of = f"{of} (until {log.settled - log.record.told[0]:.1f} s)"
-        elif one.variant.acting:
-            of = listed(_acting(fit, one.variant))
-        elif kind in ("health", "reversed commands"):
-            of = listed(twins(fit.known, objective.logs, *one.variant.of), "or")
-        structure = Structure(kind, of, probability(one.odds), words=tuple(words.items()))
+        words, place = one.variant.in_words(fit.known, objective.logs), posterior.table.place(*one.variant.parameter)
+        structure = Structure(one.variant.kind, words.pop("of"), probability(one.odds), words=tuple(words.items()))
         if place is not None:
             p = posterior.table.parameters[place]
             low, high = around(float(posterior.z[place]), posterior.errors[place])
@@ -60,8 +49,9 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
             value, low, high = (np.exp(ends) if p.is_log else ends).tolist()
             structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
         yield structure
-    if files := [one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)]:
-        yield Structure("momentary commands", listed(files), 1.0, words=tuple(_lost(fit, files).items()))
+    if files := tuple(one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)):
+        words = Variant("momentary commands", files).in_words(fit.known, objective.logs)
+        yield Structure("momentary commands", words.pop("of"), 1.0, words=tuple(words.items()))
 
 
 def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
@@ -70,20 +60,6 @@ def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
     if one.is_momentary or place is None:
         return False
     return around(float(fit.posterior.z[place]), fit.posterior.errors[place])[0] > MOST_OF_ROW
-
-
-def _lost(fit: Fit, files: Sequence[str]) -> dict[str, str]:
-    """Return along which axis most of the command is lost between the rows of some logs, in words."""
-    most = max((one for one in fit.objective.logs if one.log.file in files), key=lambda one: max(one.lost.values()))
-    return lost_in_words(most.lost, most.interval)
-
-
-def _acting(fit: Fit, variant: Variant) -> Iterator[str]:
-    """Yield each file whose commands do not always act, with the times since its first row between which they do."""
-    told = {one.log.file: one.record.told for one in fit.objective.logs}
-    for file, (begin, end) in zip(variant.of, variant.acting, strict=True):
-        first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
-        yield f"{file} ({first} to {last} s)"
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

@@ -184,7 +184,8 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
     """Return the vehicle, also with the axes about which nothing is known but on whose motion those shown depend.
 
     The thrusters that turn a vehicle in a dive move it along these axes, too, and this motion takes thrust from them.
-    Without a turn, such an axis takes thrust from no other. An axis is left out where more thrusters push along it.
+    Without a turn, such an axis takes thrust from no other. An axis is left out where more thrusters push along it. If
+    the axes are coupled, unseen motion would turn the vehicle by moments that nothing tells, so none is added.
     """
     vehicle, base = tests.vehicle, tests.base
     layout, wide = vehicle.layout, _without_unknown_options(tests.description.layout, tests.known)
@@ -194,7 +195,8 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
         return not axis.is_rotation and axis.inertia in base and bool(pushing) and pushing <= {*layout.thrusters}
 
     axes = [form.axis for form in wide.axes if layout.has(form.axis) or is_unseen(form.axis)]
-    if layout.has_wrench or not any(axis.is_rotation for axis in shown) or len(axes) == len(layout.axes):
+    turns = any(axis.is_rotation for axis in shown)
+    if layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes):
         return vehicle
     layout = with_axes_alone(wide, axes)
     values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}

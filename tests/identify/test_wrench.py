@@ -16,9 +16,10 @@ from scipy.integrate import solve_ivp
 from rov_fmu import load
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
-from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import by_heading, findings_of
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.tank.readers.writers import Ros
@@ -121,6 +122,13 @@ def test_drag_and_inertia_are_those_of_the_simulation(tmp_path: Path) -> None:
     assert again.layout.example(SURGE) == {"X_ext": 5.0}
     rate = again.derivatives(again.layout.usual_inputs | {"X_ext": 10.0}, again.layout.at_rest)["u"]
     assert rate == pytest.approx(10.0 / INERTIA["u"], rel=0.1)
+
+
+def test_a_force_along_an_axis_is_no_thruster_that_may_be_ill(tmp_path: Path) -> None:
+    write_dives(tmp_path, ROV)
+    known, logs, _ = begin(load_tests(tmp_path))
+    assert not [*HYPOTHESES["health"].variants(known, logs)]
+    assert len([*HYPOTHESES["reversed commands"].variants(known, logs)]) == 2, "but its sign may be wrong"
 
 
 def of_topics(folder: Path, d: Dive) -> None:

@@ -13,6 +13,7 @@ from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
 from rov_fmu.identify.result import ALARM
+from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant
 from rov_fmu.tank.arrays import Array
 
@@ -22,6 +23,7 @@ _FINEST = 0.05
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
 Change = Callable[[Prior, Logs, "Variant"], tuple[Prior, Logs]]
+InWords = Callable[[Prior, Logs, "Variant"], dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -37,7 +39,9 @@ class Hypothesis:
     starts: tuple[float, ...] = ()
     """The coordinates from which its parameter begins; empty if it has none."""
     sentence: str = ""
-    """What is told, with `of`, the thrusters or files, `value`, the number of the parameter, and `odds`."""
+    """What is told, with `in_words`, `value`, the number of the parameter, and `odds`."""
+    in_words: InWords = lambda _known, _logs, variant: {"of": listed(variant.of)}
+    """What may have it, as `of`, and what else the sentence says about it."""
     most: float = inf
     """A number of its parameter above this one is told as an effect alone."""
     alarm: float = ALARM
@@ -64,6 +68,10 @@ class Variant:
     def parameter(self) -> tuple[str, str]:
         """The kind of its parameter, and what has it."""
         return self.kind, self.of[0] if self.of else ""
+
+    def in_words(self, known: Prior, logs: Logs) -> dict[str, str]:
+        """Return what its sentence says about it, where the logs have it."""
+        return HYPOTHESES[self.kind].in_words(known, logs, self)
 
     def excludes(self, other: "Variant") -> bool:
         """Return True if both say something of one kind about the same thrusters or files."""
@@ -174,6 +182,32 @@ def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
     return {"share": percent(lost[axis]), "axis": axis, "rate": significant(1.0 / interval, 2)}
 
 
+def _of_lost(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+    """Return the files, and along which axis most of the command is lost between their rows."""
+    most = max((one for one in logs if one.log.file in variant.of), key=lambda one: max(one.lost.values()))
+    return {"of": listed(variant.of), **lost_in_words(most.lost, most.interval)}
+
+
+def _of_settled(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+    """Return each file with the time since its first row from which its velocities count."""
+    some = (one for one in logs if one.log.file in variant.of)
+    return {"of": listed(f"{one.log.file} (until {one.settled - one.record.told[0]:.1f} s)" for one in some)}
+
+
+def _of_acting(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+    """Return each file whose commands do not always act, with the times since its first row between which they do."""
+    told, words = {one.log.file: one.record.told for one in logs}, []
+    for file, (begin, end) in zip(variant.of, variant.acting, strict=True):
+        first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
+        words.append(f"{file} ({first} to {last} s)")
+    return {"of": listed(words)}
+
+
+def _of_twins(known: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+    """Return the thrusters that no log tells apart, of which one has it."""
+    return {"of": listed(twins(known, logs, *variant.of), "or")}
+
+
 def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that the logs command, one of those that no log tells apart."""
     seen = list[Array]()
@@ -182,6 +216,12 @@ def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
         if shown is not None and not any(np.array_equal(shown, other) for other in seen):
             seen.append(shown)
             yield (thruster.name,)
+
+
+def _ill(known: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield each thruster that may have lost force. A commanded force along an axis of the body is not one of them."""
+    if not known.layout.has_wrench:
+        yield from _thrusters(known, logs)
 
 
 def _signature(known: Prior, logs: Logs, name: str) -> Array | None:
@@ -236,6 +276,7 @@ HYPOTHESES = {
             "{of}: the measured velocity is not that of the vehicle before it jumps, as of an estimator without a "
             "position{odds}. It is left out until then. Begin a dive when the estimator has its position"
         ),
+        in_words=_of_settled,
         changes_thrust=False,
         is_first=True,
     ),
@@ -247,6 +288,7 @@ HYPOTHESES = {
             "{of}: the commands do not act before and after, as if the thrusters were off{odds}. They count as 0 "
             "there. Record while the thrusters are on"
         ),
+        in_words=_of_acting,
         has_times=True,
     ),
     "reversed commands": Hypothesis(
@@ -257,6 +299,7 @@ HYPOTHESES = {
             "thruster {of}: it pushes against its commands in the logs{odds}. Check its direction, the order of its "
             "wires, and its propeller"
         ),
+        in_words=_of_twins,
     ),
     "swapped commands": Hypothesis(
         0.03,
@@ -283,16 +326,18 @@ HYPOTHESES = {
             "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
             "({rate} per second). Fly in MANUAL, or log at 50 Hz"
         ),
+        in_words=_of_lost,
         changes_thrust=False,
     ),
     "health": Hypothesis(
         0.1,
-        _thrusters,
+        _ill,
         lambda known, logs, variant: _with_parameter("health")(
             replace(known, exact=known.exact - {known.layout.health[variant.of[0]]}), logs, variant
         ),
         (0.0, 0.5, 0.75),
         "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
+        _of_twins,
         most=0.79,
     ),
     "command limit": Hypothesis(

@@ -94,12 +94,23 @@ def test_the_drag_and_the_inertia_of_what_a_dive_with_a_heading_does_not_show_ar
     assert {"a_d_u", "b_d_u"} <= exact.exact
 
 
-@pytest.mark.parametrize(("sensors", "unseen"), [(("yaw", "heave"), [SURGE]), (("yaw",), [SURGE]), (("heave",), [])])
+@pytest.mark.parametrize(
+    ("sensors", "is_coupled", "unseen"),
+    [
+        (("yaw", "heave"), False, [SURGE]),
+        (("yaw",), False, [SURGE]),
+        (("heave",), False, []),
+        (("yaw", "heave"), True, []),
+    ],
+)
 def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
-    sensors: tuple[str, ...], unseen: list[Axis], tmp_path: Path
+    sensors: tuple[str, ...], is_coupled: bool, unseen: list[Axis], tmp_path: Path
 ) -> None:
     """Its speed takes thrust from the thrusters that turn the vehicle. The file does not have it."""
     Drawn(("surge", "heave", "yaw"), sensors, seconds=10.0).write(0, tmp_path / "dives")
+    description = tmp_path / "dives" / "rov.toml"
+    coupling = "[body]\ncoupling = true\n" if is_coupled else "[body]\n"
+    description.write_text(description.read_text(encoding="utf-8").replace("[body]\n", coupling), encoding="utf-8")
     tests = load_tests(tmp_path / "dives")
     known, logs, _ = begin(tests)
     assert {form.axis.name for form in tests.vehicle.layout.axes} == {*sensors}
