@@ -171,6 +171,15 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
     assert sum(one.probability for one in HYPOTHESES.values()) < 0.6
 
 
+def test_idle_commands_of_one_file_leave_another_alone(model: Model) -> None:
+    (one,) = model.logs
+    other, told = replace(one, log=replace(one.log, file="other.csv")), one.record.told
+    idle = Variant("idle commands", (one.log.file,), ((told[5], np.inf),))
+    first, second = replace(model, logs=[one, other]).applied(idle).logs
+    assert not first.record.inputs[:5].any()
+    assert np.array_equal(second.record.inputs, other.record.inputs)
+
+
 def with_jump(one: SampledLog) -> SampledLog:
     """The log, whose horizontal velocities jump by 2 m/s after a third of it."""
 
