@@ -23,13 +23,14 @@ from rov_fmu.identify.result import (
     Coefficient,
     Disturbance,
     Effect,
+    Estimate,
     Identification,
     Interval,
-    Known,
     Logging,
     Prediction,
     Structure,
     half_width,
+    is_known,
     relative_error,
 )
 from rov_fmu.identify.tuning import BETA, BETA_WITH_ADDED_MASS
@@ -314,9 +315,9 @@ def _next_tests(identification: Identification) -> list[str]:
     return useful or [nothing.format(test.axis.name, test.target, _known_to(test.now)) for test in tests[:1]]
 
 
-def _known_to(half_width: float) -> str:
-    """Return how well a number is known: `±12%`, or `not known` where its interval is wider than its value."""
-    return f"±{half_width:.0%}" if half_width <= 1.0 else "not known"
+def _known_to(width: float) -> str:
+    """Return how well a number is known by the relative half-width of its interval: `±12%`, or `not known`."""
+    return f"±{width:.0%}" if is_known(width) else "not known"
 
 
 def repairs(identification: Identification) -> list[str]:
@@ -412,13 +413,13 @@ def with_lag(identification: Identification) -> list[str]:
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
-def with_error(known: Known, unit: str) -> str:
+def with_error(estimate: Estimate, unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
     wider than the value is not known."""
-    value, interval = known
+    value, interval = estimate
     if not 0.0 < abs(value) < inf:
         return "-"
-    if (error := half_width(known)) > 1.0:
+    if not is_known(error := half_width(estimate)):
         return "not known"
     words, _, _ = in_words(value, interval, unit).partition(" (")
     return f"{words} ±{error:.0%}"

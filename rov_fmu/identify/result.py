@@ -16,7 +16,7 @@ from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Interval = tuple[float, float]
-Known = tuple[float, Interval]
+Estimate = tuple[float, Interval]
 """A number with its 95 % interval."""
 
 KEPT = 6.0
@@ -64,13 +64,13 @@ class Answer:
     axis: Axis
     command: float
     """A fraction of full command, with its sign."""
-    steady: Known
+    steady: Estimate
     """The steady velocity V_ss, m/s or rad/s."""
-    rise: Known
+    rise: Estimate
     """The time Tau from rest to 63 % of it, with the lag of the thrusters left out, s."""
-    stop: Known
+    stop: Estimate
     """The stopping distance: from it to a tenth of it without thrust, m or rad."""
-    lagged: Known | None = None
+    lagged: Estimate | None = None
     """The time with the lag of the thrusters, s; None without a lag."""
 
 
@@ -341,10 +341,15 @@ class AxisOfBase:
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
 
 
-def half_width(known: Known) -> float:
+def half_width(estimate: Estimate) -> float:
     """Return the larger half of the interval of a number, relative to the number."""
-    value, interval = known
+    value, interval = estimate
     return max(abs(end / value - 1.0) for end in interval)
+
+
+def is_known(half_width: float) -> bool:
+    """Return False for the relative half-width of an interval that is wider than its number, which is then not told."""
+    return half_width <= 1.0
 
 
 @dataclass(frozen=True)

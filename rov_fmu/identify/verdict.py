@@ -21,6 +21,7 @@ from rov_fmu.identify.result import (
     Verdict,
     coverage_of,
     half_width,
+    is_known,
     relative_error,
     score_of,
 )
@@ -143,7 +144,7 @@ def _reach(e: Evidence) -> dict[str, str]:
 
 def _known(half_width: float) -> str:
     """Return how well a number is known, as the end of a sentence, by the relative half-width of its interval."""
-    if half_width > 1.0:
+    if not is_known(half_width):
         return "not known: its interval is wider than its value"
     return f"known to no better than {percent(half_width)}"
 
