@@ -34,9 +34,9 @@ _LEAST_JUMP = 0.2
 _FASTER = 5.0
 """A quantity jumps where it changes this many times as fast as around there, by this many usual steps, and stays there:
 its median over three samples changes by half of the jump or more."""
-_USUALLY = {False: _FASTER, True: 2.0}
-"""How many times as fast as 95 % of the time a quantity changes where it jumps: False for positions, and True for
-velocities, which thrusters change quickly."""
+_FASTER_VELOCITY = 2.0
+"""How many times as fast as 95 % of the time a velocity changes where it jumps, because thrusters change it quickly.
+Other quantities change _FASTER times as fast."""
 
 
 def checked(log: Log) -> Log:
@@ -160,7 +160,7 @@ def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[n
         return np.zeros(0, np.intp)
     rates = np.abs(steps) / np.diff(time)
     beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
-    usual = _USUALLY[is_velocity] * np.quantile(rates, 0.95)
+    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(rates, 0.95)
     least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
     sudden = (np.abs(steps) > least) & (rates > np.maximum(beside, usual))
     around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")

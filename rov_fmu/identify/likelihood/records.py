@@ -108,9 +108,9 @@ class SampledLog:
         """Return the log without the horizontal velocities before a time, s."""
 
         def counts(m: SampledChannel) -> SampledChannel:
-            later = m.channel.time >= time
             if not m.sensor.is_horizontal_velocity:
                 return m
+            later = m.channel.time >= time
             left = replace(m, channel=replace(m.channel, time=m.channel.time[later], values=m.channel.values[later]))
             return replace(left, noise=_least_noise(left)) if self.lost else left
 
