@@ -40,8 +40,7 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
     """Yield the hypotheses about the structure that won, with the numbers of their parameters."""
     posterior, objective = fit.posterior, fit.objective
     for one in fit.adopted:
-        words, place = one.variant.in_words(fit.known, objective.logs), posterior.table.place(*one.variant.parameter)
-        structure = Structure(one.variant.kind, words.pop("of"), probability(one.odds), words=tuple(words.items()))
+        structure, place = _named(fit, one.variant, one.odds), posterior.table.place(*one.variant.parameter)
         if place is not None:
             p = posterior.table.parameters[place]
             low, high = around(float(posterior.z[place]), posterior.errors[place])
@@ -50,8 +49,13 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
             structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
         yield structure
     if files := tuple(one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)):
-        words = Variant("momentary commands", files).in_words(fit.known, objective.logs)
-        yield Structure("momentary commands", words.pop("of"), 1.0, words=tuple(words.items()))
+        yield _named(fit, Variant("momentary commands", files), inf)
+
+
+def _named(fit: Fit, variant: Variant, odds: float) -> Structure:
+    """Return a hypothesis with 2 ln of its odds and what its sentence says."""
+    words = variant.in_words(fit.known, fit.objective.logs)
+    return Structure(variant.kind, words.pop("of"), probability(odds), words=tuple(words.items()))
 
 
 def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:

@@ -27,7 +27,7 @@ from rov_fmu.identify.likelihood.search import (
     windows,
     with_shared,
 )
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, minimise, scaled
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, evidence_at, minimise, scaled
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
@@ -126,16 +126,15 @@ def fit_all(
     show = moving(on_progress, "all samples", 0.3, 0.7)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
     on_progress("hypotheses", 0.65)
-    of_quick = evidence(quick, ends[0].value, ends[0].information)
-    plain = Trial({}, model, full, near, evidence(full, near.value, near.information), of_quick)
+    plain = Trial({}, model, full, near, evidence_at(full, near), evidence_at(quick, ends[0]))
     plain, first = settled(plain, _search)
     held = windows(plain.objective, plain.minimum.z)
-    best_model = StructureSearch(plain, _search).explained()
-    adopted = (*first, *best_model.adopted)
-    model, full, near = best_model.model, best_model.objective, best_model.minimum
+    explained = StructureSearch(plain, _search).explained()
+    adopted = (*first, *explained.adopted)
+    model, full, near = explained.trial.model, explained.trial.objective, explained.trial.minimum
     known = model.known
     for n, curve in enumerate(known.measured_curves):
-        other, needed = replace(known, bent=known.bent | {curve}), evidence(full, near.value, near.information) + KEPT
+        other, needed = replace(known, bent=known.bent | {curve}), evidence_at(full, near) + KEPT
         objective = replace(model, known=other).objective()
 
         def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
@@ -174,7 +173,7 @@ def fit_all(
         replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
         float(difference),
         adopted,
-        best_model.rivals,
+        explained.rivals,
         errors,
     )
 

@@ -100,6 +100,8 @@ class Kind(Coordinate):
     """True for a time constant, which the samples of sensors must be close enough to show."""
     finest: float = 0.0
     """The half-width of the narrowest interval: what is smaller is no effect."""
+    adapts: bool = False
+    """True if one linear step adapts it to a hypothesis about the structure, where J compares these before any fit."""
     is_size: bool = False
     """True for the size of a slow or short process."""
     slow: Process | None = None
@@ -142,7 +144,15 @@ def _drag(key: str, deviation: Deviation) -> Kind:
         free = _free(prior, form, key)
         return {"mean": log(max(prior.coefficients[form.axis.coefficient(key)], 1e-9))} if free else None
 
-    return Kind(deviation, keys=(key,), is_coefficient=True, told_by=("log", "steady"), of_axis=of_axis, is_log=True)
+    return Kind(
+        deviation,
+        keys=(key,),
+        is_coefficient=True,
+        told_by=("log", "steady"),
+        of_axis=of_axis,
+        is_log=True,
+        adapts=True,
+    )
 
 
 def _drag_astern(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
@@ -170,6 +180,7 @@ KINDS = {
     "thrust scale": Kind(
         Deviation("thrust", 0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
         is_log=True,
+        adapts=True,
     ),
     "thrust shape": Kind(_SHAPE),
     "linear thrust": Kind(_SHAPE),
@@ -181,6 +192,7 @@ KINDS = {
         keys=("a_t_reverse", "b_t_reverse"),
         is_ratio=True,
         null=0.0,
+        adapts=True,
     ),
     "dead band": Kind(
         Deviation("dead_band", 0.05, "the command at which thrust begins", "speed controllers have 2 to 8 %"),
@@ -210,6 +222,7 @@ KINDS = {
         low=0.0,
         null=0.0,
         unit="s/m",
+        adapts=True,
     ),
     "lag": Kind(
         Deviation("lag", 0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
@@ -220,6 +233,7 @@ KINDS = {
         low=LEAST_LAG,
         null=LEAST_LAG,
         unit="s",
+        adapts=True,
     ),
     "dead time": Kind(
         Deviation("dead_time", 0.05, "the time from a command to its effect, s", "links of one or two control periods"),
@@ -235,6 +249,7 @@ KINDS = {
         keys=("beta",),
         told_by=("log", "time_constant"),
         of_axis=_inertia,
+        adapts=True,
     ),
     "quadratic drag": _drag(
         "a_d",
@@ -256,6 +271,7 @@ KINDS = {
         of_axis=_drag_astern,
         is_ratio=True,
         null=0.0,
+        adapts=True,
     ),
     "centre of buoyancy": Kind(
         Deviation(
@@ -274,6 +290,7 @@ KINDS = {
         of_axis=_load,
         finest=0.001,
         null=0.0,
+        adapts=True,
     ),
     "current": Kind(
         Deviation("current", 0.1, "the current, m/s", "tests are made in calm water"),
@@ -281,6 +298,7 @@ KINDS = {
         ". It belongs to the water, so the vehicle file does not have it",
         null=0.0,
         unit="m/s",
+        adapts=True,
     ),
     "sensor lag": Kind(
         Deviation("sensor_lag", 0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
@@ -392,7 +410,7 @@ KINDS = {
     "coloured noise": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(0.3)),
     "correlation time": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(2.0), unit="s"),
     "row noise": Kind(is_log=True, of_motion=False, mean=log(0.03), low=log(1e-3)),
-    "logging offset": Kind(unit="s"),
+    "logging offset": Kind(unit="s", adapts=True),
     "logging width": Kind(of_motion=False, mean=0.5, deviation=0.5, low=0.0, high=1.0),
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative

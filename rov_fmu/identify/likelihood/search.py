@@ -6,10 +6,11 @@ the structure is right. Above ALARM, each hypothesis changes the model, J is min
 factor (Laplace approximation), with the prior probability, decides. What wins is part of the model.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 from math import inf, log, nan
 
 import numpy as np
@@ -19,11 +20,12 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
-from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each
@@ -43,22 +45,8 @@ fitted to all samples if its evidence of thinned logs, which hardly tell it, is 
 _FORCE, _LOUD = 0.03, 1.0
 """The size of the slow forces, relative to full thrust, and how many deviations of the prior the white noise is above
 its mean where J compares hypotheses before any fit."""
-_ADAPTS = (
-    "thrust scale",
-    "reverse thrust",
-    "advance",
-    "lag",
-    "inertia",
-    "quadratic drag",
-    "linear drag",
-    "drag astern",
-    "load",
-    "current",
-    "logging offset",
-)
-"""The kinds of parameters that adapt to a hypothesis there."""
 _FARTHEST = 3.0
-"""The most by which they adapt, in deviations of their priors."""
+"""The most by which parameters adapt to a hypothesis there, in deviations of their priors."""
 _LATE, _NARROWEST, _HALF = 0.05, 0.2, 0.5
 """How much earlier or later commands that change between rows act along an axis (standard error), relative to the
 window in which they change; the narrowest window, relative to the time between two rows; and the command whose time
@@ -137,14 +125,14 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
 
 
 def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -> Array:
-    """Return the covariance of the parameters by errors that logs do not show whose commands change between rows.
+    """Return the covariance of the parameters by errors that a log does not show if its commands change between rows.
 
-    Along each axis, commands act a small part of their window earlier or later: a stick moves it otherwise than a
-    controller. The axis answers so much earlier or later, as if its inertia were other: the more so the faster it is.
-    And such logs have the estimates of an autopilot, whose scale is not exact either. With a scale s, all velocities v
-    are s v, as if the drag were a/s² and b/s, and the inertia m/s.
+    Along each axis, commands act a small part of their window earlier or later, because a stick and a controller change
+    them at other times. The axis then answers earlier or later, as if it had another inertia, and a fast axis the more.
+    Such a log also has the estimates of an autopilot, whose scale is not exact. With a scale s, a velocity v reads s v,
+    as if the drag were a/s² and b/s, and the inertia m/s.
 
-    `before` has the windows of the fit without hypotheses: straight lines between rows leave them open.
+    `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
     now, parameters = windows(objective, z), objective.table.parameters
     widths = [one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.lost]
@@ -243,7 +231,7 @@ class Comparison:
         self.model, self.place = model, place
         self.objective = model.applied(*held).objective(thinned=True)
         self.z, self.data = self._start(self.objective, held), list[Data]()
-        self.free = np.flatnonzero([p.kind in _ADAPTS for p in self.objective.table.parameters])
+        self.free = np.flatnonzero([KINDS[p.kind].adapts for p in self.objective.table.parameters])
         with suppress(DivergedError):
             self.data = self.objective.data(self.z, self.objective.runs(self.z), exact=False)
         self.values = dict[frozenset[tuple[Variant, float | None]], float]()
@@ -333,13 +321,11 @@ class Trial:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """The model with the hypotheses that won."""
+    """The fit with the hypotheses that won."""
 
-    model: Model
-    objective: Objective
-    minimum: Minimum
-    adopted: tuple[Adopted, ...] = ()
-    rivals: tuple[Posterior, ...] = ()
+    trial: Trial
+    adopted: tuple[Adopted, ...]
+    rivals: tuple[Posterior, ...]
     """The fits with hypotheses that did not win, and whose odds are near even."""
 
 
@@ -353,7 +339,7 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
     thinned, objective = model.objective(thinned=True), model.objective()
     with suppress(DivergedError):
         end = search(thinned, numbers_of(thinned.table, starts))
-        quick = _evidence(thinned, end)
+        quick = evidence_at(thinned, end)
         if quick > enough:
             full = minimise(objective, scaled(objective, end.z), last=False)
             ends = dict.fromkeys(starts) | {
@@ -361,7 +347,7 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
                 for one in starts
                 if (place := objective.table.place(*one.parameter)) is not None
             }
-            return Trial(ends, model, objective, full, _evidence(objective, full) + prior, quick)
+            return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick)
     return None
 
 
@@ -407,7 +393,7 @@ class StructureSearch:
         self.tried: dict[frozenset[Variant], Trial | None] = {frozenset(): plain}
 
     def explained(self) -> Explained:
-        """Try the hypotheses where the alarm asks for it, and return the model with those that win."""
+        """Try the hypotheses where the alarm asks for it, and return the fit with those that win."""
         rivals = list[Trial]()
         for _ in range(_ROUNDS):
             fits = self._round()
@@ -416,13 +402,13 @@ class StructureSearch:
                 rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = best
-        now, fitted = self.now, [one for one in self.tried.values() if one]
+        now, trials = self.now, [one for one in self.tried.values() if one]
         adopted = (
-            Adopted(variant, now.score - max(one.score for one in fitted if variant not in one.starts))
+            Adopted(variant, now.score - max(one.score for one in trials if variant not in one.starts))
             for variant in in_order(now.starts)
         )
         posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
-        return Explained(now.model, now.objective, now.minimum, tuple(adopted), tuple(posteriors))
+        return Explained(now, tuple(adopted), tuple(posteriors))
 
     @cached_property
     def variants(self) -> list[Variant]:
@@ -452,7 +438,7 @@ class StructureSearch:
     def _round(self) -> list[Trial]:
         """Return fits with other sets of hypotheses, where the alarm asks for them.
 
-        What J shows less before any fit than one that has won by far waits for the next round.
+        If one set has won by far, sets whose J falls much less before any fit wait for the next round.
         """
         fits, won = list[Trial](), -inf
         for starts, gain in [*self._promising()]:
@@ -469,9 +455,9 @@ class StructureSearch:
         return fits
 
     def _promising(self) -> Iterator[tuple[Starts, float]]:
-        """Yield the sets that are worth a fit, with by how much J falls at the better of two places before any fit.
+        """Yield the sets that are worth a fit, with the fall of J that tells so before any fit.
 
-        These are the best ones at each place of those that change the thrust, and then all others, whose gain is -inf.
+        The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
         """
         now = self.now
         predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
@@ -491,24 +477,30 @@ class StructureSearch:
         shown += self._smaller[1:] if filtered > ALARM else []
         shown = [some for some in shown if frozenset(some) not in self.tried]
         if shown:
-            at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
-            gains = np.array([[_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in shown])
-            chosen = dict[frozenset[Variant], int]()
-            for gain in gains.T.tolist():
-                own = dict[frozenset[Variant], int]()
-                for n in sorted((n for n, one in enumerate(gain) if one > 0.0), key=gain.__getitem__, reverse=True):
-                    own.setdefault(frozenset(shown[n]), n)
-                chosen = {**dict([*own.items()][:_FITTED]), **chosen}
-            best = sorted(((float(gains[n].max()), n) for n in chosen.values()), reverse=True)
-            yield from ((shown[n], gain) for gain, n in best)
+            yield from self._ranked(shown)
         yield from ((some, -inf) for some in others if frozenset(some) not in self.tried)
+
+    def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
+        """Yield the best sets at either of two places with the fall of J at the better one, the largest fall first.
+
+        Of the starts of one set, the best one counts.
+        """
+        now = self.now
+        at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
+        falls = [[_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets]
+        chosen = dict[frozenset[Variant], int]()
+        for here in zip(*falls, strict=True):
+            best = dict[frozenset[Variant], int]()
+            for n in sorted(range(len(sets)), key=here.__getitem__, reverse=True):
+                if here[n] > 0.0:
+                    best.setdefault(frozenset(sets[n]), n)
+            for key, n in islice(best.items(), _FITTED):
+                chosen.setdefault(key, n)
+        order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
+        yield from ((sets[n], fall) for fall, n in order)
 
 
 def _fall(at: Comparison, before: Starts, after: Starts) -> float:
     """Return by how much J falls from some hypotheses to others; -inf where a motion diverges."""
     value = at.value(after)
     return at.value(before) - value if value < inf else -inf
-
-
-def _evidence(objective: Objective, minimum: Minimum) -> float:
-    return evidence(objective, minimum.value, minimum.information)

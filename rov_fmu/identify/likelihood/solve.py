@@ -262,6 +262,11 @@ def evidence(objective: Objective, value: float, information: Array) -> float:
     return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
 
 
+def evidence_at(objective: Objective, minimum: Minimum) -> float:
+    """Return the evidence of a model by the minimum of its J."""
+    return evidence(objective, minimum.value, minimum.information)
+
+
 def scaled(objective: Objective, z: Array) -> Array:
     """Return the parameters with the common scale of thrust, drag, load and inertia that their priors prefer.
 

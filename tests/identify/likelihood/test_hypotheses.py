@@ -523,7 +523,7 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: py
     search.tried[frozenset({DEAD})] = search.now = dead
     found = search.explained()
     assert [one.variant for one in found.adopted] == [REVERSED]
-    assert max(structure(found.objective, found.minimum).values()) < ALARM
+    assert max(structure(found.trial.objective, found.trial.minimum).values()) < ALARM
 
 
 # ---- What wins -------------------------------------------------------------------------------------------------------
