@@ -8,12 +8,13 @@ import numpy as np
 
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
-from rov_fmu.identify.likelihood.kinds import KINDS
+from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
 from rov_fmu.identify.likelihood.posterior import QUANTILE, around
-from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
+from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
+from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
@@ -25,7 +26,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
-        posterior, kind = fit.posterior if n in file.absent else file, KINDS[p.kind]
+        posterior, kind = fit.posterior if n in file.absent else file, p.of_kind
         value = p.offset + p.factor * float(posterior.z[n])
         low, high = around(value, p.factor * max(posterior.errors[n], kind.finest / QUANTILE))
         if kind.is_ratio or p.is_log:
@@ -60,7 +61,7 @@ def _named(fit: Fit, variant: Variant, odds: float) -> Structure:
 
 def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
     """Return True if commands that hold surely change within more than half of the time between two rows."""
-    place = fit.posterior.table.place("logging width", one.log.file)
+    place = fit.posterior.table.place(WIDTH, one.log.file)
     if one.is_momentary or place is None:
         return False
     return around(float(fit.posterior.z[place]), fit.posterior.errors[place])[0] > MOST_OF_ROW
@@ -75,7 +76,7 @@ def _shortest(fit: Fit, p: Parameter) -> float:
         float(np.median(np.diff(one.record.time[one.record.sensor == n])))
         for one in fit.objective.logs
         for n, m in enumerate(one.measured)
-        if KINDS[p.kind].is_lag and p.part in ("", with_same_lag(m.sensor))
+        if p.of_kind.is_lag and p.part in ("", with_same_lag(m.sensor))
     ]
     return min(intervals, default=-inf) / (2.0 * pi)
 
@@ -84,33 +85,26 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
     """Yield how long after their rows the commands of each log act, s, without the dead time and lag of the vehicle."""
     posterior, table = fit.file.posterior, fit.file.posterior.table
     for one in fit.objective.logs:
-        place = table.place("logging offset", one.log.file)
+        place = table.place(OFFSET, one.log.file)
         if place is None:
             continue
-        offset, lag = float(posterior.z[place]), table.place("lag")
+        offset, lag = float(posterior.z[place]), table.place(LAG)
         if lag in posterior.absent:  # a delay that the vehicle does not keep belongs to the logger
             offset += float(posterior.z[lag])
-        width = table.get(posterior.z, "logging width", one.log.file) * one.interval
+        width = table.get(posterior.z, WIDTH, one.log.file) * one.interval
         yield Logging(one.log.file, one.interval, offset, around(offset, posterior.errors[place]), width)
 
 
 def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
     """Yield the noise and the outliers of each measured quantity over all logs."""
-    z, table = fit.best.z, fit.posterior.table
-    counts: dict[str, int] = {}
-    outlying: dict[str, list[bool]] = {}
-    first: dict[str, SampledChannel] = {}
-    logs = fit.objective.logs
-    for one, record, data in zip(logs, fit.objective.records, fit.best.data[: len(logs)], strict=True):
-        for place, m in enumerate(one.measured):
-            name = m.channel.quantity.name
-            counts[name] = counts.get(name, 0) + len(m.channel.values)
-            far = np.abs(data.normalised[record.sensor == place]) > _OUTLIER
-            outlying.setdefault(name, []).extend(far.tolist())
-            first.setdefault(name, m)
-    for name, m in first.items():
-        white = table.get(z, "white noise", name)
-        coloured = white * table.get(z, "coloured noise", name)
-        time = table.get(z, "correlation time", name)
-        share = float(np.mean(outlying[name]))
-        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, white, coloured, time, counts[name], share)
+    objective, table = fit.objective, fit.posterior.table
+    seen = grouped(
+        (m.channel.quantity.name, (m, np.abs(data.normalised[record.sensor == place]) > _OUTLIER))
+        for one, record, data in zip(objective.logs, objective.records, fit.best.data, strict=False)
+        for place, m in enumerate(one.measured)
+    )
+    for name, some in seen.items():
+        m, noise = some[0][0], table.noise(fit.best.z, name)
+        count = sum(len(m.channel.values) for m, _ in some)
+        outliers = float(np.mean(np.concatenate([is_far for _, is_far in some])))
+        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers)

@@ -356,7 +356,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
         most = max((rms(force) for force in forces), default=inf)
         if (
-            d.kind == "slow force"
+            d.slow.acts_as == "force"
             and d.axis
             and d.kept
             and not d.cause
@@ -562,9 +562,8 @@ _REMEDIES = {
 
 def acting(d: Disturbance) -> str:
     """Return what a disturbance does in its log as a sentence without the file: `an unknown slow force of ... acts`."""
-    slow, is_turn = KINDS[d.kind].slow, d.axis is not None and d.axis.is_rotation
-    assert slow
-    return slow.sentence.format(
+    is_turn = d.axis is not None and d.axis.is_rotation
+    return d.slow.sentence.format(
         unknown="a" if d.cause else "an unknown",
         push="torque" if is_turn else "force",
         thrust="torque" if is_turn else "thrust",
@@ -575,9 +574,7 @@ def acting(d: Disturbance) -> str:
 
 def _disturbance(d: Disturbance, vehicle: Vehicle) -> Finding:
     """Return the finding about a disturbance that the evidence shows."""
-    slow = KINDS[d.kind].slow
-    assert slow
-    kind = "explained disturbance" if d.cause else slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
+    kind = "explained disturbance" if d.cause else d.slow.finding if d.share >= MOST_UNKNOWN else "small disturbance"
     where = d.axis.name if d.axis else listed(one.name for one in (SURGE, SWAY) if vehicle.layout.has(one))
     what = acting(d) if d.changes_thrust else f"{where}: {acting(d)}"
     since = "" if d.since is None or d.since < _LATER else f" from {d.since:.0f} s on"

@@ -32,8 +32,6 @@ INFORMED = 0.5
 """The least share of what all data tell of an axis that a fit must know to hold out the rest."""
 _CENTRAL = (0.5,)
 """The command whose answers tell what data know of an axis."""
-_LEAST_GAIN = 0.03
-"""Thrust is never predicted to better than 3 %: batteries and water differ from day to day."""
 _LEAST_CURRENT = 0.02
 """The current of an unseen log is never known to better than this, m/s."""
 _STEPS = 0.3, 0.03, 0.003
@@ -147,7 +145,7 @@ def _with_currents(objective: Objective, best: Minimum, covariance: Array, numbe
     """Return the covariance with the variance of the current of an unseen log: about as large as in the other logs."""
     found = covariance.copy()
     for n, p in enumerate(objective.table.parameters):
-        if p.kind == "current" and p.log == number:
+        if p.of_kind.is_of_water and p.log == number:
             found[n], found[:, n] = 0.0, 0.0
             found[n, n] = unseen_current(objective.table, best.z, covariance, p.of)
     return found
@@ -158,18 +156,15 @@ def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> floa
 
     Where no other log has one, it is that of the prior.
     """
-    currents = [(n, p) for n, p in enumerate(table.parameters) if p.kind == "current"]
+    currents = [(n, p) for n, p in enumerate(table.parameters) if p.of_kind.is_of_water]
     others = [z[n] ** 2 + covariance[n, n] for n, p in currents if p.of != file]
     return _LEAST_CURRENT**2 + float(np.mean(others or [p.deviation**2 for _, p in currents]))
 
 
 def cautious(objective: Objective, z: Array) -> Array:
-    """Return the parameters with at least the least change of thrust."""
-    moved = z.copy()
-    place = objective.table.place("slow gain")
-    if place is not None:
-        moved[place] = max(moved[place], log(_LEAST_GAIN))
-    return moved
+    """Return the parameters with at least the least change of thrust, which is never predicted to better."""
+    least = [log(p.of_kind.least_unseen) if p.of_kind.least_unseen else -inf for p in objective.table.parameters]
+    return np.maximum(z, least)
 
 
 def _predicted(
@@ -211,7 +206,7 @@ def _predicted(
                 predicted=measured - off,
                 deviation=deviation,
                 unchanged=unchanged(record.time[at], measured, span),
-                noise=objective.table.get(z, "white noise", m.channel.quantity.name),
+                noise=objective.table.noise(z, m.channel.quantity.name)[0],
                 error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 loss=cost(off, deviation**2) / len(off),

@@ -9,6 +9,7 @@ from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.identify.likelihood.kinds import SLOW, Process
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
@@ -224,9 +225,14 @@ class Disturbance(Effect):
     """The channel that explains it in words, such as `the voltage`; empty if none does."""
 
     @property
+    def slow(self) -> Process:
+        """The slow process that it is."""
+        return SLOW[self.kind]
+
+    @property
     def changes_thrust(self) -> bool:
         """True for a change of all thrust."""
-        return self.kind == "slow gain"
+        return self.slow.acts_as == "gain"
 
     def concerns(self, axis: Axis) -> bool:
         """Return True if it acts along an axis. Without an axis, it acts along all, or on the horizontal velocity."""

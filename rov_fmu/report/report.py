@@ -8,7 +8,6 @@ from markupsafe import Markup
 
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
-from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.report.plots.identification import plot_answers, plot_forces
@@ -57,7 +56,6 @@ def report_page(results: Identification, on_progress: Progress = silent) -> str:
         script=inline_script("plots.js"),
         card=card(results.vehicle),
         KNOTS=KNOTS,
-        KINDS=KINDS,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=relative_error,

@@ -12,7 +12,7 @@ from rov_fmu.identify import assess, held_out
 from rov_fmu.identify.findings import acting
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records, search
-from rov_fmu.identify.likelihood.kinds import EFFECTS, SLOW
+from rov_fmu.identify.likelihood.kinds import EFFECTS, KINDS, SLOW
 from rov_fmu.identify.result import MOST_UNKNOWN
 from rov_fmu.identify.unexplained import causes, slips
 from rov_fmu.identify.verdict import RULES
@@ -94,7 +94,7 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
     assert f"The filter reads the first {search.SETTLING:g} s" in page
     assert f"positions and headings over {records.AHEAD:g} s" in page
     assert f"never claimed to better than {100.0 * assess.EXACT:g} %" in page
-    assert f"a change of thrust of at least {100.0 * held_out._LEAST_GAIN:g} %" in page
+    assert f"a change of thrust of at least {100.0 * KINDS['slow gain'].least_unseen:g} %" in page
     assert (
         f"the current of an unseen log, which is about as large as in the others, but not below {least:g} m/s" in page
     )

@@ -11,6 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.filter import Run
 from rov_fmu.identify.likelihood.fit import fit_all
+from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -72,10 +73,11 @@ OTHER = 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
 
 def cause(objective: Objective, values: Array, axis: Axis | None = SURGE, time_constant: float = 8.0) -> str:
     """Return what a slow process with these values follows."""
-    states, place = objective.filters[0].vehicle_states, objective.filters[0].force
+    states, slow = objective.filters[0].vehicle_states, SLOW["slow force" if axis else "slow gain"]
+    (place,) = objective.filters[0].places_of(slow.acts_as, axis.name if axis else "")
     course = {states.index(name): some for name, some in (("x", NORTH), ("y", EAST), ("psi", HEADING))}
     run = run_with(objective, {**course, place: centred(values) + OTHER})
-    return cause_of(objective, objective.mean, [run], [place], time_constant, axis)
+    return cause_of(objective, objective.mean, [run], replace(slow, time_constant=time_constant), axis)
 
 
 @pytest.mark.parametrize("name", CAUSES)

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, refits
@@ -46,7 +45,7 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     at the end, with which more effects may go.
     """
     posterior, parameters = Posterior.of(objective.table, best.z, best.information), objective.table.parameters
-    inputs = (n for n, p in enumerate(parameters) if KINDS[p.kind].adds_input)
+    inputs = (n for n, p in enumerate(parameters) if p.of_kind.adds_input)
     absent = frozenset(n for n in inputs if posterior.evidence(n) < _POSITIVE)
     if absent:
         best = _exact(objective, absent, best)

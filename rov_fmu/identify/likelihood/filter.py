@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -198,6 +199,17 @@ class Filter:
         self.gain, self.drift = self.short + axes, self.short + axes + 1
         self.noise = self.drift + len(DRIFTS)
         """The places of the slow processes among the states of the filter."""
+
+    def places_of(self, slow: Literal["force", "gain", "velocity"], axis: str) -> list[int]:
+        """Return the places of a slow process among the states of the filter; none where the vehicle lacks its axis.
+
+        A velocity along no axis is the horizontal one.
+        """
+        if slow == "force":
+            return [place for place, form in enumerate(self.layout.axes, self.force) if form.axis.name == axis]
+        if slow == "gain":
+            return [self.gain]
+        return [self.drift + 2] if axis == HEAVE.name else [self.drift, self.drift + 1]
 
     def run(
         self,

@@ -35,21 +35,14 @@ from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
-STARTS: tuple[Mapping[str, float], ...] = (
-    {"slow": 1.0, "white": 4.0, "quadratic": 0.7},
-    {"slow": 1.0, "white": 2.0},
-)
-"""Two starts: how many deviations of their priors some kinds of parameters are above their means, by their first word.
-
-With much noise, J has few minima far from the data.
-"""
+_STARTS = ("start 1", "start 2", "a more careful start")
+"""Two starts, and one for a motion that diverges from both. The kinds of the parameters say where they begin: with much
+noise, J has few minima far from the data, and a heavier vehicle with less drag is careful."""
 _QUICK = 8.0
 """The reduction of J by new derivatives at which a quick fit ends."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
-_CAREFUL = {"slow": 1.0, "white": 4.0, "quadratic": -1.0, "linear": -1.0, "inertia": 1.0}
-"""The start if the motion diverges from both others: a heavier vehicle with less drag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +73,7 @@ class Fit:
     @cached_property
     def most_followed(self) -> float:
         """The strongest command that the thrusters follow."""
-        return float(self.file.posterior.table.get(self.file.posterior.z, "command limit", default=1.0))
+        return min(float(self.file.posterior.table.limit(self.file.posterior.z)), 1.0)
 
     @cached_property
     def command_range(self) -> tuple[float, float]:
@@ -180,17 +173,14 @@ def fit_all(
 
 def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
-    starts = [start_of(quick, louder) for louder in (*STARTS, _CAREFUL)]
     ends: list[Minimum] = []
-    for n, start in enumerate(starts):
+    for n, words in enumerate(_STARTS):
         is_enough = len(ends) == n and not any(_is_loud(quick.table, end.z) for end in ends)
-        if ends and (n == len(STARTS) or is_enough):
+        if ends and (words is _STARTS[-1] or is_enough):
             break
-
-        words = f"start {n + 1}" if n < len(STARTS) else "a more careful start"
         show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
-            ends.append(_least(quick, start, show, _QUICK))
+            ends.append(_least(quick, start_of(quick, n), show, _QUICK))
         except DivergedError:
             continue
     if not ends:
@@ -201,16 +191,10 @@ def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple
 def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:
     """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
-    For a measured curve, a linear share of 2 d almost makes up for a dead band d, as a (c - d)^2 is almost
-    a c^2 - 2 a d c. In the valley between both, J has a kink wherever the dead band passes a command of the tests.
+    In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
     end = minimise(objective, start, on_step=on_step, enough=enough, last=False)
-    larger = end.z.copy()
-    for n, p in enumerate(objective.table.parameters):
-        band = objective.table.place("dead band", p.of)
-        if p.kind == "linear thrust" and p.low < p.high and band is not None:
-            d = objective.deviation[band]
-            larger[n], larger[band] = end.z[n] + 2.0 * d, end.z[band] + d
+    larger = objective.table.with_larger_dead_bands(end.z)
     if np.array_equal(larger, end.z):
         return end
     other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
@@ -219,18 +203,17 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None], e
 
 def _search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
     """Return the minimum of J of thinned logs from the first start, in which some parameters have other numbers."""
-    start = start_of(objective, STARTS[0])
+    start = start_of(objective)
     start[[*numbers]] = [*numbers.values()]
     return _least(objective, start, lambda _: None, _QUICK)
 
 
-def start_of(objective: Objective, louder: Mapping[str, float]) -> Array:
-    """Return the means of the priors, but for some kinds of parameters, which are so many deviations above them."""
-    kinds = [parameter.kind.split()[0] for parameter in objective.table.parameters]
-    above = np.array([louder.get(kind, 0.0) for kind in kinds])
+def start_of(objective: Objective, number: int = 0) -> Array:
+    """Return the coordinates at which a start begins."""
+    above = np.array([parameter.of_kind.starts[number] for parameter in objective.table.parameters])
     return np.asarray(objective.mean + objective.deviation * above)
 
 
 def _is_loud(table: Table, z: Array) -> bool:
     """Return True if a slow process is much larger than usual."""
-    return any(p.is_slow_size and z[n] - p.mean > _LOUD for n, p in enumerate(table.parameters))
+    return any(p.of_kind.is_size and z[n] - p.mean > _LOUD for n, p in enumerate(table.parameters))

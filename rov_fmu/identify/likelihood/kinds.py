@@ -8,7 +8,7 @@ deviation is estimated from one effect.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, log
-from typing import Any
+from typing import Any, Literal
 
 from rov_fmu.equation.catalogue import CURVE, REVERSE
 from rov_fmu.equation.parts import VehicleAxis
@@ -20,6 +20,8 @@ USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage, of thrusters whose speed nothing regulates."""
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
+INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "logging width", "white noise"
+"""Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
 
@@ -44,6 +46,9 @@ class Process:
     """s."""
     title: str
     """Its name in a table."""
+    acts_as: Literal["force", "gain", "velocity"]
+    """A force along an axis, told relative to the thrust along it; a gain of all thrust; or a velocity of the water or
+    of the ground, told relative to that of the vehicle."""
     sentence: str
     """What it does, with `unknown` (`an unknown` or, with a cause, `a`), `push` (`force` or `torque`), its `size`, and
     the `share` of the `thrust` (or `torque`) that this is."""
@@ -100,15 +105,27 @@ class Kind(Coordinate):
     """True for a time constant, which the samples of sensors must be close enough to show."""
     finest: float = 0.0
     """The half-width of the narrowest interval: what is smaller is no effect."""
+    force_power: float = 0.0
+    """Its number is proportional to this power of the common scale of all forces, which motion does not tell."""
+    speed_power: float = 0.0
+    """Its number is proportional to this power of the common scale of all measured velocities and positions."""
+    starts: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """How many deviations above its mean the fit begins in each of its starts."""
     adapts: bool = False
     """True if one linear step adapts it to a hypothesis about the structure, where J compares these before any fit."""
     is_size: bool = False
     """True for the size of a slow or short process."""
     slow: Process | None = None
     """The slow process whose size it is."""
+    hides_structure: bool = False
+    """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
+    least_unseen: float = 0.0
+    """Its least size where unseen data are predicted."""
+    is_of_water: bool = False
+    """True if it differs from log to log, but is about as large in all of them."""
 
 
-def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: float) -> Kind:
+def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: float, **own: Any) -> Kind:
     """Return the kind of the size of a slow process by its usual, its least and its largest size."""
     low, high = log(least), log(largest)
     return Kind(
@@ -120,7 +137,9 @@ def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: 
         null=low,
         of_motion=False,
         is_size=True,
+        starts=(1.0, 1.0, 1.0),
         slow=slow,
+        **own,
     )
 
 
@@ -137,7 +156,7 @@ def _inertia(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
     return {} if _free(prior, form, "beta") else None
 
 
-def _drag(key: str, deviation: Deviation) -> Kind:
+def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
     """Return the kind of a drag coefficient of an axis, ahead."""
 
     def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
@@ -151,7 +170,9 @@ def _drag(key: str, deviation: Deviation) -> Kind:
         told_by=("log", "steady"),
         of_axis=of_axis,
         is_log=True,
+        force_power=1.0,
         adapts=True,
+        **own,
     )
 
 
@@ -180,6 +201,7 @@ KINDS = {
     "thrust scale": Kind(
         Deviation("thrust", 0.10, "all forces of a curve, relatively", "two thrusters of one type, or a maker's table"),
         is_log=True,
+        force_power=1.0,
         adapts=True,
     ),
     "thrust shape": Kind(_SHAPE),
@@ -249,6 +271,9 @@ KINDS = {
         keys=("beta",),
         told_by=("log", "time_constant"),
         of_axis=_inertia,
+        force_power=1.0,
+        speed_power=-1.0,
+        starts=(0.0, 0.0, 1.0),
         adapts=True,
     ),
     "quadratic drag": _drag(
@@ -256,12 +281,16 @@ KINDS = {
         Deviation(
             "quadratic_drag", 1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"
         ),
+        speed_power=-2.0,
+        starts=(0.7, 0.0, -1.0),
     ),
     "linear drag": _drag(
         "b_d",
         Deviation(
             "linear_drag", 1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"
         ),
+        speed_power=-1.0,
+        starts=(0.0, 0.0, -1.0),
     ),
     "drag astern": Kind(
         Deviation("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
@@ -290,6 +319,7 @@ KINDS = {
         of_axis=_load,
         finest=0.001,
         null=0.0,
+        force_power=1.0,
         adapts=True,
     ),
     "current": Kind(
@@ -298,6 +328,7 @@ KINDS = {
         ". It belongs to the water, so the vehicle file does not have it",
         null=0.0,
         unit="m/s",
+        is_of_water=True,
         adapts=True,
     ),
     "sensor lag": Kind(
@@ -324,7 +355,11 @@ KINDS = {
     "slow force": _slow(
         Deviation("slow_force", 2.5, "ln of the size of a slow force", "0.1 % of full thrust, within a factor of 12"),
         Process(
-            8.0, "Slow force", "{unknown} slow {push} of {size} (RMS), {share} of the {thrust}, acts", "unknown force"
+            8.0,
+            "Slow force",
+            "force",
+            "{unknown} slow {push} of {size} (RMS), {share} of the {thrust}, acts",
+            "unknown force",
         ),
         0.001,
         1e-7,
@@ -338,6 +373,7 @@ KINDS = {
             "a quarter of the second differences between rows",
         ),
         is_size=True,
+        hides_structure=True,
         is_log=True,
         of_motion=False,
         mean=log(0.25),
@@ -350,10 +386,11 @@ KINDS = {
             "ln of the size of a slow change of thrust",
             "1 %, to a factor of 2, or it acts as thrust",
         ),
-        Process(60.0, "Change of thrust", "the thrust changes slowly by {size} (RMS)", "change of thrust"),
+        Process(60.0, "Change of thrust", "gain", "the thrust changes slowly by {size} (RMS)", "change of thrust"),
         0.01,
         1e-6,
         0.2,
+        least_unseen=0.03,  # batteries and water differ from day to day
     ),
     "slow velocity": _slow(
         Deviation(
@@ -362,12 +399,14 @@ KINDS = {
         Process(
             8.0,
             "Velocity over ground",
+            "velocity",
             "{unknown} slow velocity over ground of {size} (RMS) acts",
             "velocity over ground",
         ),
         0.001,
         1e-7,
         0.3,
+        unit="m/s",
     ),
     "health": Kind(
         None,
@@ -406,8 +445,9 @@ KINDS = {
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
         is_log=True,
         of_motion=False,
+        starts=(4.0, 2.0, 4.0),
     ),
-    "coloured noise": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(0.3)),
+    "coloured noise": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(0.3), hides_structure=True),
     "correlation time": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(2.0), unit="s"),
     "row noise": Kind(is_log=True, of_motion=False, mean=log(0.03), low=log(1e-3)),
     "logging offset": Kind(unit="s", adapts=True),
@@ -415,8 +455,8 @@ KINDS = {
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative
 to white noise."""
-SLOW = {name: kind.slow.time_constant for name, kind in KINDS.items() if kind.slow}
-"""The time constants of the slow processes, s."""
+SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow}
+"""The slow processes, by the kinds of their sizes."""
 EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is

@@ -30,8 +30,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
-from rov_fmu.identify.likelihood.kinds import LEAST_LAG
-from rov_fmu.identify.likelihood.parameters import Parameter, Table
+from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -275,12 +274,9 @@ class Objective:
         one = self.logs[number]
         if parameter.log is not None:
             return parameter.of == one.log.file
-        parts = {*one.layout.curves_by_name, *one.layout.curve_of}
-        if parameter.kind == "row noise" or parameter.low == parameter.high:
-            return False
-        if parameter.kind in ("white noise", "coloured noise", "correlation time"):
-            return parameter.of in {m.channel.quantity.name for m in one.measured}
-        return parameter.of in {"", "horizontal", *one.layout.by_name, *parts}
+        quantities = {m.channel.quantity.name for m in one.measured}
+        names = {"", HORIZONTAL, *one.layout.by_name, *one.layout.curves_by_name, *one.layout.curve_of, *quantities}
+        return parameter.of in names and parameter.low != parameter.high
 
     # ---- All data ----
 
@@ -293,10 +289,9 @@ class Objective:
     def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
         """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
         rows = self.rows if rows is None else rows
-        least_lag = LEAST_LAG if self.table.place("lag") is not None else 0.0
         measured = np.array([row.measured for row in rows])
-        off = (measured - modelled(rows, *self.table.model(z), least_lag).T).T
-        noise = np.array([self.table.get(z, "row noise", row.noise) * row.scale for row in rows])
+        off = (measured - modelled(rows, *self.table.model(z), self.table.least_lag).T).T
+        noise = np.array([self.table.row_noise(z, row.noise) * row.scale for row in rows])
         return off, noise**2
 
     def prior(self, z: Array) -> float:
@@ -424,9 +419,9 @@ class Objective:
         inside = z.copy()  # a lag at its bound is absent, and a shorter one changes nothing
         inside[places] = np.maximum(z[places], self.low[places] + steps)
         of_motion = derivatives(lambda sets: self.row_values(sets)[0], inside, places, steps)
-        noises = [k for k, one in enumerate(self.table.parameters) if one.kind == "row noise"]
-        names = [self.table.parameters[k].of for k in noises]
-        of_noise = np.array([[2.0 * (row.noise == name) for name in names] for row in self.rows])
+        own = {row.noise for row in self.rows}
+        noises = {k: p.of for k, p in enumerate(self.table.parameters) if p.of in own}
+        of_noise = np.array([[2.0 * (row.noise == name) for name in noises.values()] for row in self.rows])
         slopes = np.hstack([of_motion, np.zeros_like(of_noise)])
         log_slopes = np.hstack([np.zeros((len(off), len(places))), of_noise])
         return Data(off, variances, slopes, log_slopes, [*places, *noises], len(z))

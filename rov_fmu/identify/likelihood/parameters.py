@@ -13,7 +13,21 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Part, Thruster, VehicleAxis
 from rov_fmu.identify.likelihood.curves import COUNT, Shapes
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
-from rov_fmu.identify.likelihood.kinds import ABSENT, KINDS, LEAST_LAG, PLACED, PRIORS, SLOW, Coordinate
+from rov_fmu.identify.likelihood.kinds import (
+    ABSENT,
+    INERTIA,
+    KINDS,
+    LAG,
+    LEAST_LAG,
+    OFFSET,
+    PLACED,
+    PRIORS,
+    SLOW,
+    WHITE,
+    WIDTH,
+    Coordinate,
+    Kind,
+)
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.tank.arrays import Array
@@ -24,6 +38,8 @@ _QUIETER = 2.0
 Where commands change between rows, it is at least all of it, because J is rough where a sensor is more exact."""
 _LINEAR = 0.3
 """The deviation of the linear share of a quadratic thrust curve, which measured forces determine."""
+HORIZONTAL = "horizontal"
+"""What has a slow velocity along no axis of the body."""
 CURRENT = ("to the north", "to the east")
 """The parts of a current."""
 _PLACES = ("forward", "to starboard", "down")
@@ -61,9 +77,9 @@ class Parameter(Coordinate):
         return self.null is not None and self.of_motion
 
     @property
-    def is_slow_size(self) -> bool:
-        """True for the size of a slow or short process."""
-        return KINDS[self.kind].is_size
+    def of_kind(self) -> Kind:
+        """What all parameters of its kind are."""
+        return KINDS[self.kind]
 
     def number(self, z: Any) -> Any:
         """Return the number that a coordinate stands for."""
@@ -141,7 +157,7 @@ class Table:
                 ratio = self._ratio(reverse, name) * np.exp(self.get(z, "drag astern", axis.name))
                 values[reverse] = values[name] * ratio
         beta = axis.coefficient("beta")
-        values[beta] = self.base[beta] / self.get(z, "inertia", axis.name, default=1.0)
+        values[beta] = self.base[beta] / self.get(z, INERTIA, axis.name, default=1.0)
 
     def _ratio(self, astern: str, ahead: str) -> float:
         """Return a coefficient astern of the base relative to that ahead; 1 if that ahead is 0."""
@@ -173,14 +189,14 @@ class Table:
                 values[name] = self._ratio(name, ahead) * lost * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
-            values[lag] = np.maximum(self.get(z, "lag", default=values[lag]), LEAST_LAG)
+            values[lag] = np.maximum(self.get(z, LAG, default=values[lag]), LEAST_LAG)
 
     def force_unit(self, z: Array, axis: Axis) -> Any:
         """Return what the size of a slow force is relative to, N or N m: full thrust, in proportion to the inertia.
 
         The data do not tell the scale of all forces.
         """
-        return self.full.get(axis.name, 1.0) * self.get(z, "inertia", axis.name, default=1.0)
+        return self.full.get(axis.name, 1.0) * self.get(z, INERTIA, axis.name, default=1.0)
 
     def model(self, z: Array) -> tuple[Vehicle, Shapes]:
         """Return the vehicle, and the deviations of the shapes of its curves."""
@@ -215,50 +231,74 @@ class Table:
         shapes = self._shapes(z, coefficients)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
             coefficients[name] = self.get(z, "current", file, part)
-        whole = self.get(z, "slow gain")
         axes = layout.bare_axes
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
         for thruster, curve in ((t, c) for t, c in layout.curve_of.items() if not c.has_rotors):
             units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
 
-        def drift(axis: Axis | None) -> Slow:
-            size = self.get(z, "slow velocity", axis.name if axis else "horizontal")
-            return Slow(size, SLOW["slow velocity"])
+        def slow(kind: str, of: str = "", unit: Any = 1.0) -> Slow:
+            return Slow(unit * self.get(z, kind, of), SLOW[kind].time_constant)
 
-        along = drift(None) if one.has_positions or one.has_velocities else Slow()
-        down = drift(HEAVE) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
-        white, noise = [], []
-        for m in one.measured:
-            quantity = m.channel.quantity.name
-            sigma = self.get(z, "white noise", quantity)
-            white.append(sigma)
-            coloured = self.get(z, "coloured noise", quantity) * sigma
-            noise.append(Slow(coloured, self.get(z, "correlation time", quantity, default=1.0)))
+        along = slow("slow velocity", HORIZONTAL) if one.has_positions or one.has_velocities else Slow()
+        down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
+        noises = [self.noise(z, m.channel.quantity.name) for m in one.measured]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         is_inside = HEAVE.name in layout.by_name
         return Parameters(
             coefficients=coefficients,
-            forces=tuple(Slow(units[a.name] * self.get(z, "slow force", a.name), SLOW["slow force"]) for a in axes),
+            forces=tuple(slow("slow force", a.name, units[a.name]) for a in axes),
             units=units,
             short=tuple(Slow(units[a.name] * self.get(z, "short force", a.name), 0.5 * one.interval) for a in axes)
             if one.is_momentary
             else (),
-            gain=Slow(whole, SLOW["slow gain"]),
+            gain=slow("slow gain"),
             drifts=(along, along, down if is_inside else Slow()),
-            white=tuple(white),
-            noise=tuple(noise),
+            white=tuple(white for white, _, _ in noises),
+            noise=tuple(Slow(coloured, time) for _, coloured, time in noises),
             lags=tuple(self._lag(z, m.sensor) for m in one.measured),
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
-            offset=self.get(z, "logging offset", file) + self.get(z, "dead time"),
-            width=self.get(z, "logging width", file),
+            offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
+            width=self.get(z, WIDTH, file),
             inputs=shapes.inputs(layout, self.followed(z, one)),
             count=1 if z.ndim == 1 else z.shape[1],
         )
 
+    def noise(self, z: Array, quantity: str) -> tuple[Any, Any, Any]:
+        """Return the standard deviations of the white and the coloured noise of a sensor, and the correlation time."""
+        white = self.get(z, WHITE, quantity)
+        coloured = white * self.get(z, "coloured noise", quantity)
+        return white, coloured, self.get(z, "correlation time", quantity, default=1.0)
+
+    def row_noise(self, z: Array, name: str) -> Any:
+        """Return the relative noise of the rows of a table."""
+        return self.get(z, "row noise", name)
+
+    @property
+    def least_lag(self) -> float:
+        """The lag of a vehicle without one, s: the least one if there is a parameter, and otherwise 0."""
+        return 0.0 if self.place(LAG) is None else LEAST_LAG
+
+    def limit(self, z: Array) -> Any:
+        """Return the strongest command that the thrusters follow; inf if there is no limit."""
+        return self.get(z, "command limit", default=np.inf)
+
+    def with_larger_dead_bands(self, z: Array) -> Array:
+        """Return the coordinates with larger dead bands of measured curves, and linear shares that make up for them.
+
+        A linear share of 2 d almost makes up for a dead band d, as a (c - d)^2 is almost a c^2 - 2 a d c.
+        """
+        larger = z.copy()
+        for n, p in enumerate(self.parameters):
+            band = self.place("dead band", p.of)
+            if p.kind == "linear thrust" and p.low < p.high and band is not None:
+                d = self.parameters[band].deviation
+                larger[n], larger[band] = z[n] + 2.0 * d, z[band] + d
+        return larger
+
     def followed(self, z: Array, one: SampledLog) -> Array:
         """Return the inputs that thrusters can follow, by a limit and a slew limit: (sets x) rows x inputs."""
-        limits = (self.get(z, kind, default=np.inf) for kind in ("command limit", "slew limit"))
-        some = [_followed(one, float(limit), float(slew)) for limit, slew in np.broadcast(*limits)]
+        limits = np.broadcast(self.limit(z), self.get(z, "slew limit", default=np.inf))
+        some = [_followed(one, float(limit), float(slew)) for limit, slew in limits]
         return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
@@ -312,7 +352,7 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
     if logs or known.has_times:
         T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
         width = prior("lag")
-        yield from make("lag", deviation=width and max(width, T), mean=T) if known.with_lag else make("lag")
+        yield from make(LAG, deviation=width and max(width, T), mean=T) if known.with_lag else make(LAG)
     if logs:
         for part, key in CENTRE.items():
             if key in {*known.layout.restoring} - known.exact:
@@ -414,11 +454,11 @@ def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str
 def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
     file, half = one.log.file, 0.5 * one.interval
     if one.is_momentary:
-        yield from make("logging offset", file, mean=-half, deviation=max(0.5 * half, 0.005), log=number)
-        yield from make("logging width", file, mean=1.0, low=1.0, log=number)
+        yield from make(OFFSET, file, mean=-half, deviation=max(0.5 * half, 0.005), log=number)
+        yield from make(WIDTH, file, mean=1.0, low=1.0, log=number)
     else:
-        yield from make("logging offset", file, mean=-half, deviation=max(half, 0.005), log=number)
-        yield from make("logging width", file, log=number)
+        yield from make(OFFSET, file, mean=-half, deviation=max(half, 0.005), log=number)
+        yield from make(WIDTH, file, log=number)
     if one.has_positions or one.has_velocities:
         for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
             yield from make("current", file, part, log=number)
@@ -451,7 +491,7 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
         yield from make("slow velocity", HEAVE.name)
     if any(one.has_positions or one.has_velocities for one in logs):
-        yield from make("slow velocity", "horizontal")
+        yield from make("slow velocity", HORIZONTAL)
     noises: dict[str, list[float]] = {}
     for one in logs:
         for m in one.measured:
@@ -459,6 +499,6 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():
         mean = log(sorted(some)[len(some) // 2])
-        yield from make("white noise", quantity, mean=mean, low=mean - quieter)
+        yield from make(WHITE, quantity, mean=mean, low=mean - quieter)
         yield from make("coloured noise", quantity)
         yield from make("correlation time", quantity)

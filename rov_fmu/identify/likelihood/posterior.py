@@ -12,7 +12,6 @@ from math import log
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.result import USUAL, Interval
@@ -94,7 +93,7 @@ class Posterior:
         """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent."""
         p = self.table.parameters[place]
         assert p.null is not None
-        error = max(self.errors[place], KINDS[p.kind].finest / QUANTILE)
+        error = max(self.errors[place], p.of_kind.finest / QUANTILE)
         after, before = ((self.z[place] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
         return float(after - before + 2.0 * log(error / p.deviation))
 

@@ -20,7 +20,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
-from rov_fmu.identify.likelihood.kinds import KINDS
+from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -111,16 +111,16 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
     """Return the parameters with no slow processes. Coloured noise and short forces are at most as large as usual."""
     quiet = z.copy()
     for n, p in enumerate(table.parameters):
-        if p.kind in ("coloured noise", "short force"):
+        if p.of_kind.hides_structure:
             quiet[n] = min(z[n], p.mean)
-        elif p.is_slow_size:
+        elif p.of_kind.is_size:
             quiet[n] = p.low
     return quiet
 
 
 def windows(objective: Objective, z: Array) -> dict[str, float]:
     """Return the part of the time between two rows in which a command may change, of each log that loses commands."""
-    found = {one.log.file: objective.table.get(z, "logging width", one.log.file) for one in objective.logs if one.lost}
+    found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.lost}
     return {file: 1.0 if width > MOST_OF_ROW else max(float(width), _NARROWEST) for file, width in found.items()}
 
 
@@ -140,13 +140,12 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -
     if not widths:
         return found
     vehicle, shapes = objective.table.model(z)
-    powers = {"quadratic drag": 2.0, "linear drag": 1.0, "inertia": 1.0}
     for axis in vehicle.layout.bare_axes:
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
-        own = np.array([powers.get(p.kind, 0.0) * (p.of == axis.name) for p in parameters])
+        own = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
         found += _SCALE**2 * np.outer(own, own)
         if 0.0 < time < inf:
-            is_inertia = np.array([p.kind == "inertia" and p.of == axis.name for p in parameters])
+            is_inertia = np.array([p.kind == INERTIA and p.of == axis.name for p in parameters])
             found += np.diag(is_inertia * (_LATE * max(widths) / time) ** 2)
     return found
 
@@ -180,8 +179,8 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
         return variant
     table, z, found = objective.table, best.copy(), {}
     for n, p in enumerate(table.parameters):
-        if p.is_slow_size:
-            z[n] = p.high if p.kind == "slow force" else p.low
+        if (kind := p.of_kind).is_size:
+            z[n] = p.high if kind.slow and kind.slow.acts_as == "force" else p.low
     vehicle, _ = table.model(best)
     for n, one in enumerate(model.logs):
         if one.log.file not in variant.of:
@@ -231,7 +230,7 @@ class Comparison:
         self.model, self.place = model, place
         self.objective = model.applied(*held).objective(thinned=True)
         self.z, self.data = self._start(self.objective, held), list[Data]()
-        self.free = np.flatnonzero([KINDS[p.kind].adapts for p in self.objective.table.parameters])
+        self.free = np.flatnonzero([p.of_kind.adapts for p in self.objective.table.parameters])
         with suppress(DivergedError):
             self.data = self.objective.data(self.z, self.objective.runs(self.z), exact=False)
         self.values = dict[frozenset[tuple[Variant, float | None]], float]()
@@ -274,8 +273,9 @@ def rough(table: Table) -> dict[Key, float]:
 
     A fit without the right hypothesis bends the vehicle until wrong ones look right.
     """
-    place = {p.key: p.mean + _LOUD * p.deviation for p in table.parameters if p.kind == "white noise"}
-    return place | {p.key: log(_FORCE) for p in table.parameters if p.kind == "slow force"}
+    place = {p.key: p.mean + _LOUD * p.deviation for p in table.parameters if p.kind == WHITE}
+    forces = (p for p in table.parameters if (slow := p.of_kind.slow) and slow.acts_as == "force")
+    return place | {p.key: log(_FORCE) for p in forces}
 
 
 def place_of(table: Table, z: Array) -> dict[Key, float]:

@@ -214,7 +214,7 @@ def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, 
         raise DivergedError
     curvature = [
         _size_curvature(g, 2.0 * (z[n] - parameter.mean) / parameter.deviation**2, 2.0 / parameter.deviation**2)
-        if parameter.is_slow_size
+        if parameter.of_kind.is_size
         else 0.0
         for n, (parameter, g) in enumerate(zip(objective.table.parameters, gradient, strict=True))
     ]
@@ -239,7 +239,7 @@ def _size_curvature(data: float, prior: float, prior_slope: float) -> float:
 def _step(objective: Objective, z: Array, gradient: Array, information: Array, free: Chosen, damping: float) -> Array:
     """Return the end of a damped step. What would leave its bounds stays at them, and the others move on without it."""
     weight, moving = 2.0 / objective.deviation**2, free.copy()
-    is_size = np.array([parameter.is_slow_size for parameter in objective.table.parameters])
+    is_size = np.array([parameter.of_kind.is_size for parameter in objective.table.parameters])
     change = np.clip(z, objective.low, objective.high) - z  # an effect that becomes absent is beyond
     moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0)) & (change == 0.0)
     for _ in range(len(z)):
@@ -273,10 +273,9 @@ def scaled(objective: Objective, z: Array) -> Array:
     Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    kinds = np.array([p.kind for p in objective.table.parameters])
-    loads = kinds == "load"
+    direction = np.array([p.of_kind.force_power for p in objective.table.parameters])
+    loads = np.array([not p.is_log for p in objective.table.parameters]) & (direction != 0.0)
     no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
-    direction = np.isin(kinds, ("thrust scale", "inertia", "quadratic drag", "linear drag")) * 1.0
     direction[loads] = (z - no_load)[loads]
     if not direction.any():
         return z

@@ -13,6 +13,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.filter import Run
+from rov_fmu.identify.likelihood.kinds import Process
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import first_in_each
@@ -40,18 +41,16 @@ class _Piece:
         return float(np.minimum(np.diff(self.time) / time_constant, 1.0).sum())
 
 
-def cause_of(
-    objective: Objective, z: Array, runs: Sequence[Run], places: Sequence[int], time_constant: float, axis: Axis | None
-) -> str:
+def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process, axis: Axis | None) -> str:
     """Return what a slow process follows in words, such as `the voltage`, or an empty text.
 
-    `runs` has the states of the filter for each log, and `places` where the process is among them; -1 where it is not.
-    Without an axis the process is a change of all thrust.
+    `runs` has the states of the filter for each log. Without an axis the process is a change of all thrust.
     """
+    time_constant = slow.time_constant
     pieces = [
         _piece(objective, z, n, run, place, axis)
-        for n, (run, place) in enumerate(zip(runs, places, strict=True))
-        if place >= 0
+        for n, run in enumerate(runs)
+        for place in objective.filters[n].places_of(slow.acts_as, axis.name if axis else "")
     ]
     pieces = [piece for piece in pieces if piece.constants(time_constant) > _LEAST]
     if not pieces:

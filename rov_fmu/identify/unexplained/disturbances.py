@@ -6,7 +6,7 @@ from math import inf, log
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import HEAVE
+from rov_fmu.equation.catalogue import AXES, HEAVE
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
@@ -38,8 +38,10 @@ def disturbances(
             in_logs = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
             present = [one for one in in_logs if one]
             if present:
-                largest = max(present, key=lambda one: one.share)
-                yield replace(largest, cause=_cause(objective, best.z, p, runs, largest)) if largest.kept else largest
+                largest, slow = max(present, key=lambda one: one.share), SLOW[p.kind]
+                if largest.kept and slow.acts_as != "velocity":  # nobody knows what a velocity over ground follows
+                    largest = replace(largest, cause=cause_of(objective, best.z, runs, slow, largest.axis))
+                yield largest
 
 
 def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[UnknownForce]:
@@ -84,33 +86,30 @@ def _disturbance(
     error: float,
 ) -> Disturbance | None:
     """Return a slow process in one log; None if the log does not have it. `error` is that of ln of its size."""
-    one, run = objective.logs[number], runs[number]
-    first = _place(objective, number, parameter)
-    if first < 0:
+    one, run, time = objective.logs[number], runs[number], objective.records[number].time
+    slow = SLOW[parameter.kind]
+    columns = objective.filters[number].places_of(slow.acts_as, parameter.of)
+    if not columns:
         return None
-    axis = next((axis for axis in one.layout.bare_axes if axis.name == parameter.of), None)
-    columns = [first, first + 1] if parameter.kind == "slow velocity" and axis is not HEAVE else [first]
+    axis = AXES.get(parameter.of)
     states, deviations = run.states[:, columns], run.deviations[:, columns]
-    size = float(np.sqrt(np.mean(np.sum(states**2, axis=1))))
-    time, unit, usual = objective.records[number].time, "1", 1.0
-    if parameter.kind == "slow gain":
-        size = rms(np.expm1(states))
-    elif parameter.kind == "slow force":
+    acting, unit, usual = states, parameter.unit, 1.0
+    if slow.acts_as == "gain":
+        acting = np.expm1(states)
+    elif slow.acts_as == "force":
         assert axis
         unit = axis.load
-        usual = max(
-            rms(thrust_along(objective, z, number, time[::10], axis)), _LITTLE * objective.table.full[axis.name]
-        )
-    elif parameter.kind == "slow velocity":
-        unit = "m/s"
+        thrust = rms(thrust_along(objective, z, number, time[::10], axis))
+        usual = max(thrust, _LITTLE * objective.table.full[axis.name])
+    else:
         speeds = [
             n
             for n, form in enumerate(one.layout.axes)
             if not form.axis.is_rotation and (form.axis is HEAVE) == (axis is HEAVE)
         ]
         usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
+    size = float(np.sqrt(np.mean(np.sum(acting**2, axis=1))))
     clear = np.flatnonzero(np.any(np.abs(states) > 2.0 * deviations, axis=1))
-    since = float(time[clear[0]] - time[0]) if len(clear) else None
     return Disturbance(
         parameter.kind,
         parameter.of,
@@ -122,24 +121,5 @@ def _disturbance(
         axis=axis,
         file=one.log.file,
         share=size / usual,
-        since=since,
+        since=float(time[clear[0]] - time[0]) if len(clear) else None,
     )
-
-
-def _cause(objective: Objective, z: Array, parameter: Parameter, runs: Sequence[Run], slow: Disturbance) -> str:
-    """Return what a slow process follows in all logs, in words. Nobody knows what a velocity over ground follows."""
-    if slow.kind == "slow velocity":
-        return ""
-    places = [_place(objective, n, parameter) for n in range(len(runs))]
-    return cause_of(objective, z, runs, places, SLOW[parameter.kind], slow.axis)
-
-
-def _place(objective: Objective, number: int, parameter: Parameter) -> int:
-    """Return where a slow process is among the states of the filter of a log, or -1. A velocity has its first one."""
-    one, filter_of = objective.logs[number], objective.filters[number]
-    names = [form.axis.name for form in one.layout.axes]
-    if parameter.kind == "slow gain":
-        return filter_of.gain
-    if parameter.kind == "slow velocity":
-        return filter_of.drift + (2 if parameter.of == HEAVE.name else 0)
-    return filter_of.force + names.index(parameter.of) if parameter.of in names else -1

@@ -28,8 +28,9 @@ from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
-from rov_fmu.identify.likelihood.fit import STARTS, start_of
+from rov_fmu.identify.likelihood.fit import start_of
 from rov_fmu.identify.likelihood.hypotheses import Model
+from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
@@ -134,7 +135,7 @@ def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> It
     """Yield the translations that are fitted, with ln of their inertia relative to the mass, and its error."""
     vehicle, _ = objective.table.model(z)
     for axis in known.fitted:
-        place = objective.table.place("inertia", axis.name)
+        place = objective.table.place(INERTIA, axis.name)
         if place is not None and not axis.is_rotation:
             inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
             yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[place]), _WEIGHED)
@@ -198,7 +199,7 @@ def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Ar
     model = Model(known, recorded, rows).applied(*(one.variant for one in adopted))
     quick = model.objective(thinned=True)
     try:
-        value = minimise(quick, start_of(quick, STARTS[0]) if start is None else start, last=False).value
+        value = minimise(quick, start_of(quick) if start is None else start, last=False).value
     except DivergedError:
         return np.inf
     return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)

@@ -16,7 +16,7 @@ import rov_fmu
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood.fit import STARTS, _search, start_of
+from rov_fmu.identify.likelihood.fit import _search, start_of
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order, probability, twins
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -513,7 +513,7 @@ def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> 
 def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays."""
     quick = reversed_model.objective(thinned=True)
-    near = minimise(quick, start_of(quick, STARTS[0]), enough=8.0, last=False)
+    near = minimise(quick, start_of(quick), enough=8.0, last=False)
     start = evidence(quick, near.value, near.information)
     search = StructureSearch(Trial({}, reversed_model, quick, near, start, start), _search)
     monkeypatch.setattr(Model, "objective", lambda self, **_: Objective(self.table, self.logs, self.rows, thinned=True))

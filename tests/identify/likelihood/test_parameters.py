@@ -1,22 +1,29 @@
 """The parameters: their priors, and how they enter the model."""
 
+import ast
 from dataclasses import replace
 from functools import partial
 from math import exp
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from rov_fmu import identify
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, table_of
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.tank.catalogue import QUANTITIES
 from tests.folders import HEAD, folder_of, pulled
 from tests.identify.conftest import add_voltage
 from tests.recordings import run, write_log
 from tests.vehicles import VIDEORAY
 
+PHYSICS = ("kinds.py", "parameters.py", "hypotheses.py")
+"""What declares the kinds, and what they do to the model."""
 Known = tuple[Table, list[SampledLog]]
 
 
@@ -148,3 +155,15 @@ def test_a_linear_drag_of_0_has_a_prior_next_to_0(fit: Fit) -> None:
     table = table_of(known, fit.objective.logs, [])
     (drag,) = (p for p in table.parameters if (p.kind, p.of) == ("linear drag", "heave"))
     assert exp(drag.mean) == pytest.approx(1e-9)
+
+
+def test_code_asks_a_kind_what_it_declares_and_not_for_its_name() -> None:
+    """Then a new kind needs an entry in the table, and what it does to the model, and no branch elsewhere."""
+    names = KINDS.keys() - {quantity.name for quantity in QUANTITIES.values()}
+    for path in Path(identify.__file__).parent.rglob("*.py"):
+        nodes = [*ast.walk(ast.parse(path.read_text("utf-8")))]
+        asked = [part for node in nodes if isinstance(node, ast.Compare | ast.Call) for part in ast.walk(node)]
+        literals = {str(part.value) for part in asked if isinstance(part, ast.Constant)}
+        everywhere = {str(part.value) for part in nodes if isinstance(part, ast.Constant)}
+        named = names & (literals | {text for text in everywhere if " " in text})
+        assert not named or path.name in PHYSICS, path
