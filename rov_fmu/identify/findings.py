@@ -255,9 +255,14 @@ def name_of(p: Prediction) -> str:
     return f"{quantity}, {p.span:g} s ahead" if isfinite(p.span) else quantity
 
 
+def _errors(p: Prediction) -> tuple[str, str]:
+    """Return the error of a prediction, and that of a prediction of no change, in words."""
+    return size_in_words(p.error, p.unit), size_in_words(p.unchanged, p.unit)
+
+
 def error_in_words(p: Prediction) -> str:
     """Return the error of a prediction beside that of a prediction of no change, and the share in the band."""
-    error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+    error, unchanged = _errors(p)
     return (
         f"{name_of(p)}: off by {error} (RMS) in {p.file}, and a prediction of no change by {unchanged}; "
         f"{p.coverage:.0%} of the samples are inside the 95% band"
@@ -346,7 +351,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
             own = [other for other in judged if other.quantity == p.quantity]
             is_odd = 2 * sum(other.is_worse for other in own) < len(own)
             if p.is_worse and is_odd and (p.file, p.quantity) not in slipped:
-                error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+                error, unchanged = _errors(p)
                 yield (
                     p.file,
                     f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
@@ -467,7 +472,7 @@ def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     for p in worse:
         if p.is_judged or (p.file, p.quantity) not in warned:
             kind = "worse than no change" if p.is_judged else "drift"
-            error, unchanged = (size_in_words(size, p.unit) for size in (p.error, p.unchanged))
+            error, unchanged = _errors(p)
             yield about(p.file, kind, result.axis.name, quantity=p.quantity, error=error, unchanged=unchanged)
 
 
@@ -500,7 +505,7 @@ def _not_identified(
 def _on_points(result: AxisResult) -> Iterator[Finding]:
     """Yield findings about tables of velocities and time constants that contradict the model."""
     for quantity in ("V_ss", "Tau"):
-        error = relative_error((p for p in result.points if p.quantity == quantity), "model")
+        error = relative_error(result.points, "model", quantity)
         if error > _CONTRADICTION:
             yield about("", "points differ", result.axis.name, quantity=quantity, error=error)
 

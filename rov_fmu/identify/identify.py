@@ -32,7 +32,7 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
-from rov_fmu.identify.verdict import MOST_GAIN, Evidence, most_inertia, verdict
+from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.description import ROV_FILE
@@ -123,7 +123,6 @@ def _axis(
     effects: Sequence[Effect],
     pushes: Sequence[float],
 ) -> AxisResult:
-    own, tested = tuple(p for p in predicted if p.axis is axis), fit.tested(axis)
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
@@ -136,35 +135,27 @@ def _axis(
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
-    steady, times = ([*points_of(tests, values, vehicle, kind, axis.name)] for kind in ("steady", "time_constant"))
+    steady, times = (points_of(tests, values, vehicle, kind, axis.name) for kind in ("steady", "time_constant"))
     limits = tests.description.tables.limits
     shown = replace(fit.posterior, z=fit.file.posterior.z)
-    known = _those_of(coefficients, vehicle.layout.by_name[axis.name], "beta")
-    evidence = Evidence(
-        predictions=own,
+    result = AxisResult(
+        axis=axis,
         answers=answers,
-        tested=tested,
-        steady=steady,
+        tested=fit.tested(axis),
+        known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
+        predictions=tuple(p for p in predicted if p.axis is axis),
+        points=(*steady, *times),
+        next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        structure=fit.structure.get(axis, 0.0),
         disturbances=[d for d in slow if d.concerns(axis)],
         effects=acting,
         slips=[s for s in wrong if s.file in files],
         misfits=misfits,
-        structure=fit.structure.get(axis, 0.0),
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
         is_assumed=bool(tests.description.assumed),
         difference=fit.difference,
     )
-    return AxisResult(
-        axis=axis,
-        verdict=verdict(evidence),
-        answers=answers,
-        tested=tested,
-        known=known,
-        predictions=own,
-        points=(*steady, *times),
-        next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
-        structure=evidence.structure,
-    )
+    return replace(result, verdict=verdict(result))
 
 
 def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:

@@ -303,9 +303,10 @@ class Point:
     """False outside the window of rov.toml."""
 
 
-def relative_error(points: Iterable[Point], of: Literal["model", "held_out"]) -> float:
-    """Return the RMS of the relative errors of the points that count; NaN where there are none."""
-    off = [getattr(p, of) / p.measured - 1.0 for p in points if p.counts and p.measured]
+def relative_error(points: Iterable[Point], of: Literal["model", "held_out"], quantity: str = "") -> float:
+    """Return the RMS of the relative errors of the points that count, or of those of a quantity; NaN without any."""
+    some = (p for p in points if p.quantity == (quantity or p.quantity))
+    off = [getattr(p, of) / p.measured - 1.0 for p in some if p.counts and p.measured]
     off = [error for error in off if isfinite(error)]
     return sqrt(sum(error**2 for error in off) / len(off)) if off else nan
 
@@ -393,23 +394,56 @@ class Slip:
 
 @dataclass(frozen=True, eq=False)
 class AxisResult:
-    """All that concerns one axis."""
+    """All that concerns one axis: what its verdict rests on, and the verdict."""
 
     axis: Axis
-    verdict: Verdict
-    answers: tuple[Answer, ...]
-    tested: tuple[float, float]
-    """The strongest command of the tests in the negative and in the positive direction."""
-    known: tuple[Coefficient, ...]
+    verdict: Verdict = Verdict("not identified", ())
+    answers: tuple[Answer, ...] = ()
+    tested: tuple[float, float] = (1.0, 1.0)
+    """The strongest command of the tests in the negative and in the positive direction. Answers to stronger ones, and
+    those in a direction that no test has, are extrapolated, and do not count for the verdict."""
+    known: tuple[Coefficient, ...] = ()
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
-    predictions: tuple[Prediction, ...]
+    predictions: tuple[Prediction, ...] = ()
     """Held-out predictions; empty where the axis has only tables or a single short log."""
-    points: tuple[Point, ...]
-    next_test: NextTest | None
+    points: tuple[Point, ...] = ()
+    next_test: NextTest | None = None
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
     structure: float = 0.0
     """The error R of the fit to all data, relative to what noise explains (`search.structure`)."""
+    disturbances: Sequence[Disturbance] = ()
+    effects: Sequence[Effect] = ()
+    slips: Sequence[Slip] = ()
+    """The mistakes in the logs that show the axis."""
+    misfits: Sequence[str] = ()
+    """The logs whose motors are not the thrusters along the axis."""
+    inertia: float = inf
+    """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
+    is_assumed: bool = False
+    """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
+    difference: float = 0.0
+    """How much larger J is at the end of the second start."""
+
+    @property
+    def moving(self) -> list[Prediction]:
+        """The predictions that are judged of quantities that move."""
+        return [p for p in self.predictions if p.is_judged and p.moves]
+
+    @property
+    def worse(self) -> list[Prediction]:
+        """Those that a prediction of no change would be better than."""
+        return [p for p in self.moving if p.is_worse]
+
+    @property
+    def unknown(self) -> list[Disturbance]:
+        """What is unknown: the disturbances without a cause."""
+        return [d for d in self.disturbances if d.kept and not d.cause]
+
+    @property
+    def unusual(self) -> list[Effect]:
+        """The effects of unusual size."""
+        return [effect for effect in self.effects if effect.is_unusual]
 
     @property
     def main(self) -> Prediction | None:

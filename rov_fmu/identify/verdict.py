@@ -1,6 +1,6 @@
 """Whether the model of an axis may be trusted: one table of rules, which the documentation has, too."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from math import inf, isfinite, nan
 
@@ -11,13 +11,8 @@ from rov_fmu.identify.result import (
     LEAST_TESTED,
     MOST_UNKNOWN,
     USUAL,
-    Answer,
+    AxisResult,
     Coefficient,
-    Disturbance,
-    Effect,
-    Point,
-    Prediction,
-    Slip,
     Verdict,
     coverage_of,
     half_width,
@@ -36,67 +31,12 @@ WORDS: tuple[Word, ...] = ("good", "usable", "do not use")
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """All that a verdict about an axis rests on."""
-
-    predictions: Sequence[Prediction] = ()
-    answers: Sequence[Answer] = ()
-    tested: tuple[float, float] = (1.0, 1.0)
-    """The strongest command of the tests in the negative and in the positive direction of the axis. Answers to stronger
-    ones, and those in a direction that no test has, are extrapolated, and do not count."""
-    steady: Sequence[Point] = ()
-    """The steady velocities of the tables of the axis."""
-    disturbances: Sequence[Disturbance] = ()
-    effects: Sequence[Effect] = ()
-    slips: Sequence[Slip] = ()
-    misfits: Sequence[str] = ()
-    """The logs whose motors are not the thrusters along the axis."""
-    structure: float = 0.0
-    """The error R of the fit to all data, relative to what noise explains (`search.structure`)."""
-    inertia: float = inf
-    """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
-    is_assumed: bool = False
-    """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
-    difference: float = 0.0
-    """How much larger J is at the end of the second start."""
-
-    @property
-    def moving(self) -> list[Prediction]:
-        """The predictions that are judged of quantities that move."""
-        return [p for p in self.predictions if p.is_judged and p.moves]
-
-    @property
-    def worse(self) -> list[Prediction]:
-        """Those that a prediction of no change would be better than."""
-        return [p for p in self.moving if p.is_worse]
-
-    @property
-    def unknown(self) -> list[Disturbance]:
-        """What is unknown: the disturbances without a cause."""
-        return [d for d in self.disturbances if d.kept and not d.cause]
-
-    @property
-    def unusual(self) -> list[Effect]:
-        return [effect for effect in self.effects if effect.is_unusual]
-
-    @property
-    def error_of_tables(self) -> float:
-        """The RMS of the relative errors of the steady velocities of the tables that are held out; NaN without any."""
-        return relative_error(self.steady, "held_out")
-
-    def half_width(self, *of: str) -> float:
-        """Return the largest relative half-width of some answers within the tests; NaN without any."""
-        within = [a for a in self.answers if not is_extrapolated(a.command, self.tested)] or self.answers
-        return max((half_width(getattr(a, key)) for a in within for key in of), default=nan)
-
-
-@dataclass(frozen=True)
 class Rule:
-    """What lowers a verdict: a value of the evidence beyond a limit."""
+    """What lowers a verdict: a value of the result beyond a limit."""
 
     of: str
     """What the value is, in words."""
-    value: Callable[[Evidence], float]
+    value: Callable[[AxisResult], float]
     """NaN where nothing can be judged."""
     usable: float | None
     """The limit beyond which a model is at most *usable*."""
@@ -105,7 +45,7 @@ class Rule:
     sentence: str
     """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells. If the
     value is the half-width of an interval, `known` tells how well the number in it is known."""
-    names: Callable[[Evidence], Mapping[str, str]] = lambda _: {}
+    names: Callable[[AxisResult], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
     """True if a value below the limit is beyond it."""
@@ -127,19 +67,30 @@ class Rule:
         return self.of, told[0], told[1]
 
 
-def _largest(e: Evidence) -> dict[str, str]:
+def _largest(e: AxisResult) -> dict[str, str]:
     """Return what the largest unknown disturbance does, and its file."""
     largest = max(e.unknown, key=lambda d: d.share)
     what = acting(largest)
     return {"what": what[:1].upper() + what[1:], "file": largest.file}
 
 
-def _reach(e: Evidence) -> dict[str, str]:
+def _reach(e: AxisResult) -> dict[str, str]:
     """Return how good the predictions are, as the end of a sentence."""
     score = score_of(e.moving)
     if score < 0.0:
         return {"reach": "are worse than no change"}
     return {"reach": f"reach {percent(score)} of the way from no change (0%) to the noise of the sensors (100%)"}
+
+
+def _error_of_tables(e: AxisResult) -> float:
+    """Return the RMS of the relative errors of the steady velocities of tables that are held out; NaN without any."""
+    return relative_error(e.points, "held_out", "V_ss")
+
+
+def _half_width(e: AxisResult, *of: str) -> float:
+    """Return the largest relative half-width of some answers within the tests; NaN without any."""
+    within = [a for a in e.answers if not is_extrapolated(a.command, e.tested)] or e.answers
+    return max((half_width(getattr(a, key)) for a in within for key in of), default=nan)
 
 
 def _known(half_width: float) -> str:
@@ -187,7 +138,7 @@ RULES = (
     ),
     Rule(
         "nothing predicted that moves",
-        lambda e: not e.moving and not isfinite(e.error_of_tables),
+        lambda e: not e.moving and not isfinite(_error_of_tables(e)),
         0.0,
         None,
         "Nothing of this axis was checked on unseen data.",
@@ -219,21 +170,21 @@ RULES = (
     ),
     Rule(
         "half-width of the widest V_ss",
-        lambda e: e.half_width("steady"),
+        lambda e: _half_width(e, "steady"),
         0.15,
         0.3,
         "A steady velocity is {known}.",
     ),
     Rule(
         "the same of times and stopping distances",
-        lambda e: e.half_width("rise", "stop"),
+        lambda e: _half_width(e, "rise", "stop"),
         0.3,
         None,
         "A time or a stopping distance is {known}.",
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
-        lambda e: e.error_of_tables,
+        _error_of_tables,
         0.2,
         0.4,
         "The other commands predict a V_ss of the tables with an error of {share} (RMS).",
@@ -292,7 +243,7 @@ def is_extrapolated(command: float, tested: tuple[float, float]) -> bool:
     return abs(command) > max(strongest, 0.5) or strongest < LEAST_TESTED
 
 
-def verdict(e: Evidence) -> Verdict:
+def verdict(e: AxisResult) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [

@@ -188,7 +188,7 @@ def example() -> Identification:
 def bare() -> Identification:
     """A result of one axis without logs, tables, effects or anything else that a report shows."""
     result = without_findings()
-    axis = AxisResult(SURGE, GOOD, (), (0.0, 0.7), (), (), (), None)
+    axis = AxisResult(SURGE, GOOD, tested=(0.0, 0.7))
     empty: dict[str, Any] = dict.fromkeys(("forces", "effects", "disturbances", "logging", "sensors"), ())
     folder = replace(result.folder, logs=[])
     correlation = (), result.correlation[1][:0, :0]

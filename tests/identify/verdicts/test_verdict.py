@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.identify.result import Effect, Point, Slip, score_of
-from rov_fmu.identify.verdict import RULES, WORDS, Evidence, verdict
+from rov_fmu.identify.result import AxisResult, Effect, Point, Slip, score_of
+from rov_fmu.identify.verdict import RULES, WORDS, verdict
 from tests.report import results
 
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
@@ -90,12 +90,12 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
     ],
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
-    judged = verdict(Evidence(**(USUAL | changes)))
+    judged = verdict(AxisResult(HEAVE, **(USUAL | changes)))
     assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
 
 
 def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
-    judged = verdict(Evidence(**USUAL, misfits=["dive.tlog"]))
+    judged = verdict(AxisResult(HEAVE, **USUAL, misfits=["dive.tlog"]))
     words = "The motors of dive.tlog are not the thrusters of the vehicle."
     assert (judged.word, judged.reasons) == ("do not use", (words, COVERED))
 
@@ -116,7 +116,7 @@ MADE: dict[str, Any] = {
             for a, b in zip(results.answers(1.0, x), results.answers(1.0, 0.02), strict=True)
         ]
     },
-    "held-out V_ss": lambda x: {"steady": [point(x)]},
+    "held-out V_ss": lambda x: {"points": [point(x)]},
     "upper end": lambda x: {"inertia": x},
     "effects of unusual": lambda x: {"effects": [SLOW] * round(x)},
     "slips": lambda x: {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)] * round(x)},
@@ -133,7 +133,9 @@ def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
         if limit is None:
             continue
         step = (0.6 if rule.unit == "1" else 2e-3) * (-1.0 if rule.is_least else 1.0)
-        inside, outside = (verdict(Evidence(**(USUAL | made(x)))).word for x in (limit - 0.01 * step, limit + step))
+        inside, outside = (
+            verdict(AxisResult(HEAVE, **(USUAL | made(x)))).word for x in (limit - 0.01 * step, limit + step)
+        )
         assert outside == word
         assert WORDS.index(inside) < WORDS.index(outside)
 
@@ -153,14 +155,14 @@ def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
 def test_what_nobody_tested_does_not_decide(tested: tuple[float, float], loose: tuple[float, ...], word: str) -> None:
     narrow, wide = results.answers(1.0, 0.02), results.answers(1.0, 0.4)
     some = [w if n.command in loose else n for n, w in zip(narrow, wide, strict=True)]
-    assert verdict(Evidence(**(USUAL | {"answers": some, "tested": tested}))).word == word
+    assert verdict(AxisResult(HEAVE, **(USUAL | {"answers": some, "tested": tested}))).word == word
 
 
 @pytest.mark.parametrize("size", [1.7, 1e20])
 def test_no_reason_has_a_percentage_beyond_0_and_100(size: float) -> None:
     kinds = ("unknown dist", "half-width of the widest V_ss", "the same of times", "held-out V_ss")
     for made in [*(MADE[kind](size) for kind in kinds), MADE["score G"](-size)]:
-        reasons = " ".join(verdict(Evidence(**(USUAL | made))).reasons)
+        reasons = " ".join(verdict(AxisResult(HEAVE, **(USUAL | made))).reasons)
         shares = [float(number) for number in re.findall(r"(-?[\d.]+)%", reasons)]
         assert all(0.0 <= share <= 100.0 for share in shares), reasons
         assert re.search("more than 100%|worse than no change|not known: its interval is wider than its value", reasons)
