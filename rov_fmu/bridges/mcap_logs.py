@@ -77,7 +77,7 @@ def _pose(log: Log) -> tuple[Array, dict[str, Array]]:
         channel = log.used(name)
         if channel is None or not channel.count:
             return np.zeros(len(time))
-        return np.interp(time, channel.samples[0], unwrapped(channel)[channel.there])
+        return np.interp(time, *unwrapped(channel).samples)
 
     psi, theta, phi = (at_times(axis.position) for axis in (YAW, PITCH, ROLL))
     attitude = Rotation.from_euler("ZYX", np.column_stack([psi, theta, phi])).as_quat(scalar_first=True)
@@ -116,7 +116,7 @@ def _prediction(parts: Sequence[Prediction], channel: Channel | None) -> _Series
     if channel:
         left = np.all([(channel.time < p.time[0]) | (channel.time > p.time[-1]) for p in parts], axis=0) & channel.there
         time = np.append(time, channel.time[left])
-        measured = np.append(measured, (unwrapped(channel) if channel.quantity.wraps else channel.values)[left])
+        measured = np.append(measured, unwrapped(channel).values[left])
     ends = _band(predicted, np.concatenate([part.deviation for part in parts]))
     none, order = np.full(len(time) - len(predicted), nan), np.argsort(time, kind="stable")
     columns = {"measured": measured} | {

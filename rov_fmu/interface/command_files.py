@@ -63,7 +63,7 @@ def _of_log(path: Path, layout: Layout, rov_file: RovFile) -> dict[str, Array]:
     inputs = {name: np.array([layout.command_of(fraction) for fraction in column]) for name, column in values.items()}
     voltage = log.used("voltage")
     if "voltage" in layout.inputs and voltage and voltage.count:
-        inputs["voltage"] = held(voltage.time[voltage.there], voltage.values[voltage.there], times)
+        inputs["voltage"] = held(*voltage.samples, times)
     return {TIME: times - times[0], **inputs}
 
 

@@ -18,7 +18,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import Field
@@ -134,11 +134,6 @@ class _Outputs:
         """The number of messages of all outputs."""
         return sum(len(time) for time, _ in self.series.values())
 
-    @property
-    def activity(self) -> float:
-        """How much the outputs change."""
-        return sum(spread(values) for _, values in self.series.values())
-
 
 @dataclass(frozen=True)
 class Function:
@@ -223,11 +218,16 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)
     if not own:
         return Commanded()
-    best = max(own, key=lambda source: sum(spread(values) for _, values in found[source].values()))
+    best = max(own, key=lambda source: _activity(found[source]))
     others = [source.topic for source in own if source is not best]
     left = f"; not used: {listed(others)}" if others else ""
     findings = [about(path.name, "source of wrench", source=best.topic, others=left)]
     return Commanded(found[best], best, topics={source.topic for source in found}, findings=findings)
+
+
+def _activity(series: Mapping[Any, Series]) -> float:
+    """Return how much outputs or forces change."""
+    return sum(spread(values) for _, values in series.values())
 
 
 def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
@@ -294,7 +294,7 @@ def _best(candidates: Sequence[_Outputs], thrusters: int, parameters: Parameters
     """Return the outputs of one vehicle that drive the motors: those that fit best, and change most."""
     same = [outputs for outputs in candidates if outputs.rule is candidates[0].rule]
     module = _motor_module(parameters)
-    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, o.activity))
+    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, _activity(o.series)))
 
 
 def _motor_module(parameters: Parameters) -> str:

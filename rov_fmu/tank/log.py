@@ -121,8 +121,8 @@ class Commands:
         return {name: float(own.max(initial=0.0)) for name, own in zip(self.thrusters, by_thruster, strict=True)}
 
     def relative_to(self, full: Mapping[str, float]) -> "Commands":
-        """Return the commands divided by a full command of each thruster."""
-        each = np.array([full[name] for name in self.thrusters])
+        """Return the commands divided by a full command of each thruster, or by 1 where that is 0."""
+        each = np.array([full[name] or 1.0 for name in self.thrusters])
         return replace(self, value=self.value / each[self.thruster])
 
     def at(self, time: Array) -> Array:

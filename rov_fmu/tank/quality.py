@@ -119,8 +119,8 @@ def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
     return [(float(at[n]), float(at[n + 1])) for n in before]
 
 
-def unwrapped(channel: Channel) -> Array:
-    """Return the values without jumps of a full turn, if they are angles; NaN stays NaN.
+def unwrapped(channel: Channel) -> Channel:
+    """Return a channel whose values have no jumps of a full turn, if they are angles; NaN stays NaN.
 
     An angle is already continuous if it ranges over clearly more than a turn, or if it never jumps by more than half a
     turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is assumed.
@@ -131,13 +131,13 @@ def unwrapped(channel: Channel) -> Array:
     jumps[np.isin(channel.time[there][:-1], [start for start, _ in gaps(channel.time, found)])] = False
     if channel.quantity.wraps and jumps.any() and spread(values) < _TURN:
         found[there] = np.unwrap(values)
-    return found
+    return replace(channel, values=found)
 
 
 def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
     axis, unit = channel.quantity.axis, channel.quantity.unit
-    time, values = replace(channel, values=unwrapped(channel)).samples
+    time, values = unwrapped(channel).samples
     if unit not in ("m", "rad") or not len(places := jumps(time, values)):
         return None
     factor, shown_unit = in_degrees(unit)
@@ -188,7 +188,7 @@ def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Chann
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
     if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
         return None
-    time, values = replace(position, values=unwrapped(position)).samples
+    time, values = unwrapped(position).samples
     at, speeds = velocity.samples
     both = (at >= time[0]) & (at <= time[-1])
     if not spread(speeds[both]):

@@ -46,7 +46,7 @@ def _tank_tests(path: Path) -> Any:
                 recordings[f"{channel.file or log.file} {axis.name} {kind}"] = [
                     len(channel.time),
                     float(channel.time[-1] - log.commands.rows[0]),
-                    float(np.nansum(unwrapped(channel))),
+                    float(np.nansum(unwrapped(channel).values)),
                     0.0 if log.follows_axis else commands,
                     commands if log.follows_axis else None,
                 ]

@@ -399,7 +399,7 @@ def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
     for signal in recording["signals"]:
         channel = used[axes[signal["axis"]], signal["isPosition"]]
         there = channel.there & (log.commands is None or channel.time >= log.commands.rows[0])
-        assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel)[there]), abs=1e-6), log.file
+        assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel).values[there]), abs=1e-6), log.file
 
 
 @pytest.mark.parametrize("name", WRITTEN)

@@ -43,7 +43,7 @@ def used(log: Log, quantity: str) -> Channel:
 def measured(log: Log, quantity: str) -> Array:
     """Return the values that were measured of a quantity; angles are unwrapped."""
     channel = used(log, quantity)
-    return unwrapped(channel)[channel.there]
+    return unwrapped(channel).samples[1]
 
 
 def commanded(log: Log, thruster: str, time: Array | None = None) -> Array:

@@ -19,7 +19,7 @@ def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_n
     values = heading % (2.0 * pi)
     values[50:55] = np.nan
     values += np.radians(2.0) * np.sign(values - pi) * (np.abs(values - pi) > 3.0)
-    found = unwrapped(channel("heading", STEPS, values))
+    found = unwrapped(channel("heading", STEPS, values)).values
     there = np.isfinite(values)
     assert np.isnan(found[~there]).all()
     assert found[there] == pytest.approx(heading[there], abs=np.radians(2.1))
@@ -27,7 +27,7 @@ def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_n
 
 def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() -> None:
     values = np.tile(np.linspace(-3.4, 3.4, 100), 2)
-    assert unwrapped(channel("heading", STEPS, values)).tolist() == values.tolist()
+    assert unwrapped(channel("heading", STEPS, values)).values.tolist() == values.tolist()
 
 
 @pytest.mark.parametrize(

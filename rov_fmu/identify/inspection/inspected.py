@@ -84,7 +84,7 @@ class Inspected:
             return []
         dives = self.dives
         if self.description.layout.has_wrench:
-            dives = [replace(log, commands=c.relative_to(_whole(c.largest))) for log in dives if (c := log.commands)]
+            dives = [replace(log, commands=c.relative_to(c.largest)) for log in dives if (c := log.commands)]
         return [*undetermined(dives, self.description, self.headers.curves)] if dives else []
 
     def draft_for(self, base: Path | None) -> Draft:
@@ -101,10 +101,6 @@ class Inspected:
             )
         text = draft(self.name, self.logs, self.headers, self.likely, asks=False)
         return Draft(text, "" if base else self.likely.reason)
-
-
-def _whole(largest: dict[str, float]) -> dict[str, float]:
-    return {name: most or 1.0 for name, most in largest.items()}
 
 
 @one_parser()

@@ -7,6 +7,7 @@ which keeps what they tell and bounds the time of a fit.
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import cos, inf, sin
+from typing import Any
 
 import numpy as np
 
@@ -88,11 +89,14 @@ class SampledLog:
         """How far ahead positions are predicted, s, and velocities, too, if commands are lost between rows."""
         return _ROWS_AHEAD * self.interval if self.lost else AHEAD
 
+    def _with_rows(self, **columns: Any) -> "SampledLog":
+        """Return the log with other columns of its rows."""
+        return replace(self, record=replace(self.record, **columns), thinned=replace(self.thinned, **columns))
+
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
         assert not self.is_momentary
-        record, thinned = (replace(some, inputs=inputs) for some in (self.record, self.thinned))
-        return replace(self, record=record, thinned=thinned)
+        return self._with_rows(inputs=inputs)
 
     @property
     def jump(self) -> float | None:
@@ -141,7 +145,7 @@ class SampledLog:
         made = {"told": later, "since": earlier, "inputs": self.record.inputs[rows]}
         if self.record.beside is not None:
             made["beside"] = self.record.beside[rows]
-        return replace(self, record=replace(self.record, **made), thinned=replace(self.thinned, **made))
+        return self._with_rows(**made)
 
     @property
     def has_positions(self) -> bool:
@@ -175,8 +179,7 @@ class SampledLog:
             ends = np.pad(np.diff(thrust, 2), 1, mode="edge") if len(thrust) > 2 else np.zeros(len(thrust))
             after = np.append(ends[1:], 0.0)
             found.append(np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2))
-        record, thinned = (replace(some, beside=np.array(found).T) for some in (self.record, self.thinned))
-        return replace(self, is_momentary=True, record=record, thinned=thinned)
+        return replace(self._with_rows(beside=np.array(found).T), is_momentary=True)
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:
@@ -283,7 +286,7 @@ def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
         if channel.unused or axis is None or axis.name not in layout.by_name or (log.axis and axis is not log.axis):
             continue
         inside = channel.there & (channel.time >= begin) & (channel.time <= end)
-        yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel)[inside])
+        yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel).values[inside])
 
 
 def _why_left_out(channel: Channel) -> str:
@@ -386,7 +389,7 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
     since = np.minimum(commands.since[first], told)
     voltage = log.used("voltage") if layout.voltage is not None else None
     if voltage:
-        time, value = voltage.time[voltage.there], voltage.values[voltage.there]
+        time, value = voltage.samples
         kept = [0]
         for n, v in enumerate(value):
             if abs(v - value[kept[-1]]) > _LEAST_CHANGE * abs(value[kept[-1]]):
@@ -417,11 +420,10 @@ def _tilt(log: Log, layout: Layout) -> Array:
     roll, pitch = log.used("roll angle"), log.used("pitch angle")
     if log.follows_axis or layout.has_attitude or roll is None or pitch is None:
         return np.zeros((3, 0))
-    time, first = np.unique(pitch.time[pitch.there], return_index=True)
-    if len(time) < LEAST_SAMPLES or roll.there.sum() < LEAST_SAMPLES:
+    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in (roll, pitch))
+    if min(len(times), len(time)) < LEAST_SAMPLES:
         return np.zeros((3, 0))
-    values = np.interp(time, roll.time[roll.there], unwrapped(roll)[roll.there])
-    return np.array([time, values, unwrapped(pitch)[pitch.there][first]])
+    return np.array([time, np.interp(time, times, rolls), pitches])
 
 
 def _start(

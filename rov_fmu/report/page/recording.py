@@ -99,7 +99,7 @@ def _signals(log: Log, axes: tuple[VehicleAxis, ...], start: float, end: float) 
             if np.count_nonzero(is_meant) < 2:
                 continue
             stride = -(-np.count_nonzero(is_meant) // _MOST_SAMPLES)
-            values = unwrapped(channel) if channel.quantity.wraps else channel.values
+            values = unwrapped(channel).values
             yield {
                 "axis": n,
                 "quantity": channel.quantity.name,

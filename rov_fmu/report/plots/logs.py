@@ -76,8 +76,7 @@ def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:
 
 def _draw_channel(ax: Axes, channel: Channel) -> None:
     factor, unit = in_degrees(channel.quantity.unit)
-    whole = unwrapped(channel)
-    time, values = channel.time[channel.there], whole[channel.there]
+    time, values = unwrapped(channel).samples
     some = slice(None, None, max(1, len(time) // (5 * MOST_SAMPLES)))
     time, values = time[some], factor * values[some]
     breaks = np.searchsorted(time, [start for start, _ in gaps(channel.time, channel.values)], side="right")

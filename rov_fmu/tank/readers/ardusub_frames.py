@@ -114,7 +114,7 @@ def misfits(
     `without_pulse` has the names of thrusters, `extra` the motors of the log for which there is no thruster, by words
     about them, and `config` is the FRAME_CONFIG of the log, or None.
     """
-    frame = [*FRAMES][int(config)] if config is not None and 0.0 <= config < len(FRAMES) else ""
+    frame = frame_of(config)
     motors = FRAMES.get(frame, ())
     fits = fitting_frames(layout)
     if frame in fits:
