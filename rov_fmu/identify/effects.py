@@ -10,7 +10,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
-from rov_fmu.identify.likelihood.posterior import QUANTILE, around
+from rov_fmu.identify.likelihood.posterior import around
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
@@ -27,10 +27,8 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if not p.is_effect:
             continue
         posterior, kind = fit.posterior if n in file.absent else file, p.of_kind
-        value = p.offset + p.factor * float(posterior.z[n])
-        low, high = around(value, p.factor * max(posterior.errors[n], kind.finest / QUANTILE))
-        if kind.is_ratio or p.is_log:
-            value, low, high = np.exp([value, low, high]).tolist()
+        numbers = p.number(posterior.ends(n))
+        value, low, high = (np.exp(numbers) if kind.is_ratio else numbers).tolist()
         name = kind.words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
@@ -44,9 +42,7 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         structure, place = _named(fit, one.variant, one.odds), posterior.table.place(*one.variant.parameter)
         if place is not None:
             p = posterior.table.parameters[place]
-            low, high = around(float(posterior.z[place]), posterior.errors[place])
-            ends = np.clip([posterior.z[place], low, high], p.low, p.high)
-            value, low, high = (np.exp(ends) if p.is_log else ends).tolist()
+            value, low, high = p.number(np.clip(posterior.ends(place), p.low, p.high)).tolist()
             structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
         yield structure
     if files := tuple(one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)):
@@ -64,7 +60,8 @@ def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
     place = fit.posterior.table.place(WIDTH, one.log.file)
     if one.is_momentary or place is None:
         return False
-    return around(float(fit.posterior.z[place]), fit.posterior.errors[place])[0] > MOST_OF_ROW
+    _, low, _ = fit.posterior.ends(place)
+    return bool(low > MOST_OF_ROW)
 
 
 def _shortest(fit: Fit, p: Parameter) -> float:

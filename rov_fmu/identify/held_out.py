@@ -219,8 +219,7 @@ def _usual_noise(objective: Objective, z: Array) -> Array:
 
     The noise of a fit is too small for it: the filter would explain its errors by a thrust that fades to 0.
     """
-    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
-    return np.where(of_motion, z, objective.mean)
+    return np.where(objective.table.each("of_motion"), z, objective.mean)
 
 
 def ahead(

@@ -58,7 +58,11 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     rov = Vehicle(layout, {name: values.get(name, tests.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in tests.known.items() if name in layout.coefficients}
     changed = _changed(file, rov)
-    coefficients = {one.name: one for one in _coefficients(fit, rov, changed)}
+    # A file without a dead band has an exact one of 0.
+    bands = [name for name, (*_, key) in fit.known.layout.keys_in_file.items() if key in _DEAD_BAND]
+    every = [*dict.fromkeys((*changed, *bands))]
+    numbers = [_numbers(posterior, fit, every) for posterior in fit.posteriors] if changed else []
+    coefficients = {one.name: one for one in _coefficients(fit, rov, changed, numbers)}
     forms = (form for form in layout.axes if form.axis in fit.known.unseen)
     unseen = {form.coefficient(key) for form in forms for key in (*form.keys, "beta")}
     identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
@@ -85,26 +89,21 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         if name not in {*names, *unseen}:
             sources[name] = "Assumed: the tests do not determine it"
     if names:
-        held = [  # a file without a dead band has an exact one of 0
-            name
-            for name, (*_, key) in fit.known.layout.keys_in_file.items()
-            if name not in {*names, *unseen} and (name in changed or key in _DEAD_BAND)
-        ]
-        of_file, full = (_numbers(posterior, fit, [*names, *held]) for posterior in fit.posteriors)
+        held = [name for name in every if name not in {*names, *unseen}]
+        places = [every.index(name) for name in (*names, *held)]
+        of_file, full = numbers
         shift = full.values - of_file.values
-        covariance = _given_the_last(full.covariance + np.outer(shift, shift), len(names))
+        whole = full.covariance + np.outer(shift, shift)
+        covariance = _given_the_last(whole[np.ix_(places, places)], len(names))
         errors = np.sqrt(np.diag(covariance))
         for n, name in enumerate(names):
-            intervals[name] = identified.get(name) or _interval(rov, name, n, (of_file, full))
+            intervals[name] = identified.get(name) or _interval(rov, name, places[n], numbers)
             others = {
                 other: float(np.clip(covariance[n, m] / (errors[n] * errors[m]), -1.0, 1.0))
                 for m, other in enumerate(names[:n])
                 if errors[n] * errors[m] > 0.0
             }
-            estimates[name] = Estimated(
-                error=float(errors[n]) * QUANTILE / NORMAL,
-                correlation=others,
-            )
+            estimates[name] = Estimated(error=float(errors[n]) * QUANTILE / NORMAL, correlation=others)
     validity = tests.description.tables.validity
     made = Provenance(
         tool=f"rov-fmu {__version__} identify", method=METHOD, hash="SHA3-256", inputs=dict(tests.folder.inputs)
@@ -321,11 +320,13 @@ def _data(fit: Fit) -> str:
     return " and ".join(parts) or "given values"
 
 
-def _coefficients(fit: Fit, vehicle: Vehicle, changed: Sequence[str]) -> Iterator[Coefficient]:
-    """Yield the coefficients that the fit changes, with intervals where the tests determine them."""
-    if not changed:
-        return
-    numbers = [_numbers(posterior, fit, changed) for posterior in fit.posteriors]
+def _coefficients(
+    fit: Fit, vehicle: Vehicle, changed: Sequence[str], numbers: Sequence[_Numbers]
+) -> Iterator[Coefficient]:
+    """Yield the coefficients that the fit changes, with intervals where the tests determine them.
+
+    They come first among the `numbers` by the posteriors.
+    """
     began = _in_file(fit.posterior, fit, np.array([p.mean for p in fit.posterior.table.parameters]))
     for n, name in enumerate(changed):
         error, before = (float(np.sqrt(C[n, n])) for C in (numbers[-1].covariance, numbers[-1].prior))

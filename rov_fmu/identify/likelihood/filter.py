@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +18,7 @@ from rov_fmu.c.library import load_library
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.kinds import Action
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -200,7 +200,7 @@ class Filter:
         self.noise = self.drift + len(DRIFTS)
         """The places of the slow processes among the states of the filter."""
 
-    def places_of(self, slow: Literal["force", "gain", "velocity"], axis: str) -> list[int]:
+    def places_of(self, slow: Action, axis: str) -> list[int]:
         """Return the places of a slow process among the states of the filter; none where the vehicle lacks its axis.
 
         A velocity along no axis is the horizontal one.

@@ -210,8 +210,7 @@ def _search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
 
 def start_of(objective: Objective, number: int = 0) -> Array:
     """Return the coordinates at which a start begins."""
-    above = np.array([parameter.of_kind.starts[number] for parameter in objective.table.parameters])
-    return np.asarray(objective.mean + objective.deviation * above)
+    return np.asarray(objective.mean + objective.deviation * objective.table.each("of_kind.starts")[:, number])
 
 
 def _is_loud(table: Table, z: Array) -> bool:

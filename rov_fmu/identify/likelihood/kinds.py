@@ -38,17 +38,20 @@ class Deviation:
     reason: str
 
 
+Action = Literal["force", "gain", "velocity"]
+"""A force along an axis, told relative to the thrust along it; a gain of all thrust; or a velocity over ground, told
+relative to that of the vehicle."""
+
+
 @dataclass(frozen=True)
 class Process:
     """A slow process."""
 
     time_constant: float
-    """s."""
+    """s, fixed."""
     title: str
     """Its name in a table."""
-    acts_as: Literal["force", "gain", "velocity"]
-    """A force along an axis, told relative to the thrust along it; a gain of all thrust; or a velocity of the water or
-    of the ground, told relative to that of the vehicle."""
+    acts_as: Action
     sentence: str
     """What it does, with `unknown` (`an unknown` or, with a cause, `a`), `push` (`force` or `torque`), its `size`, and
     the `share` of the `thrust` (or `torque`) that this is."""

@@ -138,10 +138,6 @@ class Data:
         keys = ("innovations", "variances", "slopes", "log_slopes")
         return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
 
-    def at(self, innovations: Array, variances: Array) -> "Data":
-        """Return other innovations with the same derivatives."""
-        return replace(self, innovations=innovations, variances=variances)
-
     @property
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
@@ -156,6 +152,11 @@ class Data:
         gradient[self.places] = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
         information[np.ix_(self.places, self.places)] = 2.0 * (A.T * weight) @ A + B.T @ B
         return gradient, information
+
+
+def with_samples(data: Iterable[Data], samples: Iterable[Samples]) -> list[Data]:
+    """Return other samples with the same derivatives."""
+    return [replace(one, innovations=off, variances=S) for one, (off, S) in zip(data, samples, strict=True)]
 
 
 def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
@@ -215,9 +216,7 @@ class Objective:
         steps = _QUICK_STEPS if thinned else {}
         filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
         self.filters = [filters[one.layout] for one in logs]
-        p = table.parameters
-        self.mean, self.deviation = (np.array([getattr(one, key) for one in p]) for key in ("mean", "deviation"))
-        self.low, self.high = (np.array([getattr(one, key) for one in p]) for key in ("low", "high"))
+        self.mean, self.deviation, self.low, self.high = map(table.each, ("mean", "deviation", "low", "high"))
         self.whole = Part(range(len(logs)), range(len(rows)))
 
     def of(self, part: Part) -> "Objective":
@@ -350,17 +349,16 @@ class Objective:
         self,
         z: Array,
         runs: Sequence[Run],
-        earlier: Sequence[Data] | None = None,
         *,
-        with_noise: bool = True,
         exact: bool = True,
+        of_noise: Sequence[Data] = (),
     ) -> list[Data]:
         """Return the innovations with their derivatives, for each log and then for the rows of tables, if any.
 
-        Exact ones are differences to both sides, and the others, which guide the steps of a fit, to one side. Without
-        derivatives with respect to the noise, those of earlier data are returned, or 0. All contain the changes of the
-        gains of the filter. Without these, the common scale of all forces, which the motion does not tell, would look
-        determined, and where the model does not explain a log, half of a gradient would have the wrong sign.
+        Exact ones are differences to both sides, and the others, which guide the steps of a fit, to one side. Those
+        with respect to the noise are of earlier data, if these are given. All contain the changes of the gains of the
+        filter. Without these, the common scale of all forces, which the motion does not tell, would look determined,
+        and where the model does not explain a log, half of a gradient would have the wrong sign.
         """
         parameters = self.table.parameters
         found, work = [], list[Callable[[], None]]()
@@ -369,11 +367,11 @@ class Objective:
             found.append(Data.of(run, places, len(z)))
             columns = []
             for column, k in enumerate(places):
-                if with_noise or parameters[k].of_motion:
+                if parameters[k].of_motion or not of_noise:
                     columns.append(column)
-                elif earlier:
-                    found[n].slopes[:, column] = earlier[n].slopes[:, column]
-                    found[n].log_slopes[:, column] = earlier[n].log_slopes[:, column]
+                else:
+                    found[n].slopes[:, column] = of_noise[n].slopes[:, column]
+                    found[n].log_slopes[:, column] = of_noise[n].log_slopes[:, column]
             for first in range(0, len(columns), _TOGETHER):
                 some = columns[first : first + _TOGETHER]
                 work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
@@ -390,7 +388,7 @@ class Objective:
         run: Run,
         into: Data,
         *,
-        exact: bool = True,
+        exact: bool,
     ) -> None:
         """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 

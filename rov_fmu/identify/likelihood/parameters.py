@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
 from math import log
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -120,6 +121,10 @@ class Table:
     shape_deviation: float = PRIORS["thrust_shape"].deviation
     exact: frozenset[str] = frozenset()
     """The names of the coefficients that no parameter changes."""
+
+    def each(self, key: str) -> np.ndarray:
+        """Return a number of each parameter, such as its `mean`, or `of_kind.is_size`."""
+        return np.array([*map(attrgetter(key), self.parameters)])
 
     def place(self, kind: str, of: str = "", part: str = "") -> int | None:
         """Return the index of a parameter, or None."""
@@ -326,12 +331,12 @@ def _followed(one: SampledLog, limit: float, slew: float) -> Array:
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
     shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
-    parameters = tuple(_parameters(known, logs, row_noises))
+    parameters = tuple(p for p in _parameters(known, logs, row_noises) if p.deviation > 0.0)
     return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact)
 
 
-Make = Callable[..., Iterator[Parameter]]
-"""A function that yields a parameter of a kind, unless its prior is exact."""
+Make = Callable[..., Parameter]
+"""A function that returns a parameter of a kind. One whose prior is exact has the deviation 0, and is left out."""
 
 
 def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Iterator[Parameter]:
@@ -340,26 +345,23 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
         is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
-    def make(
-        kind: str, of: str = "", part: str = "", deviation: float | None = None, **own: Any
-    ) -> Iterator[Parameter]:
+    def make(kind: str, of: str = "", part: str = "", deviation: float | None = None, **own: Any) -> Parameter:
         usual = {one.name: getattr(KINDS[kind], one.name) for one in fields(Coordinate)} | own
         if deviation is None:
             deviation = prior(declared.key) if (declared := KINDS[kind].prior) else usual["deviation"]
-        if deviation > 0.0:
-            yield Parameter(kind, of, part, **usual | {"deviation": deviation})
+        return Parameter(kind, of, part, **usual | {"deviation": deviation})
 
     if logs or known.has_times:
         T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
         width = prior("lag")
-        yield from make(LAG, deviation=width and max(width, T), mean=T) if known.with_lag else make(LAG)
+        yield make(LAG, deviation=width and max(width, T), mean=T) if known.with_lag else make(LAG)
     if logs:
         for part, key in CENTRE.items():
             if key in {*known.layout.restoring} - known.exact:
-                yield from make("centre of buoyancy", "", part, offset=known.coefficients[key], sets=(key,))
-        yield from make("dead time")
+                yield make("centre of buoyancy", "", part, offset=known.coefficients[key], sets=(key,))
+        yield make("dead time")
         if any("n_V" in c.keys for c in known.curves):
-            yield from make("voltage", sets=_set(known, "voltage", known.layout.curves))
+            yield make("voltage", sets=_set(known, "voltage", known.layout.curves))
         yield from _of_sensors(logs, make)
     yield from _of_curves(known, make, prior("thrust_shape"))
     yield from _advance(known, make)
@@ -368,32 +370,31 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
         yield from _of_one_log(one, number, make)
     yield from _of_noise(known, logs, make)
     for kind, of in known.assumed:
-        yield from make(kind, of, sets=_set(known, kind, [t for t in known.layout.thrusters if t.name == of]))
+        yield make(kind, of, sets=_set(known, kind, [t for t in known.layout.thrusters if t.name == of]))
     for name in row_noises:
-        yield from make("row noise", name)
+        yield make("row noise", name)
 
 
 def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
     for curve in known.curves:
         name = curve.name
         is_measured = name in known.measured_curves
-        yield from make("thrust scale", name, deviation=1.0 if is_measured else known.thrust_errors.get(name))
+        yield make("thrust scale", name, deviation=1.0 if is_measured else known.thrust_errors.get(name))
         if curve.tables:
             continue
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
-            shapes = [one for n in range(COUNT) for one in make("thrust shape", name, str(n + 1), deviation=1.0)]
+            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0) for n in range(COUNT)]
             linear = [
-                one
-                for end in (("", REVERSE) if is_told_astern else ("",))
-                for one in make(
+                make(
                     "linear thrust",
                     name,
                     "astern" if end else "",
                     low=_least_linear(curve, known.coefficients, end),
                     deviation=_LINEAR if is_measured else None,
                 )
+                for end in (("", REVERSE) if is_told_astern else ("",))
             ]
             bends = name in known.bent
             yield from shapes if bends else map(_held, shapes)
@@ -401,20 +402,20 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
         if has_reverse:
             # Forces that were measured astern are data, and not an effect that may be absent.
             null = {"null": None} if is_told_astern else {}
-            yield from make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
+            yield make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
         if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
             band = curve.coefficient("c_0")
-            yield from make("dead band", name, mean=known.coefficients[band], sets=_set(known, "dead band", [curve]))
+            yield make("dead band", name, mean=known.coefficients[band], sets=_set(known, "dead band", [curve]))
             astern = curve.coefficient(f"c_0{REVERSE}")
             if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
-                yield from make("dead band astern", name)
+                yield make("dead band astern", name)
 
 
 def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
     for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
-            yield from make("advance", curve.name, mean=_lost(curve, known.coefficients))
+            yield make("advance", curve.name, mean=_lost(curve, known.coefficients))
 
 
 def _lost(curve: Curve, c: Mapping[str, float]) -> float:
@@ -441,7 +442,7 @@ def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
         form = known.layout.by_name[axis.name]
         for name, kind in KINDS.items():
             if (own := kind.of_axis(known, form)) is not None:
-                yield from make(name, axis.name, sets=_set(known, name, [form]), **own)
+                yield make(name, axis.name, sets=_set(known, name, [form]), **own)
 
 
 def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str, ...]:
@@ -453,15 +454,12 @@ def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str
 
 def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
     file, half = one.log.file, 0.5 * one.interval
-    if one.is_momentary:
-        yield from make(OFFSET, file, mean=-half, deviation=max(0.5 * half, 0.005), log=number)
-        yield from make(WIDTH, file, mean=1.0, low=1.0, log=number)
-    else:
-        yield from make(OFFSET, file, mean=-half, deviation=max(half, 0.005), log=number)
-        yield from make(WIDTH, file, log=number)
+    share, width = (0.5, {"mean": 1.0, "low": 1.0}) if one.is_momentary else (1.0, {})
+    yield make(OFFSET, file, mean=-half, deviation=max(share * half, 0.005), log=number)
+    yield make(WIDTH, file, log=number, **width)
     if one.has_positions or one.has_velocities:
         for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
-            yield from make("current", file, part, log=number)
+            yield make("current", file, part, log=number)
 
 
 def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
@@ -474,24 +472,24 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
             if form.axis.is_rotation and any(s.is_velocity == is_velocity and has_place(s) for s in one.record.sensors)
         }
         for part in _PLACES if turns - {YAW} else _PLACES[:2] if turns else ():
-            yield from make(kind, "", part)
+            yield make(kind, "", part)
     for part in sorted({with_same_lag(sensor) for one in logs for sensor in one.record.sensors}):
-        yield from make("sensor lag", "", part)
+        yield make("sensor lag", "", part)
 
 
 def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     moving = {form.axis.name for one in logs for form in one.layout.axes}
     for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
-            yield from make("slow force", axis.name)
+            yield make("slow force", axis.name)
             if any(one.is_momentary and axis.name in one.layout.by_name for one in logs):
-                yield from make("short force", axis.name)
+                yield make("short force", axis.name)
     if logs and not known.layout.fins:
-        yield from make("slow gain")
+        yield make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
-        yield from make("slow velocity", HEAVE.name)
+        yield make("slow velocity", HEAVE.name)
     if any(one.has_positions or one.has_velocities for one in logs):
-        yield from make("slow velocity", HORIZONTAL)
+        yield make("slow velocity", HORIZONTAL)
     noises: dict[str, list[float]] = {}
     for one in logs:
         for m in one.measured:
@@ -499,6 +497,6 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():
         mean = log(sorted(some)[len(some) // 2])
-        yield from make(WHITE, quantity, mean=mean, low=mean - quieter)
-        yield from make("coloured noise", quantity)
-        yield from make("correlation time", quantity)
+        yield make(WHITE, quantity, mean=mean, low=mean - quieter)
+        yield make("coloured noise", quantity)
+        yield make("correlation time", quantity)

@@ -78,7 +78,7 @@ class Posterior:
         factors = np.sqrt(1.0 + np.where(errors > USUAL, _ALIKE * (errors**2 - 1.0), 0.0))
         if np.all(factors == 1.0):
             return self
-        prior = np.diag(1.0 / np.array([p.deviation for p in parameters]) ** 2)
+        prior = np.diag(1.0 / self.table.each("deviation") ** 2)
         free = np.ix_(*[[n for n in range(len(parameters)) if n not in self.absent]] * 2)
         data = np.zeros_like(prior)
         data[free] = np.linalg.inv(self.covariance[free]) - prior[free]
@@ -89,11 +89,19 @@ class Posterior:
         """The standard errors of the coordinates."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
+    def error(self, place: int) -> float:
+        """Return the standard error of a coordinate, which is never less than its kind says."""
+        return max(float(self.errors[place]), self.table.parameters[place].of_kind.finest / QUANTILE)
+
+    def ends(self, place: int) -> Array:
+        """Return a coordinate and the two ends of its 95 % interval."""
+        z = float(self.z[place])
+        return np.array([z, *around(z, self.error(place))])
+
     def evidence(self, place: int) -> float:
         """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent."""
-        p = self.table.parameters[place]
+        p, error = self.table.parameters[place], self.error(place)
         assert p.null is not None
-        error = max(self.errors[place], p.of_kind.finest / QUANTILE)
         after, before = ((self.z[place] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
         return float(after - before + 2.0 * log(error / p.deviation))
 
@@ -120,7 +128,7 @@ class Posterior:
         The function returns m x n numbers for p x n coordinates.
         """
         G = self.slopes(values)
-        prior = np.array([p.deviation**2 for p in self.table.parameters])
+        prior = self.table.each("deviation") ** 2
         return values(self.z[:, None])[:, 0], G @ self.covariance @ G.T, (G * prior) @ G.T
 
 

@@ -21,14 +21,14 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
-from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost
+from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
-from rov_fmu.tank.clocks import first_in_each
+from rov_fmu.tank.clocks import first_in_each, held
 from rov_fmu.vehicle.vehicle import Vehicle
 
 WINS, CLOSE = 6.0, 10.0
@@ -209,11 +209,11 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
 
 def _thrust(vehicle: Vehicle, one: SampledLog, time: Array) -> Array:
     """Return the thrust along each axis of a log at some times: n x axes."""
-    rows = np.maximum(np.searchsorted(one.record.told, time, side="right") - 1, 0)
+    inputs = held(one.record.told, one.record.inputs, time)
     found, names = np.zeros((len(time), len(one.layout.axes))), [*one.layout.inputs]
     for t in one.layout.thrusters:
         curve = one.layout.curve_of[t.name]
-        commands = one.record.inputs[rows, names.index(f"u_{t.name}")]
+        commands = inputs[:, names.index(f"u_{t.name}")]
         forces = vehicle[one.layout.health[t.name]] * NO_SHAPES.forces(vehicle, curve, commands) / curve.n_thrusters
         found += np.outer(forces, [vehicle.effect(t, form.axis) for form in one.layout.axes])
     return found
@@ -250,7 +250,7 @@ class Comparison:
         runs = objective.runs(z)
         if not self.data:
             return objective.value(z, runs)
-        data = [old.at(*some) for old, some in zip(self.data, objective.samples(z, runs), strict=True)]
+        data = with_samples(self.data, objective.samples(z, runs))
         gradient, information = total(self.objective, self.z, data)
         free, end = self.free, self.z.copy()
         most = _FARTHEST * self.objective.deviation[free]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
-from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples
+from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples, with_samples
 from rov_fmu.tank.arrays import Array
 
 Chosen = NDArray[np.bool_]
@@ -73,7 +73,7 @@ def minimise(
         on_step(count)
         try:
             if near and count == 1:
-                data = [old.at(*some) for old, some in zip(near, objective.samples(z, runs), strict=True)]
+                data = with_samples(near, objective.samples(z, runs))
             else:
                 data = objective.data(now.z, now.runs, exact=stalled > 0)
             information = total(objective, now.z, data)[1]
@@ -101,7 +101,7 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
     Each step is the best of some that are damped differently, which run in the lanes of the filter together.
     """
     now = start
-    of_motion = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    of_motion = objective.table.each("of_motion")
     for count in range(_WITH_SAME):
         free = of_motion if count == 0 else np.ones(len(now.z), bool)
         gradient, information = total(objective, now.z, now.data)
@@ -116,7 +116,7 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
         if not gain > 0.0:
             continue
         runs = [replace(run, innovations=off, variances=S) for run, (off, S) in zip(now.runs, samples, strict=False)]
-        data = [old.at(*some) for old, some in zip(now.data, samples, strict=True)]
+        data = with_samples(now.data, samples)
         now = Minimum(moved[least], value, runs, data, information)
         if count > 0 and gain < _SLOW * (start.value - value):
             break
@@ -139,7 +139,7 @@ def refits(
     together, so that the lanes of the filter are full. The derivatives are those at the minimum for all data, which are
     exact, as long as a fit is near it, and always if it is without effects. A fit to most of the data needs two steps.
     """
-    free = np.array([parameter.of_motion for parameter in objective.table.parameters])
+    free = objective.table.each("of_motion")
     fits = [
         _Refit(objective.of(part).without(gone), part, best, is_inside=not gone)
         for part, gone in zip(parts, absent or [()] * len(parts), strict=True)
@@ -181,11 +181,11 @@ class _Refit:
             self.damping = max(8.0 * self.damping, 1.0)
             return
         gain, self.z, self.value, self.damping = self.value - value, self.moved, value, self.damping / 8.0
-        self.data = [old.at(*some) for old, some in zip(self.data, samples, strict=True)]
+        self.data = with_samples(self.data, samples)
         if self.is_inside and _REFIT_FAR < gain < np.inf:
             with suppress(DivergedError):
                 self.runs = self.objective.runs(self.z, self.runs)
-                self.data = self.objective.data(self.z, self.runs, self.data, with_noise=False, exact=False)
+                self.data = self.objective.data(self.z, self.runs, exact=False, of_noise=self.data)
 
 
 def _data_of(part: Part, best: Minimum) -> list[Data]:
@@ -239,7 +239,7 @@ def _size_curvature(data: float, prior: float, prior_slope: float) -> float:
 def _step(objective: Objective, z: Array, gradient: Array, information: Array, free: Chosen, damping: float) -> Array:
     """Return the end of a damped step. What would leave its bounds stays at them, and the others move on without it."""
     weight, moving = 2.0 / objective.deviation**2, free.copy()
-    is_size = np.array([parameter.of_kind.is_size for parameter in objective.table.parameters])
+    is_size = objective.table.each("of_kind.is_size")
     change = np.clip(z, objective.low, objective.high) - z  # an effect that becomes absent is beyond
     moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0)) & (change == 0.0)
     for _ in range(len(z)):
@@ -273,8 +273,8 @@ def scaled(objective: Objective, z: Array) -> Array:
     Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    direction = np.array([p.of_kind.force_power for p in objective.table.parameters])
-    loads = np.array([not p.is_log for p in objective.table.parameters]) & (direction != 0.0)
+    direction = objective.table.each("of_kind.force_power")
+    loads = ~objective.table.each("is_log") & (direction != 0.0)
     no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
     direction[loads] = (z - no_load)[loads]
     if not direction.any():

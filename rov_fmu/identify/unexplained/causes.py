@@ -15,8 +15,8 @@ from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.filter import Run
 from rov_fmu.identify.likelihood.kinds import Process
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.clocks import first_in_each
+from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.clocks import first_in_each, held
 
 ENOUGH, AHEAD = 10.0, 6.0
 """A cause is named if 2 ln of its Bayes factor exceeds that of no cause by so much, and that of the next one."""
@@ -76,8 +76,8 @@ def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, ax
     causes = {"the time": time - time[0]}
     for quantity, words in _CHANNELS.items():
         channel = one.log.used(quantity)
-        if channel is not None and channel.count > 2 and np.ptp(channel.values[channel.there]) > 0.0:
-            causes[words] = at(channel.time[channel.there], channel.values[channel.there])
+        if channel and channel.count > 2 and spread(channel.values):
+            causes[words] = at(*channel.samples)
     thrust = thrust_along(objective, z, number, time, axis)
     if axis is None:
         causes["the command"] = np.abs(thrust)
@@ -94,8 +94,7 @@ def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, ax
 def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis: Axis | None) -> Array:
     """Return the thrust along an axis that the model commands, N or N m; without an axis, the largest command."""
     one, record = objective.logs[number], objective.records[number]
-    rows = np.maximum(np.searchsorted(record.told, time, side="right") - 1, 0)
-    inputs = record.inputs[rows]
+    inputs = held(record.told, record.inputs, time)
     names = [*one.layout.inputs]
     if axis is None:
         thrusters = [names.index(f"u_{thruster.name}") for thruster in one.layout.thrusters]

@@ -223,7 +223,7 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
     for n, m in enumerate(one.measured):
         at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
         channel = next(c for c in one.log.channels if not c.unused and (c.quantity, c.source) == used)
-        time, raw = channel.time[channel.there], channel.values[channel.there]
+        time, raw = channel.samples
         likenesses = {}
         for scale in (1.0, -1.0, *(_ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS)):
             values = np.unwrap(raw / scale) if channel.quantity.wraps else raw / scale
