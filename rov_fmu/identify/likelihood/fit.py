@@ -32,6 +32,7 @@ from rov_fmu.identify.result import KEPT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import COMMAND
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
@@ -95,10 +96,8 @@ class Fit:
         signs = self.known.layout.signs(axis)
         for log in (one.log for one in self.objective.logs):
             assert log.commands
-            if log.follows_axis:
-                weights = np.array([float(log.axis is axis)])
-            else:
-                weights = np.array([signs.get(f"u_{name}", 0.0) for name in log.commands.thrusters])
+            own = {f"u_{COMMAND}": float(log.axis is axis)} if log.follows_axis else signs
+            weights = np.array([own.get(f"u_{name}", 0.0) for name in log.commands.thrusters])
             used.append(log.commands.at(log.commands.rows) @ weights / max(np.abs(weights).sum(), 1.0))
         every = np.concatenate(used)
         return float(-every.min(initial=0.0)), float(every.max(initial=0.0))

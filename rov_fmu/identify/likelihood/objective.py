@@ -32,6 +32,7 @@ from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -83,10 +84,7 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
     A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
     """
     found: dict[int, Array] = {}
-    of: dict[Curve | Axis, list[int]] = {}
-    for n, row in enumerate(rows):
-        of.setdefault(row.subject, []).append(n)
-    for subject, places in of.items():
+    for subject, places in grouped((row.subject, n) for n, row in enumerate(rows)).items():
         commands = np.array([rows[n].command for n in places])
         if isinstance(subject, Curve):
             found |= zip(places, shapes.forces(vehicle, subject, commands), strict=True)

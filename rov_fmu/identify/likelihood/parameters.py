@@ -31,6 +31,7 @@ from rov_fmu.identify.likelihood.kinds import (
 )
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -490,10 +491,7 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
         yield make("slow velocity", HEAVE.name)
     if any(one.has_positions or one.has_velocities for one in logs):
         yield make("slow velocity", HORIZONTAL)
-    noises: dict[str, list[float]] = {}
-    for one in logs:
-        for m in one.measured:
-            noises.setdefault(m.channel.quantity.name, []).append(m.noise)
+    noises = grouped((m.channel.quantity.name, m.noise) for one in logs for m in one.measured)
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():
         mean = log(sorted(some)[len(some) // 2])
