@@ -385,7 +385,8 @@ def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterato
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
     for one in (one for one in logs if axis.name in one.layout.by_name):
         some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
-        yield from filter(None, np.abs(one.thrust(vehicle.coefficients, axis, some)).tolist())
+        thrust = one.thrust(vehicle.coefficients, some)[:, one.layout.bare_axes.index(axis)]
+        yield from filter(None, np.abs(thrust).tolist())
 
 
 def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> float:

@@ -161,11 +161,11 @@ class SampledLog:
         """Return the part of a vehicle that the log concerns."""
         return Vehicle(self.layout, {name: coefficients[name] for name in self.layout.coefficients})
 
-    def thrust(self, coefficients: Mapping[str, float], axis: Axis, rows: Array) -> Array:
-        """Return the steady thrust of a vehicle along an axis for some rows of inputs, N or N m."""
+    def thrust(self, coefficients: Mapping[str, float], rows: Array) -> Array:
+        """Return the steady thrust of a vehicle along each axis for some rows of inputs, rows x axes, N or N m."""
         vehicle, names, usual = self.vehicle(coefficients), [*self.layout.inputs], self.layout.usual_inputs
         forces = (vehicle.commanded(usual | dict(zip(names, row, strict=True))) for row in rows.tolist())
-        return np.array([vehicle.along(axis, F) for F in forces])
+        return np.array([[vehicle.along(axis, F) for axis in self.layout.bare_axes] for F in forces])
 
     def with_lines(self, coefficients: Mapping[str, float], full: Mapping[str, float]) -> "SampledLog":
         """Return the log with momentary commands, and with how much lines between them may lack along each axis.
@@ -173,13 +173,14 @@ class SampledLog:
         This is the RMS second difference of the thrust at both ends of a line, relative to full thrust. A line lacks an
         eighth of it in its middle where the thrust is smooth, and up to a half where it jumps between the rows.
         """
-        found = []
-        for form in self.layout.axes:
-            thrust = self.thrust(coefficients, form.axis, self.record.inputs) / (full.get(form.axis.name) or 1.0)
-            ends = np.pad(np.diff(thrust, 2), 1, mode="edge") if len(thrust) > 2 else np.zeros(len(thrust))
-            after = np.append(ends[1:], 0.0)
-            found.append(np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2))
-        return replace(self._with_rows(beside=np.array(found).T), is_momentary=True)
+        thrust = self.thrust(coefficients, self.record.inputs)
+        thrust = thrust / [full.get(axis.name) or 1.0 for axis in self.layout.bare_axes]
+        ends = np.zeros_like(thrust)
+        if len(thrust) > 2:
+            ends = np.pad(np.diff(thrust, 2, axis=0), ((1, 1), (0, 0)), mode="edge")
+        after = np.pad(ends[1:], ((0, 1), (0, 0)))
+        beside = np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2)
+        return replace(self._with_rows(beside=beside), is_momentary=True)
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

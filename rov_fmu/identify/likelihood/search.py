@@ -17,19 +17,17 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
+from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
-from rov_fmu.vehicle.vehicle import Vehicle
 
 WINS, CLOSE = 6.0, 10.0
 """The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
@@ -181,7 +179,7 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
     for n, p in enumerate(table.parameters):
         if (kind := p.of_kind).is_size:
             z[n] = p.high if kind.slow and kind.slow.acts_as == "force" else p.low
-    vehicle, _ = table.model(best)
+    coefficients = table.coefficients(best)
     for n, one in enumerate(model.logs):
         if one.log.file not in variant.of:
             continue
@@ -191,7 +189,7 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
         first, time = objective.filters[n].force, objective.records[n].time
         at = first_in_each(time, 1.0 / _IDLE_STEP)
         force = objective.run(z, n, with_states=True).states[at, first : first + len(one.layout.axes)]
-        r, T = force / scale, _thrust(vehicle, one, time[at]) / scale
+        r, T = force / scale, one.thrust(coefficients, held(one.record.told, one.record.inputs, time[at])) / scale
         gain = _IDLE_STEP * np.sum(r**2 - (r + T) ** 2 - _IDLE * T**2, axis=1)
 
         def rows(gain: Array) -> int:
@@ -205,18 +203,6 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
             begin, end = time[at][begins] if begins else -inf, time[at][-1 - ends] if ends else inf
             found[one.log.file] = float(begin), float(end)
     return replace(variant, of=tuple(found), acting=tuple(found.values()))
-
-
-def _thrust(vehicle: Vehicle, one: SampledLog, time: Array) -> Array:
-    """Return the thrust along each axis of a log at some times: n x axes."""
-    inputs = held(one.record.told, one.record.inputs, time)
-    found, names = np.zeros((len(time), len(one.layout.axes))), [*one.layout.inputs]
-    for t in one.layout.thrusters:
-        curve = one.layout.curve_of[t.name]
-        commands = inputs[:, names.index(f"u_{t.name}")]
-        forces = vehicle[one.layout.health[t.name]] * NO_SHAPES.forces(vehicle, curve, commands) / curve.n_thrusters
-        found += np.outer(forces, [vehicle.effect(t, form.axis) for form in one.layout.axes])
-    return found
 
 
 class Comparison:

@@ -99,7 +99,7 @@ def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis:
     if axis is None:
         thrusters = [names.index(f"u_{thruster.name}") for thruster in one.layout.thrusters]
         return np.asarray(np.max(np.abs(inputs[:, thrusters]), axis=1))
-    return one.thrust(objective.table.coefficients(z), axis, inputs)
+    return one.thrust(objective.table.coefficients(z), inputs)[:, one.layout.bare_axes.index(axis)]
 
 
 def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Axis) -> Array | None:

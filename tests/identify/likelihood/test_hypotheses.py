@@ -364,7 +364,7 @@ def test_lines_between_momentary_commands_are_wrong_where_their_second_differenc
         inputs = np.zeros((len(commands), len(names)))
         inputs[:, thrusters] = commands[:, None]
         lines = one.with_inputs(inputs)
-        return lines.thrust(known.coefficients, SURGE, lines.record.inputs) / known.full["surge"]
+        return lines.thrust(known.coefficients, lines.record.inputs)[:, axis] / known.full["surge"]
 
     sampled = np.zeros((rows, len(names)))
     sampled[:, thrusters] = command[::fine, None]
