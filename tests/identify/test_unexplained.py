@@ -108,6 +108,15 @@ def test_independent_values_are_those_of_the_whole_correlation() -> None:
     assert apart[21:] == pytest.approx(expected[21:], rel=1e-4)
 
 
+def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
+    """The dive has three axes; a process along another one has no state, and does not get those of a neighbour."""
+    own, slow = objective.filters[0], [p for p in objective.table.parameters if p.of_kind.slow]
+    places = [place for p in slow for place in own.places_of(SLOW[p.kind].acts_as, p.of)]
+    assert {p.kind for p in slow} == {*SLOW}
+    assert len({*places}) == len(places) == 3 + 1 + 3
+    assert not own.places_of("force", "sway")
+
+
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
     """It has them relative to the thrust along its axis, or to the speed; sizes are twice their deviations or more.
 
