@@ -156,6 +156,9 @@ _FACTS = {
     ),
     "cancelling thrusters": ("{files}: nothing is learnt about {axes}: its thrusters cancel each other all the time"),
     "gaps": "{files}: {count:#gap} in the {quantity}: {gaps}",
+    "interruption": (
+        "{files}: nothing is logged for {gaps}, so the commands are unknown there. What follows counts as another log"
+    ),
     "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",
     "source of commands": "{files}: the commands of the thrusters are those of {source}{others}",
     "source of wrench": "{files}: the forces and moments on the body are those of {source}{others}",

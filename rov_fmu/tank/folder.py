@@ -31,7 +31,7 @@ from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_c
 from rov_fmu.tank.description import ROV_FILE, Dive, Draft, Requests, RovFile, RovTables, read_description
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked, uninterrupted
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.listing import BAG, NOT_OPENED, Listing, has_usual_suffix, list_files
 from rov_fmu.tank.readers.parsers import header_of, one_parser
@@ -146,7 +146,7 @@ class Folder:
                 self.read_dive(dive)
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
-        self.logs = [checked(log) for log in self.logs]
+        self.logs = [piece for log in self.logs for piece in uninterrupted(checked(log))]
         if self.layout and self.layout.has_wrench:
             self._relate_to_full_force()
         self.findings += [finding for log in self.logs for finding in log.findings]

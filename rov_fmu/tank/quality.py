@@ -1,7 +1,8 @@
-"""What is told about the channels of a log: their sources, sensors that froze, jumps, gaps and scales."""
+"""What is told about the channels of a log: their sources, sensors that froze, jumps, gaps, scales, and its pieces."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from math import pi
 
 import numpy as np
@@ -13,7 +14,7 @@ from rov_fmu.tank.agreement import Disagreement, disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
+from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Commands, Log
 
 _MOST_SOURCES = 4
 """The largest number of sources that are not used and told."""
@@ -117,6 +118,42 @@ def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
         return []
     (before,) = np.nonzero(intervals > max(_LEAST_GAP, _GAP_INTERVALS * float(np.median(intervals))))
     return [(float(at[n]), float(at[n + 1])) for n in before]
+
+
+def uninterrupted(log: Log) -> list[Log]:
+    """Return the pieces of a log between the gaps in which it tells neither a command nor a measurement.
+
+    What was commanded in a gap is unknown. If the last command held there, the motion after it would contradict it.
+    """
+    commands = log.commands
+    if not commands:
+        return [log]
+    told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
+    silent = gaps(told, told)
+    interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))
+    pieces = list[Log]()
+    for start, end in pairwise([-np.inf, *(after for _, after in silent), np.inf]):
+        rows = commands.rows[(commands.rows >= start) & (commands.rows < end)]
+        channels = [
+            replace(channel, time=channel.time[at], values=channel.values[at])
+            for channel in log.channels
+            if (at := (channel.time >= start) & (channel.time < end) & channel.there).any()
+        ]
+        if len(rows):
+            piece = replace(
+                log,
+                file=f"{log.file} (from {start - told[0]:.4g} s)" if pieces else log.file,
+                commands=Commands.of_rows(commands.thrusters, rows, commands.at(rows), commands.source),
+                channels=tuple(channels),
+                findings=() if pieces else (*log.findings, interruption),
+            )
+            pieces.append(piece)
+    return pieces if silent else [log]
+
+
+def gaps_in_words(found: Sequence[tuple[float, float]], begin: float) -> str:
+    """Return how long the first gaps are, and when they begin after a time, s."""
+    return ", ".join(first_of([f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in found], MOST))
 
 
 def unwrapped(channel: Channel) -> Channel:

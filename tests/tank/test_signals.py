@@ -1,5 +1,6 @@
 """Times and values of commands, headings that wrap, gaps, and scales of sensors."""
 
+from dataclasses import replace
 from math import nan, pi
 
 import numpy as np
@@ -8,7 +9,7 @@ import pytest
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.clocks import in_rows
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, gaps, scales_differ, unwrapped
+from rov_fmu.tank.quality import checked, gaps, scales_differ, uninterrupted, unwrapped
 from tests.tank.logs import channel, commands
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
@@ -84,6 +85,26 @@ def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:
     for usual, within, beyond in ((0.05, 0.99, 1.01), (0.2, 1.99, 2.01)):
         time = np.cumsum([0.0, *[usual] * 5, within, *[usual] * 5, beyond, *[usual] * 5])
         assert gaps(time, time) == [pytest.approx((time[11], time[12]))]
+
+
+def test_a_log_in_which_nothing_is_told_for_a_time_is_several_logs_with_all_its_samples() -> None:
+    """What was commanded there is unknown. If any sensor goes on, so do the commands, of which each holds."""
+    time = np.concatenate([np.arange(0.0, 10.0, 0.1), np.arange(18.0, 30.0, 0.1), np.arange(33.0, 40.0, 0.1)])
+    depth, speed = channel("depth", time, np.sin(time)), channel("heave velocity", time[40:], np.cos(time[40:]))
+    log = Log("a.csv", commands(time, {"a": np.round(np.sin(time), 1)}), (depth, speed))
+    pieces = uninterrupted(log)
+    assert [piece.file for piece in pieces] == ["a.csv", "a.csv (from 18 s)", "a.csv (from 33 s)"]
+    assert [finding.kind for piece in pieces for finding in piece.findings] == ["interruption"]
+    for name, whole in (("depth", depth), ("heave velocity", speed)):
+        parts = [part for piece in pieces if (part := piece.used(name))]
+        assert np.concatenate([part.values for part in parts]).tolist() == whole.values.tolist()
+    for piece in pieces:
+        assert piece.commands
+        assert log.commands
+        assert piece.commands.at(piece.commands.rows).tolist() == log.commands.at(piece.commands.rows).tolist()
+        assert piece.commands.since.min() == piece.commands.rows[0]
+    goes_on = replace(log, channels=(depth, channel("heave velocity", np.arange(0.0, 40.0, 0.5), np.zeros(80))))
+    assert uninterrupted(goes_on) == [goes_on]
 
 
 @pytest.mark.parametrize(("scale", "is_told"), [(1.0, False), (1.008, False), (1.02, True), (0.97, True)])

@@ -15,13 +15,12 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axi
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
-from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
-from rov_fmu.tank.quality import gaps, jumps, unwrapped
+from rov_fmu.tank.quality import gaps, gaps_in_words, jumps, unwrapped
 from rov_fmu.vehicle.vehicle import Vehicle
 
 FASTEST = 20.0
@@ -227,8 +226,7 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
         if places := gaps(channel.time, channel.values):
             assert log.commands
             begin = float(log.commands.rows[0])
-            told = [f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in places]
-            words = {**found.words, "gaps": ", ".join(first_of(told, MOST)), "count": len(places)}
+            words = {**found.words, "gaps": gaps_in_words(places, begin), "count": len(places)}
             findings.append(replace(found, words=words))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
