@@ -1,11 +1,14 @@
 """The mutation test: which lines it changes, and which tests it runs for them."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from verification import mutation
-from verification.checkouts import ROOT
+from verification.checkouts import ROOT, environment
 
 
 def test_every_file_has_tests() -> None:
@@ -71,6 +74,33 @@ def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypa
     moved = mutation.applied(rows[1])
     assert moved is not None
     assert (moved.file, moved.line, moved.text) == ("b.py", 2, "y = 2\nx = 2\nz = 3\n")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("limit", "code", "begun"), [(0.0, 0, ""), (2.5, -signal.SIGXCPU, "b")])
+@pytest.mark.skipif(sys.platform == "win32", reason="the limits are POSIX")
+def test_processor_time_ends_a_run_or_a_test(limit: float, code: int, begun: str, tmp_path: Path) -> None:
+    text = """
+def test_b():
+    open("log", "w").write("b")
+    while True: pass
+"""
+    (tmp_path / "test_a.py").write_text(text)
+    (tmp_path / "log").touch()
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "verification.processor_time",
+        "-c",
+        "/dev/null",
+        "test_a.py",
+    ]
+    own = environment(ROOT) | {"ROV_FMU_PROCESSOR_TIME": str(limit), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    assert subprocess.run(command, cwd=tmp_path, env=own, capture_output=True, check=False).returncode == code
+    assert (tmp_path / "log").read_text() == begun
 
 
 @pytest.mark.long
