@@ -25,4 +25,7 @@ def inspect_tests(
         outputs.append(page_output(report, inspection_page(inspected), "inspect"))
     if drafts and inspected.text:
         outputs.append(inspected.completed)
-    return inspected, write_whole(*outputs, force=True)
+    written = write_whole(*outputs, force=True)
+    if inspected.path in written:
+        written[inspected.path] = ""  # what was there is in the completed file
+    return inspected, written

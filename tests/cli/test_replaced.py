@@ -11,7 +11,7 @@ from rov_fmu.build import build
 from rov_fmu.cli import _commands, main
 from rov_fmu.io.output import Output, WriteError, check_targets, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, FEW_TESTS, FILES, READING, WRITING, without_progress
+from tests.commands import BARE, FILES, READING, WRITING, without_progress
 from tests.conftest import without_page
 
 Capsys = pytest.CaptureFixture[str]
@@ -19,49 +19,6 @@ Capsys = pytest.CaptureFixture[str]
 
 FOREIGN = "is not as rov-fmu wrote it: it may have been made or changed by hand"
 CHANGED = "has changed since rov-fmu wrote it"
-_FILES = ("rov.toml", "r.html")
-"""What `_identify` writes."""
-
-
-def _identify(folder: Path, *options: str) -> int:
-    vehicle, report = (str(folder / name) for name in _FILES)
-    return main(["identify", str(FEW_TESTS), "-o", vehicle, "--report", report, *options])
-
-
-@pytest.mark.parametrize("name", _FILES)
-@pytest.mark.parametrize(
-    ("is_of_ours", "before", "after", "reason"),
-    [
-        (True, b"my", b"our", CHANGED),
-        (True, b"my", b"\xff", "is not UTF-8 text, at byte {}"),
-        (False, b"my", b"\xff", FOREIGN),
-    ],
-)
-def test_the_work_of_others_is_refused_before_anything_is_computed(
-    name: str,
-    is_of_ours: bool,
-    before: bytes,
-    after: bytes,
-    reason: str,
-    tmp_path: Path,
-    capsys: Capsys,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    path = tmp_path / name
-    seal = ("# {}", "<!-- {} -->")[_FILES.index(name)]
-    text = sealed("my notes", seal, "identify") if is_of_ours else "my notes"
-    own = text.encode().replace(before, after)
-    path.write_bytes(own)
-    monkeypatch.setattr(
-        "rov_fmu.interface.identify_command.identify", lambda *_: pytest.fail("it is computed before it is refused")
-    )
-    monkeypatch.setattr("rov_fmu.tank.folder.read_rows", lambda *_: pytest.fail("tests are read before it is refused"))
-    assert _identify(tmp_path) == 2
-    reason = reason.format(own.find(after))
-    line = f"rov-fmu: {path}: cannot be written: the file there {reason}; --force replaces it\n"
-    assert capsys.readouterr() == ("", line)
-    assert [*tmp_path.iterdir()] == [path]
-    assert path.read_bytes() == own
 
 
 def _check(path: Path) -> str:
@@ -76,14 +33,31 @@ def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: 
     for whole in (text, text.replace("\n", "\r\n"), f"\ufeff{text}"):
         path.write_bytes(whole.encode())
         assert _check(path) == "the result of an earlier run"
-    for other in (text + "\n", text.replace("a", "c", 1), text.partition("\n")[2], f"\n{text}", "", text[:40]):
-        path.write_bytes(other.encode())
-        with pytest.raises(WriteError):
+    ours = text.encode()
+    for other, reason in (
+        (ours + b"\n", CHANGED),
+        (ours.replace(b"a = 1", b"c = 1"), CHANGED),
+        (ours.replace(b"a = 1", b"\xff"), f"is not UTF-8 text, at byte {ours.index(b'a = 1')}"),
+        *((other, FOREIGN) for other in (ours.partition(b"\n")[2], b"\n" + ours, b"", ours[:40], b"\xff")),
+    ):
+        path.write_bytes(other)
+        with pytest.raises(WriteError, match=f"the file there {reason}; --force replaces it"):
             _check(path)
 
 
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
+_WORK = (
+    "rov_fmu.tank.folder.read_rows",
+    "rov_fmu.interface.identify_command.identify",
+    "rov_fmu.interface.inspect_command.inspect_logs",
+    "rov_fmu.interface.fly_command.fly_page",
+    "rov_fmu.interface.simulate_command.run",
+    "rov_fmu.interface.tune_command.tune",
+    "rov_fmu.interface.prove_command.prove_claims",
+    "rov_fmu.study.study_command.run_study",
+    "rov_fmu.build.compile_all",
+)
 _SLOW = dict.fromkeys(("build", "study", "identify", "inspect"), pytest.mark.long) | {"prove": pytest.mark.weekly}
 
 
@@ -96,8 +70,11 @@ def test_every_file_that_a_command_reads_or_writes_is_known_here() -> None:
 
 @pytest.mark.parametrize("key", WRITING, ids=" ".join)
 def test_no_command_replaces_the_work_of_others(
-    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """It is refused before tests are read and before anything is computed."""
+    for work in _WORK:
+        monkeypatch.setattr(work, lambda *_, **__: pytest.fail("the work is done before it is refused"))
     command = WRITING[key]
     (tmp_path / "plan.toml").write_text(f'vehicle = "{BARE.name}"\nstop_time = 1.0\n', encoding="utf-8")
     shutil.copy(BARE, tmp_path)
