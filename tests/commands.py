@@ -83,7 +83,7 @@ WRITING = {
 """What each option of a command writes. A study, an exported folder and the files beside an FMU name their files."""
 READING = {
     ("build", "vehicle"): "build videoray.toml",
-    ("build", "sign"): "build videoray.toml --sign key",
+    ("build", "sign"): "build videoray.toml --sign key.fmu",
     ("simulate", "vehicle"): "simulate videoray.toml",
     ("simulate", "commands"): "simulate videoray.toml --input points.csv",
     ("fly", "vehicle"): "fly videoray.toml",

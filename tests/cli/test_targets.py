@@ -206,7 +206,7 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
         **dict.fromkeys(("logs.mcap", "videoray.fmu", "key.pub"), "is read once the output is checked"),
     }
     key = Ed25519PrivateKey.generate().private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    (folder / "key").write_bytes(key)
+    (folder / "key.fmu").write_bytes(key)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder
