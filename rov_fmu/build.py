@@ -23,10 +23,10 @@ from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
-from rov_fmu.io.file_kinds import FMU, check_written
+from rov_fmu.io.file_kinds import FMU
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
-from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.io.reading import open_file
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.signature import private_key, signature_path, signed
@@ -53,8 +53,8 @@ class Built:
     """The result of validating and running the FMU."""
     was_run: bool
     """True when the FMU was run, and so has a binary for this machine."""
-    beside: Sequence[Path]
-    """The other files that were written."""
+    written: Mapping[Path, str]
+    """The files that were written, each with what it replaced in words, or an empty text."""
     lost: Sequence[str] = ()
     """The folders of binaries/ that the replaced FMU had and this one does not have."""
 
@@ -103,15 +103,13 @@ def build(
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
     beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
     key = private_key(sign) if sign else None
-    targets = [output, *(other.path for other in beside), *([signature_path(output)] if key else [])]
-    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])])
-    check_written(output, FMU)
+    signature = signature_path(output)
+    targets = [(output, FMU), *((other.path, "") for other in beside), (signature if key else None, "")]
+    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])], force=force, is_ours=_is_as_built)
     if output.suffix.lower() != ".fmu":
         raise FileError(f"{output}: the name must end with .fmu")
-    signature = signature_path(output)
     if not key and not force and signature.is_file():
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
-    check_replaced(targets, force=force, is_ours=_is_as_built)
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, chosen, fmi=fmi, interface=interface)
     on_content()
@@ -134,9 +132,9 @@ def build(
         beside.append(Output(signature, signed(packed, key)))
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
-    write_whole(draft, *beside, force=force, is_ours=_is_as_built)
+    written = write_whole(draft, *beside, force=force, is_ours=_is_as_built)
     sizes = {name: len(library) for name, library in binaries.items()}
-    return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], targets[1:], lost)
+    return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], written, lost)
 
 
 def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> Content:

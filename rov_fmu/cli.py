@@ -255,7 +255,7 @@ def _print_built(built: "Built", seconds: float) -> None:
         out.print(f"  {name:<14}{size_of_binary / 1000:6.0f} kB{time}")
     paragraph(out, built.note)
     following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
-    print_end([built.path, *built.beside], following)
+    print_end(built.written, following)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
@@ -364,11 +364,13 @@ def _fly(
     if identified and not recording:
         raise click.UsageError("fly: --identified needs --recording, the log that it is about")
     with _warnings_printed():
-        path = write_fly_page([vehicle, against] if against else [vehicle], recording, identified, output, force=force)
+        written = write_fly_page(
+            [vehicle, against] if against else [vehicle], recording, identified, output, force=force
+        )
     if output:
-        print_end([path], "open it in a browser")
+        print_end(written, "open it in a browser")
     else:
-        open_in_browser(path, "-o PAGE.html")
+        open_in_browser(next(iter(written)), "-o PAGE.html")
 
 
 # ---- sitl ------------------------------------------------------------------------------------------------------------
@@ -491,7 +493,7 @@ def _write_export(
         paragraph(console(), f"- {note}")
     for warning in exported.warnings:
         _warn(warning)
-    print_end([exported.path], exported.following)
+    print_end(exported.written, exported.following)
 
 
 @_commands.command("sdf")
@@ -632,7 +634,7 @@ def _identify(
     """
     from rov_fmu.identify.findings import by_heading
     from rov_fmu.interface.identify_command import identify_tests
-    from rov_fmu.report.console import console, paragraph, print_end, shell_words
+    from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import parts
 
@@ -643,11 +645,7 @@ def _identify(
         _inspect_logs(tests, report, drafts=drafts, force=force)
         return
     with parts() as shown:
-        identification, replaced = identify_tests(
-            tests, output, report, mcap, base=base, force=force, begin=shown.begin
-        )
-    for line in replaced:
-        paragraph(console(), line)
+        identification, written = identify_tests(tests, output, report, mcap, base=base, force=force, begin=shown.begin)
     print_identification(identification)
     name = identification.vehicle.identifier
     given = ["--base", shipped_name(base) or base] if base else []
@@ -655,7 +653,7 @@ def _identify(
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
-    print_end([path for path in (output, report, mcap) if path], following)
+    print_end(written, following)
 
 
 # ---- inspect ---------------------------------------------------------------------------------------------------------
@@ -681,8 +679,8 @@ def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, f
     from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_log import print_inspected
 
-    inspected, replaced, written = inspect_tests(tests, report, drafts=drafts, force=force)
-    print_inspected(inspected, replaced, with_draft=not drafts)
+    inspected, written = inspect_tests(tests, report, drafts=drafts, force=force)
+    print_inspected(inspected, with_draft=not drafts)
     is_new = inspected.path in written and not inspected.own
     steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
     if not (drafts or inspected.is_enough):
@@ -736,14 +734,12 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_results import print_tuning
 
-    tuning = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
+    tuning, written = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
     print_tuning(tuning)
     for message in sentences(implausible(tuning)):
         _warn(message)
-    if output:
-        print_end([output], shell_words("rov-fmu", "build", output))
-    else:
-        print_end([], "add -o TUNED.toml to write the tuned vehicle")
+    following = shell_words("rov-fmu", "build", output) if output else "add -o TUNED.toml to write the tuned vehicle"
+    print_end(written, following)
 
 
 # ---- schema, tables --------------------------------------------------------------------------------------------------

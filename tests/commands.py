@@ -11,7 +11,9 @@ from pathlib import Path
 from shlex import quote, split
 from typing import Any
 
-from rov_fmu.cli import main
+import click
+
+from rov_fmu.cli import _commands, main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 
 ROOT = Path(__file__).parent.parent
@@ -50,6 +52,13 @@ class Command:
         return main(self.arguments(target, "--force"))
 
 
+FILES = {
+    (name, str(parameter.name)): max(parameter.opts, key=len)
+    for name, command in _commands.commands.items()
+    for parameter in command.params
+    if isinstance(parameter.type, click.Path) or parameter._custom_shell_complete  # which completes vehicles
+}
+"""The longest form of each argument and option of the command line that names a file."""
 _BARE, _FEW = quote(str(BARE)), quote(str(FEW_TESTS))
 _TUNE = f"tune {quote(str(VIDEORAY))} --axis heave --command 0.3 --v-ss 0.2"
 WRITING = {
@@ -72,6 +81,29 @@ WRITING = {
     ("tune", "output"): Command("tuned.toml", f"{_TUNE} -o {{f}}/tuned.toml"),
 }
 """What each option of a command writes. A study, an exported folder and the files beside an FMU name their files."""
+READING = {
+    ("build", "vehicle"): "build videoray.toml",
+    ("build", "sign"): "build videoray.toml --sign key.fmu",
+    ("simulate", "vehicle"): "simulate videoray.toml",
+    ("simulate", "commands"): "simulate videoray.toml --input points.csv",
+    ("fly", "vehicle"): "fly videoray.toml",
+    ("fly", "against"): "fly videoray --against refit.toml",
+    ("fly", "recording"): "fly videoray --recording points.csv",
+    ("fly", "identified"): "fly videoray --recording points.csv --identified logs.mcap",
+    ("sitl", "vehicle"): "sitl videoray.toml",
+    ("sdf", "vehicle"): "sdf videoray.toml",
+    ("export", "vehicle"): "export --to sdf videoray.toml",
+    ("prove", "fmu"): "prove videoray.fmu",
+    ("prove", "key"): "prove videoray.fmu --key key.pub",
+    ("study", "plan"): "study study.json",
+    ("identify", "tests"): "identify tests/steady_surge.csv",
+    ("identify", "base"): "identify tests --base videoray.toml",
+    ("inspect", "tests"): "inspect tests/steady_surge.csv",
+    ("tune", "vehicle"): "tune videoray.toml --axis heave --command 0.3 --v-ss 0.2",
+    ("tune", "points"): "tune videoray.toml --axis heave --points points.csv",
+    ("tables", "vehicle"): "tables videoray.toml",
+}
+"""What each argument and option reads that names a file: the last word, in a folder with these files."""
 COMMANDS = {key: command for key, command in WRITING.items() if key[0] not in ("prove", "study") and key[1] != "folder"}
 """Those that write one file into any folder, and read none there."""
 

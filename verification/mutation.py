@@ -2,18 +2,12 @@
 
 The mutants are those of cosmic-ray (Python) and universalmutator (C), which `pip install "rov-fmu[mutation]"` installs.
 
-`mutants.csv` keeps those of 200 mutants of the whole product of 8d6b1e9 whose files still exist, and then the defects
-that once passed all tests. `--kept` applies them to the code of today and runs the quickest of their tests first. It
-writes each verdict at once, so that it can be ended and called again. `--results` writes the verdicts of a later state
-to another file, and lists those that are killed no longer.
-
 Two parts of the product are not mutated: the scripts of the page, because the tests that would notice need a browser,
 and the engine's and the page's frames around the C of the step, which no FMU contains.
 """
 
 import ast
 import contextlib
-import csv
 import fnmatch
 import io
 import os
@@ -23,8 +17,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import time
-from collections import Counter, defaultdict
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -48,12 +41,10 @@ from verification.references.limited import run_limited
 LEAST = 0.85
 """The share of the mutants that the tests must kill."""
 FILES = ("rov_fmu/**/*.py", "fmu_src/c/*.c")
-KEPT = ROOT / "verification" / "mutants.csv"
-_COLUMNS = ("file", "line", "above", "before", "below", "after", "verdict", "seconds", "test")
-"""The columns of the kept mutants: a file, a line of it with its neighbours, and the line in its place. Then follow the
-verdict (killed, survived, or empty), the seconds until then, and the test that failed."""
 _LIMIT = 150
-"""The longest time (s) for the tests of a mutant. One that no test has noticed by then has survived."""
+"""The processor time (s) after which no other test of a mutant begins: one that no test has noticed has survived."""
+_HANGS = 40 * _LIMIT
+"""The time (s) after which the tests hang, however loaded the machine is."""
 TESTS = {
     "fmu_src/c/saved.c": "fmu/calls/test_state.py fmu/calls/test_state_bytes.py fmu/results/test_ballast.py fmu/calls",
     "fmu_src/c/[dt]*.c": "equation/thrust/test_thrust_effects.py fmu/calls/test_dead_time.py fmu/calls",
@@ -265,12 +256,6 @@ def _is_valid_c(file: str, before: str, after: str) -> bool:
     return bool(compiled) and compiled != _object(Path(file).name, before)
 
 
-def with_line(text: str, line: int, new: str) -> str:
-    """Return a text with another line in the place of one."""
-    lines = text.splitlines(keepends=True)
-    return "".join([*lines[: line - 1], f"{new}\n", *lines[line:]])
-
-
 def draw(seed: int) -> Iterator[Mutant]:
     """Yield mutants of lines drawn at random, each line at most once."""
     generator = random.Random(seed)
@@ -284,62 +269,12 @@ def draw(seed: int) -> Iterator[Mutant]:
             except AttributeError:  # cosmic-ray cannot replace an exception with a dotted name
                 continue
             if _is_valid_python(before, after) if file.endswith(".py") else _is_valid_c(file, before, after):
-                old, new = before.splitlines()[line - 1], after.splitlines()[line - 1]
-                if with_line(before, line, new) == after:
-                    yield Mutant(file, line, old, new, after)
+                old, new = before.splitlines(), after.splitlines()
+                if [*old[: line - 1], *old[line:]] == [*new[: line - 1], *new[line:]]:
+                    yield Mutant(file, line, old[line - 1], new[line - 1], after)
 
 
 # ---- Verdicts --------------------------------------------------------------------------------------------------------
-
-Row = dict[str, str]
-
-
-def read_rows(path: Path) -> list[Row]:
-    with path.open(encoding="utf-8", newline="") as file:
-        return list(csv.DictReader(file))
-
-
-def _write_rows(path: Path, rows: Sequence[Row]) -> None:
-    draft = path.with_suffix(".draft")
-    with draft.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, _COLUMNS, lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(rows)
-    draft.replace(path)
-
-
-def kept(mutant: Mutant) -> Row:
-    """Return the row of a mutant without a verdict."""
-    lines = ["", *(ROOT / mutant.file).read_text(encoding="utf-8").splitlines(), ""]
-    above, below = lines[mutant.line - 1], lines[mutant.line + 1]
-    own = (mutant.file, str(mutant.line), above, mutant.before, below, mutant.after)
-    return dict.fromkeys(_COLUMNS, "") | dict(zip(_COLUMNS, own, strict=False))
-
-
-def applied(row: Row) -> Mutant | None:
-    """Apply a kept mutant to the code of today. Return None if its line is not there, or in several places.
-
-    The line is looked for with its neighbours in its file, then alone in its file, then with its neighbours anywhere.
-    Of several with its neighbours in its file, it is the one with its number.
-    """
-    texts = {file: (ROOT / file).read_text(encoding="utf-8") for file in files()}
-    neighbours = [row["above"], row["before"], row["below"]]
-
-    def places(file: str, number_above: int) -> list[tuple[str, int]]:
-        """Return where a file has the line with so many of its neighbours above, and as many below."""
-        lines = ["", *texts.get(file, "").splitlines(), ""]
-        wanted = neighbours[1 - number_above : 2 + number_above]
-        numbers = range(1, len(lines) - 1)
-        return [(file, n) for n in numbers if lines[n - number_above : n + 1 + number_above] == wanted]
-
-    own, here = places(row["file"], 1), (row["file"], int(row["line"]))
-    anywhere = [place for file in texts for place in places(file, 1)]
-    for found in ([here] if here in own else own, places(row["file"], 0), anywhere):
-        if len(found) == 1:
-            file, line = found[0]
-            return Mutant(file, line, row["before"], row["after"], with_line(texts[file], line, row["after"]))
-    return None
-
 
 _PYTEST = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider"]
 
@@ -380,69 +315,39 @@ _BEGUN = re.compile(r"^(tests/\S+::.+?) (PASSED|SKIPPED|XFAIL|FAILED|ERROR|$)", 
 def _verdict(mutant: Mutant, folder: Path, seconds: Mapping[str, float]) -> tuple[str, str]:
     """Run the tests of a mutant in a copy of the checkout until one fails; return the verdict and the failing test."""
     tests = _quickest_first(mutant.file, seconds)
-    limit = ["-o", "faulthandler_timeout=60", "-o", "faulthandler_exit_on_timeout=true"]
-    command = [*_PYTEST, "-n", "0", "-x", "-vv", *limit, *tests]
-    code, output = run_limited(command, folder, environment(folder) | {"COLUMNS": "500"}, _LIMIT)
-    begun = _BEGUN.findall(output)
-    if code == 0 or (code is None and begun):
+    limit = ["-p", "verification.processor_time", "-o", "faulthandler_timeout=600"]
+    command = [*_PYTEST, "-n", "0", "-x", "-vv", *limit, "-o", "faulthandler_exit_on_timeout=true", *tests]
+    limits = {"COLUMNS": "500", "ROV_FMU_PROCESSOR_TIME": str(_LIMIT)}
+    code, output = run_limited(command, folder, environment(folder) | limits, _HANGS)
+    if code == 0:
         return "survived", ""
+    begun = _BEGUN.findall(output)
     return "killed", begun[-1][0] if begun else "the import"
 
 
-def run(rows: Sequence[Row], jobs: int, save: Callable[[], None] = lambda: None) -> None:
-    """Give every mutant without a verdict its verdict, in copies of the checkout; `save` is called after each."""
-    left = [row for row in rows if not row["verdict"]]
-    mutants = [applied(row) for row in left]
-    tests = sorted({test for mutant in mutants if mutant for test in tests_of(mutant.file)})
+def run(mutants: Sequence[Mutant], jobs: int) -> list[Mutant]:
+    """Run the tests of every mutant in copies of the checkout, and print the verdicts. Return those that survive."""
+    tests = sorted({test for mutant in mutants for test in tests_of(mutant.file)})
     with tempfile.TemporaryDirectory(prefix="mutation-") as temporary, ThreadPoolExecutor(jobs) as pool:
         copies: SimpleQueue[Path] = SimpleQueue()
         for n in range(jobs):
             copies.put(copy_checkout(Path(temporary, str(n))))
-        seconds = _baseline(tests, Path(temporary, "0"), jobs) if tests else {}
+        seconds = _baseline(tests, Path(temporary, "0"), jobs)
 
-        def found(mutant: Mutant | None) -> Row:
-            if mutant is None:
-                return {"verdict": "no longer applies"}
-            folder, began = copies.get(), time.monotonic()
+        def judged(mutant: Mutant) -> tuple[str, str]:
+            folder = copies.get()
             (folder / mutant.file).write_text(mutant.text, encoding="utf-8")
-            verdict, test = _verdict(mutant, folder, seconds)
+            found = _verdict(mutant, folder, seconds)
             shutil.copy2(ROOT / mutant.file, folder / mutant.file)
             copies.put(folder)
-            return {"verdict": verdict, "test": test, "seconds": f"{time.monotonic() - began:.0f}"}
+            return found
 
-        for n, (row, result) in enumerate(zip(left, pool.map(found, mutants), strict=True), 1):
-            row.update(result)
-            save()
-            click.echo(
-                f"{n}/{len(left)} {row['verdict']} {row['seconds']} s: {row['file']}:{row['line']} {row['test']}"
-            )
-
-
-def run_kept(results: Path, reference: Sequence[Row], jobs: int = 1) -> list[Row]:
-    """Give the rows of the reference verdicts in a file of results, which may have some of them. Return all rows."""
-    new = [row | dict.fromkeys(("verdict", "seconds", "test"), "") for row in reference]
-    rows = read_rows(results) if results.exists() else new
-    run(rows, jobs, lambda: _write_rows(results, rows))
-    return rows
-
-
-def _print_change(row: Row) -> None:
-    click.echo(f"{row['file']}:{row['line']}\n    - {row['before'].strip()}\n    + {row['after'].strip()}")
-
-
-def _compare(rows: Sequence[Row], reference: Sequence[Row]) -> bool:
-    """Print the verdicts, and those that have changed. Return True if all that were killed still are."""
-    for verdict, number in Counter(row["verdict"] for row in rows).items():
-        click.echo(f"{number} of {len(rows)}: {verdict}")
-    lost = [now for was, now in zip(reference, rows, strict=True) if (was["verdict"], now["verdict"]) == _LOST]
-    if lost:
-        click.echo("killed before:")
-    for row in lost:
-        _print_change(row)
-    return not lost
-
-
-_LOST = ("killed", "survived")
+        left = []
+        for n, (mutant, (verdict, test)) in enumerate(zip(mutants, pool.map(judged, mutants), strict=True), 1):
+            click.echo(f"{n}/{len(mutants)} {verdict}: {mutant.file}:{mutant.line} {test}")
+            if verdict == "survived":
+                left.append(mutant)
+        return left
 
 
 @click.command()
@@ -451,25 +356,16 @@ _LOST = ("killed", "survived")
 @click.option(
     "--jobs", type=click.IntRange(1), default=os.cpu_count() or 1, help="Tests at once (default: processors)."
 )
-@click.option("--kept", "is_kept", is_flag=True, help="Run the kept mutants that have no verdict yet.")
-@click.option("--results", type=click.Path(path_type=Path), default=KEPT, help="Where --kept writes its verdicts.")
-def main(sample: int, seed: int | None, jobs: int, is_kept: bool, results: Path) -> None:
-    """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants.
-
-    With --kept, exit with 1 when a mutant survives that was killed before.
-    """
-    if is_kept:
-        reference = read_rows(KEPT)
-        sys.exit(0 if _compare(run_kept(results, reference, jobs), reference) else 1)
+def main(sample: int, seed: int | None, jobs: int) -> None:
+    """Change random lines, one at a time; exit with 1 when the tests kill less than 85 % of the mutants."""
     year, week, _ = datetime.now(timezone.utc).isocalendar()
     seed = 100 * year + week if seed is None else seed
     click.echo(f"{sample} mutants with seed {seed}")
-    rows = sorted(map(kept, islice(draw(seed), sample)), key=lambda row: (row["file"], int(row["line"])))
-    run(rows, jobs)
-    left = [row for row in rows if row["verdict"] == "survived"]
-    for row in left:
-        _print_change(row)
-    killed = 1.0 - len(left) / len(rows)
+    mutants = sorted(islice(draw(seed), sample), key=lambda mutant: (mutant.file, mutant.line))
+    left = run(mutants, jobs)
+    for mutant in left:
+        click.echo(f"{mutant.file}:{mutant.line}\n    - {mutant.before.strip()}\n    + {mutant.after.strip()}")
+    killed = 1.0 - len(left) / len(mutants)
     click.echo(f"{100.0 * killed:.0f} % of the mutants are killed; at least {100.0 * LEAST:.0f} % must be")
     sys.exit(0 if killed >= LEAST else 1)
 

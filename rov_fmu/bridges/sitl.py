@@ -21,7 +21,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.io.csv_table import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
-from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.output import Output, is_same, write_whole
 from rov_fmu.tank.readers.ardusub_frames import Servos, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -116,16 +116,18 @@ class Log:
         """The number of complete rows."""
         return len(self._rows) // len(self._titles)
 
-    def write(self, path: Path) -> None:
-        """Write all complete rows. Raises WriteError, and InputError where foxglove-sdk is not installed."""
+    def write(self, path: Path) -> dict[Path, str]:
+        """Write all complete rows, and return what the file replaced.
+
+        Raises WriteError, and InputError where foxglove-sdk is not installed.
+        """
         if is_mcap(path):
-            write_whole(Output(path, self._mcap()), force=True)
-            return
+            return write_whole(Output(path, self._mcap()), force=True)
         text, width = StringIO(), len(self._titles)
         print(*self._titles, sep=",", file=text)
         for first in range(0, len(self._rows), width):
             print(*(f"{value:.9g}" for value in self._rows[first : first + width]), sep=",", file=text)
-        write_whole(Output(path, text.getvalue().encode()), force=True)
+        return write_whole(Output(path, text.getvalue().encode()), force=True)
 
     def _mcap(self) -> bytes:
         """Return all complete rows as the content of an MCAP file."""
@@ -312,8 +314,8 @@ class Connection:
         """The time of the flights that have ended, and of the silences between them, s."""
         self.order = Sequence()
         self.traffic = Traffic()
-        self.logs: list[Path] = []
-        """The logs that are written."""
+        self.logs: dict[Path, str] = {}
+        """The logs that are written, each with what it replaced."""
         self._number = 0
         """The number in the name of the last log."""
         self._rows = 0
@@ -404,10 +406,10 @@ class Connection:
         while True:
             self._number += 1
             numbered = path if self._number == 1 else path.with_stem(f"{path.stem}_{self._number}")
-            if self._setup.force or not os.path.lexists(numbered):
+            is_read = any(is_same(numbered, file) for file in self._setup.vehicle.files)
+            if not is_read and (self._setup.force or not os.path.lexists(numbered)):
                 break
-        log.write(numbered)
-        self.logs.append(numbered)
+        self.logs |= log.write(numbered)
         self._rows += log.rows
         if self._rows >= MOST_ROWS:
             self._say_once(_FULL)

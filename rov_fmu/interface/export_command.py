@@ -13,9 +13,9 @@ from rov_fmu.bridges.mujoco import mujoco_files
 from rov_fmu.bridges.sdf import Model, gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.fmu.card import card
-from rov_fmu.io.file_kinds import GAZEBO_MODEL, check_written
-from rov_fmu.io.messages import InputError
-from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.io.file_kinds import GAZEBO_MODEL
+from rov_fmu.io.messages import InputError, listed
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -45,7 +45,8 @@ class Options:
 class Exported:
     """What was written, and what the reader of the console should know."""
 
-    path: Path
+    written: Mapping[Path, str]
+    """The file or the folder that was written, with what it replaced."""
     place: str = ""
     """Where the notes hold: "in Gazebo"."""
     notes: tuple[str, ...] = ()
@@ -71,10 +72,11 @@ def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exp
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}")
     path.mkdir(exist_ok=True)
-    check_targets((path / name for name in files), inputs)
-    write_whole(*(Output(path / name, text.encode()) for name, text in files.items()), force=options.force)
+    check_targets([(path / name, "") for name in files], inputs, force=options.force)
+    written = write_whole(*(Output(path / name, text.encode()) for name, text in files.items()), force=options.force)
     there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
-    return Exported(path, following=f"{there}python -m {path.name}" if to == "mujoco" else "")
+    replaced = listed(dict.fromkeys(filter(None, written.values())))
+    return Exported({path: replaced}, following=f"{there}python -m {path.name}" if to == "mujoco" else "")
 
 
 def _misplaced(to: str, options: Options) -> Iterator[str]:
@@ -103,16 +105,14 @@ def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Mapping[str, str]
 
 def _exported_file(vehicle: Vehicle, to: str, path: Path, inputs: list[Path], options: Options) -> Exported:
     """Write the model for Gazebo, or the robot description."""
-    check_targets([path], inputs)
-    check_written(path, GAZEBO_MODEL)
-    check_replaced([path], force=options.force)
+    check_targets([(path, GAZEBO_MODEL)], inputs, force=options.force)
     model: Model = (
         urdf_model(vehicle)
         if to == "urdf"
         else gazebo_model(vehicle, in_world=options.in_world, explicit=options.added_mass == "plugin")
     )
-    write_whole(Output(path, model.text.encode()), force=options.force)
+    written = write_whole(Output(path, model.text.encode()), force=options.force)
     following = shell_words("gz", "sim", "-r", path) if options.in_world else ""
     if to == "sdf" and not following:
         following = "include it in a world, or give --world"
-    return Exported(path, "in Gazebo", model.notes, model.warnings, following)
+    return Exported(written, "in Gazebo", model.notes, model.warnings, following)

@@ -6,9 +6,9 @@ from pathlib import Path
 from tempfile import mkdtemp
 
 from rov_fmu.fmu.content import web_module
-from rov_fmu.io.file_kinds import PAGE, check_written
+from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import print_message
-from rov_fmu.io.output import check_replaced, check_targets, page_output, write_whole
+from rov_fmu.io.output import check_targets, page_output, write_whole
 from rov_fmu.report.console import console
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of
@@ -17,25 +17,24 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 
 def write_fly_page(
     paths: Sequence[Path], recording: Path | None, identified: Path | None, output: Path | None, *, force: bool
-) -> Path:
-    """Write the page of one vehicle file, or of two, of which the second is the ghost. Return its path.
+) -> dict[Path, str]:
+    """Write the page of one vehicle file, or of two, of which the second is the ghost.
+
+    Return its path, with what it replaced.
 
     `recording` is a log that is flown beside the measurements, and `identified` what `rov-fmu identify --mcap` wrote of
     it. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
     """
     vehicles = [load_vehicle(path) for path in paths]
-    if output:
-        given = [path for path in (recording, identified) if path]
-        check_targets([output], [*paths, *given, *(file for vehicle in vehicles for file in vehicle.files)])
-        check_written(output, PAGE)
-        check_replaced([output], force=force)
+    given = [path for path in (recording, identified) if path]
+    read = [*paths, *given, *(file for vehicle in vehicles for file in vehicle.files)]
+    check_targets([(output, PAGE)], read, force=force)
     flown = recording_of(recording, vehicles[0], identified) if recording else None
     names = [path.name for path in paths]
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
     shown = [Flown(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)]
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
-    write_whole(page_output(path, fly_page(shown, recording=flown), "fly"), force=force)
-    return path
+    return write_whole(page_output(path, fly_page(shown, recording=flown), "fly"), force=force)
 
 
 def open_in_browser(path: Path, option: str) -> None:

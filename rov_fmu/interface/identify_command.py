@@ -7,9 +7,9 @@ from pathlib import Path
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.identify.result import Identification
-from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, check_written, is_mcap
+from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, is_mcap
 from rov_fmu.io.messages import InputError, Progress
-from rov_fmu.io.output import Output, check_replaced, check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, page_output, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.vehicle.writer import check_report, vehicle_output
@@ -24,7 +24,7 @@ def identify_tests(
     base: Path | None = None,
     force: bool,
     begin: Callable[[str], Progress],
-) -> tuple[Identification, list[str]]:
+) -> tuple[Identification, dict[Path, str]]:
     """Identify a vehicle from a folder of tank tests, or from logs in one folder, and write the files that are asked
     for.
 
@@ -32,11 +32,11 @@ def identify_tests(
     vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
-    name of each part of the work, and returns the function that takes the progress of this part. Returns the
-    identification, and a line for each file that was replaced. Raises FileError. Raises WriteError if a file cannot be
-    written; most such cases are found before the work begins.
+    name of each part of the work, and returns the function that takes the progress of this part.
+
+    Returns the identification, and the files that were written, each with what it replaced. Raises FileError. Raises
+    WriteError if a file cannot be written; most such cases are found before the work begins.
     """
-    replaced: list[str] = []
     if vehicle and report:
         check_report(vehicle, report)
     if mcap and not is_mcap(mcap):
@@ -44,13 +44,7 @@ def identify_tests(
 
     def check_outputs(inputs: Sequence[Path]) -> None:
         """Check the files to write as soon as the input files are known."""
-        targets = [path for path in (vehicle, report, mcap) if path]
-        check_targets(targets, inputs)
-        if vehicle:
-            check_written(vehicle, VEHICLE_FILE)
-        if report:
-            check_written(report, PAGE)
-        replaced.extend(check_replaced(targets, force=force))
+        check_targets([(vehicle, VEHICLE_FILE), (report, PAGE), (mcap, "")], inputs, force=force)
 
     begin("reading the tests")
     folder, files = folder_and_files(paths)
@@ -73,5 +67,4 @@ def identify_tests(
         from rov_fmu.bridges.mcap_logs import identification_mcap
 
         outputs.append(Output(mcap, identification_mcap(identification)))
-    write_whole(*outputs, force=force)
-    return identification, replaced
+    return identification, write_whole(*outputs, force=force)

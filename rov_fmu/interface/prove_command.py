@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
-from rov_fmu.io.file_kinds import PAGE, check_written
+from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import Progress, ProofError, listed
-from rov_fmu.io.output import check_replaced, check_targets, page_output, write_whole
+from rov_fmu.io.output import check_targets, page_output, write_whole
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
 from rov_fmu.prove.proof import prove
 from rov_fmu.prove.runs import Array, Plan
+from rov_fmu.prove.signature import signature_path
 from rov_fmu.prove.subject import Subject
 from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
 from rov_fmu.report.progress import parts
@@ -66,24 +67,27 @@ def prove_fmu(fmu: Path, options: Options) -> None:
 def _with_report(fmu: Path, report: Path, options: Options) -> None:
     """Check the claims about an FMU, write the page about them, and print them."""
     with parts() as shown:
-        proof = prove_with_report(fmu, report, options, shown.begin("checking the claims"))
+        proof, written = prove_with_report(fmu, report, options, shown.begin("checking the claims"))
     print_claims(proof)
     print_evidence(proof.origin)
-    print_end([report], "open it in a browser")
+    print_end(written, "open it in a browser")
     if failed := proof.with_result("fails"):
         raise ProofError(*(f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed))
 
 
-def prove_with_report(fmu: Path, report: Path, options: Options, on_progress: Progress) -> Proof:
-    """Check the claims about an FMU, and write the page about them. Raises what `prove_claims` does."""
-    check_targets([report], [fmu])
-    check_written(report, PAGE)
-    check_replaced([report], force=options.force)
+def prove_with_report(
+    fmu: Path, report: Path, options: Options, on_progress: Progress
+) -> tuple[Proof, dict[Path, str]]:
+    """Check the claims about an FMU, and write the page about them. Return what it replaced, too.
+
+    Raises what `prove_claims` does.
+    """
+    read = [fmu, signature_path(fmu), *([options.key] if options.key else [])]
+    check_targets([(report, PAGE)], read, force=options.force)
     proof = prove_claims(
         fmu, options.interface, options.tolerance, options.time_limit, options.key, CLAIMS_OF_VEHICLES, on_progress
     )
-    write_whole(page_output(report, proof_page(proof), "prove"), force=options.force)
-    return proof
+    return proof, write_whole(page_output(report, proof_page(proof), "prove"), force=options.force)
 
 
 def conservation(subject: Subject) -> Evidence:

@@ -16,7 +16,7 @@ from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
-from rov_fmu.io.output import Output, check_replaced, check_targets, write_whole
+from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 
 _STOP = 10.0
@@ -56,12 +56,12 @@ def simulate_vehicle(path: Path, options: Options) -> None:
     check_outputs(output, None if opens else plot, inputs, force=options.force)
     result = run(vehicle, options)
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
+    written = write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
     if opens and picture:
         open_in_browser(picture, "--plot FILE.svg")
     if output or picture:
         following = "" if opens else "open the plot" if plot else "add --plot to see the curves"
-        print_end([path for path in (output, None if opens else plot) if path], following)
+        print_end({path: old for path, old in written.items() if path in (output, plot)}, following)
     else:
         print_final(vehicle, result, has_no_input=not options.commands and not _moves(options.settings, vehicle.layout))
 
@@ -76,9 +76,7 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
             last = "; put --plot without a file after VEHICLE" if option == "--plot" and not path.suffix else ""
             endings = f"{', '.join(suffixes[:-1])} or {suffixes[-1]}"
             raise InputError(f"{option} {path}: the name must end with {endings}{last}")
-    targets = [path for path in (output, plot) if path]
-    check_targets(targets, inputs)
-    check_replaced(targets, force=force)
+    check_targets([(output, ""), (plot, "")], inputs, force=force)
 
 
 def run(vehicle: VehicleModel, options: Options) -> Result:
@@ -179,8 +177,11 @@ def title(vehicle: VehicleModel, options: Options) -> str:
 
 def write_results(
     vehicle: VehicleModel, result: Result, table: Path | None, plot: Path | None, title: str, *, force: bool = False
-) -> None:
-    """Write a result as a table or as MCAP, and as a plot, if there are paths. Raises InputError, WriteError."""
+) -> dict[Path, str]:
+    """Write a result as a table or as MCAP, and as a plot, if there are paths. Return what each file replaced.
+
+    Raises InputError, WriteError.
+    """
     outputs = []
     if table and is_mcap(table):
         outputs.append(Output(table, vehicle.to_mcap(result)))
@@ -188,7 +189,7 @@ def write_results(
         outputs.append(_table_output(result, table))
     if plot:
         outputs.append(_plot_output(result, plot, title))
-    write_whole(*outputs, force=force)
+    return write_whole(*outputs, force=force)
 
 
 def _table_output(result: Result, path: Path) -> Output:

@@ -70,7 +70,7 @@ def serve(path: Path, options: Options) -> None:
             connection.end()
             paragraph(console(), _summary(connection))
             if connection.logs:
-                inspect = shell_words("rov-fmu", "inspect", connection.logs[0])
+                inspect = shell_words("rov-fmu", "inspect", next(iter(connection.logs)))
                 print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(options.log) else inspect)
             elif options.log:
                 paragraph(console(), "No log was written, because no row was complete.")
@@ -90,7 +90,7 @@ def _setup(path: Path, options: Options) -> Setup:
     if not vehicle.layout.commands:
         raise InputError(f"{path}: this vehicle has no thrusters, so there is nothing that ArduSub could drive")
     if options.log:
-        check_targets([options.log], [path, *vehicle.files])
+        check_targets([(options.log, "")], [path, *vehicle.files], force=True)
         if os.path.lexists(options.log) and not options.force:
             raise InputError(f"--log {options.log}: the file exists; choose another name, or replace it with --force")
     given = read_settings(options.settings, vehicle.layout)

@@ -8,9 +8,9 @@ from pathlib import Path
 from rov_fmu.equation.catalogue import TUNING, Axis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tune
 from rov_fmu.io.csv_table import DataFileError, read_columns
-from rov_fmu.io.file_kinds import VEHICLE_FILE, check_written
+from rov_fmu.io.file_kinds import VEHICLE_FILE
 from rov_fmu.io.messages import InputError
-from rov_fmu.io.output import check_replaced, check_targets
+from rov_fmu.io.output import check_targets
 from rov_fmu.tank.columns import columns_of, refuse_slips
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_tuned
@@ -26,8 +26,10 @@ def tune_vehicle(
     output: Path | None,
     *,
     force: bool = False,
-) -> Tuning:
+) -> tuple[Tuning, dict[Path, str]]:
     """Tune an axis as the options say, and write the tuned vehicle if there is a path for it.
+
+    Return also the files that were written, each with what it replaced.
 
     Raises InputError about the options, FileError, and WriteError.
     """
@@ -38,10 +40,7 @@ def tune_vehicle(
         raise InputError(f"tune: {path}: --axis {axis.name}: the vehicle has only {', '.join(vehicle.layout.by_name)}")
     if not vehicle.layout.signs(axis):
         raise InputError(f"tune: {path}: --axis {axis.name}: no thruster drives this axis, so it cannot be tuned")
-    if output:
-        check_targets([output], [*([points] if points else []), *vehicle.files])
-        check_written(output, VEHICLE_FILE)
-        check_replaced([output], force=force)
+    check_targets([(output, VEHICLE_FILE)], [*([points] if points else []), *vehicle.files], force=force)
     if points is not None:
         wanted = read_points(points, vehicle, axis)
     elif command is None or V_ss is None:
@@ -52,10 +51,8 @@ def tune_vehicle(
         tuning = tune(vehicle, axis, wanted)
     except TuningError as error:
         raise InputError(f"tune: {f'{points}: ' if points else ''}{error}") from error
-    if output:
-        values = {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}
-        write_tuned(path, output, values, source(wanted), force=force)
-    return tuning
+    values = {name: tuning.vehicle[name] for name in map(axis.coefficient, TUNING)}
+    return tuning, write_tuned(path, output, values, source(wanted), force=force) if output else {}
 
 
 def source(wanted: Sequence[Target]) -> str:

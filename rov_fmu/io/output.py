@@ -14,6 +14,7 @@ from pathlib import Path
 
 from platformdirs import user_state_path
 
+from rov_fmu.io.file_kinds import check_written
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.reading import hash_of, open_file, read_text
@@ -33,23 +34,46 @@ class Output:
     """A function that raises an exception if the written draft of the file is wrong."""
 
 
-def check_targets(targets: Iterable[Path], inputs: Iterable[Path] = ()) -> None:
-    """Raise WriteError about the first path that cannot be written, or that is an input or another target."""
-    taken = list(inputs)
-    for path in targets:
-        if path.is_dir():
-            raise WriteError(errno.EISDIR, "is a folder, not a file to write", str(path))
-        if not path.parent.is_dir():
-            raise WriteError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
-        if path.exists() and not path.is_file():
-            raise WriteError(errno.EINVAL, "is a device or a pipe, and cannot be replaced by a file", str(path))
-        if path.exists() and not os.access(path, os.W_OK):
-            raise WriteError(errno.EACCES, "is read-only", str(path))
-        _check_folder(path)
-        for other in taken:
-            if is_same(path, other):
-                raise WriteError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
+def check_targets(
+    targets: Iterable[tuple[Path | None, str]],
+    inputs: Iterable[Path] = (),
+    *,
+    force: bool,
+    is_ours: Callable[[Path], bool] = lambda _: False,
+) -> dict[Path, str]:
+    """Check the files that a command will write, and return what each of them replaces: an empty text for nothing.
+
+    - `targets`: the paths, each with its kind (`file_kinds`), or an empty text. None is no file.
+    - `inputs`: the files that the command reads.
+    - `force`: True to replace any other file, and not only those of this program that nobody has changed since.
+    - `is_ours`: tells whether a file proves itself that it is as this program wrote it.
+
+    Raises FileError about a suffix of another kind, and WriteError about the first path that cannot be written, that is
+    an input or another target, or whose file may not be replaced. Of a link, only the link is replaced.
+    """
+    taken, kinds = list(inputs), [(path, kind) for path, kind in targets if path]
+    for path, kind in kinds:
+        _check_target(path, taken)
+        if kind:
+            check_written(path, kind)
         taken.append(path)
+    return {path: _replaced(path, is_ours, force=force) for path, _ in kinds}
+
+
+def _check_target(path: Path, taken: Iterable[Path]) -> None:
+    """Raise WriteError if no file can be written at a path, or if it is taken."""
+    if path.is_dir():
+        raise WriteError(errno.EISDIR, "is a folder, not a file to write", str(path))
+    if not path.parent.is_dir():
+        raise WriteError(errno.ENOENT, f"there is no folder {path.parent}", str(path))
+    if path.exists() and not path.is_file():
+        raise WriteError(errno.EINVAL, "is a device or a pipe, and cannot be replaced by a file", str(path))
+    if path.exists() and not os.access(path, os.W_OK):
+        raise WriteError(errno.EACCES, "is read-only", str(path))
+    _check_folder(path)
+    for other in taken:
+        if is_same(path, other):
+            raise WriteError(errno.EEXIST, f"would overwrite {other}, an input or another output", str(path))
 
 
 def _check_folder(path: Path) -> None:
@@ -66,15 +90,15 @@ def _check_folder(path: Path) -> None:
         raise WriteError(error.errno, reason, str(path)) from error
 
 
-def write_whole(*outputs: Output, force: bool = False, is_ours: Callable[[Path], bool] = lambda _: False) -> None:
-    """Write all files, once their drafts have passed the checks, or none of them.
+def write_whole(
+    *outputs: Output, force: bool = False, is_ours: Callable[[Path], bool] = lambda _: False
+) -> dict[Path, str]:
+    """Write all files, once their drafts have passed the checks, or none of them. Return what each file replaced.
 
-    Existing files are replaced by the rule of `check_replaced`. If a path is a link, the link is replaced and its
+    Existing files are replaced by the rule of `check_targets`. If a path is a link, the link is replaced and its
     target stays. Raises WriteError about a path that cannot be written, and whatever a check raises.
     """
-    paths = [output.path for output in outputs]
-    check_targets(paths)
-    check_replaced(paths, force=force, is_ours=is_ours)
+    replaced = check_targets([(output.path, "") for output in outputs], force=force, is_ours=is_ours)
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
         with UNINTERRUPTED:
@@ -82,6 +106,7 @@ def write_whole(*outputs: Output, force: bool = False, is_ours: Callable[[Path],
                 with _errors_about(path):
                     draft.replace(path)
             _note(outputs)
+    return replaced
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:
@@ -148,23 +173,16 @@ def without_seal(text: str) -> str:
     return rest if _SEAL.fullmatch(first) else text
 
 
-def check_replaced(
-    targets: Iterable[Path], *, force: bool, is_ours: Callable[[Path], bool] = lambda _: False
-) -> list[str]:
-    """Return a line for each existing file that will be replaced.
-
-    Raises WriteError about the first file that this program did not write, or that has changed since, unless `force`.
-    `is_ours` tells whether a file proves itself that it is as it was written. Of a link, only the link is replaced.
-    """
-    lines = []
-    for path in targets:
-        if not path.exists() or path.is_symlink():
-            continue
-        foreign = "" if (reason := _foreign(path)) and is_ours(path) else reason
-        if foreign and not force:
-            raise WriteError(errno.EEXIST, f"the file there {foreign}; --force replaces it", str(path))
-        lines.append(f"{path}: replaced {f'a file that {foreign}' if foreign else 'the result of an earlier run'}")
-    return lines
+def _replaced(path: Path, is_ours: Callable[[Path], bool], *, force: bool) -> str:
+    """Return which file at a path will be replaced, in words. Raises WriteError as `check_targets` does."""
+    if path.is_symlink():
+        return "a link"
+    if not path.exists():
+        return ""
+    foreign = "" if (reason := _foreign(path)) and is_ours(path) else reason
+    if foreign and not force:
+        raise WriteError(errno.EEXIST, f"the file there {foreign}; --force replaces it", str(path))
+    return f"a file that {foreign}" if foreign else "the result of an earlier run"
 
 
 def _foreign(path: Path) -> str:

@@ -31,7 +31,7 @@ _MAKE_ONE = "must be an Ed25519 key, which `ssh-keygen -t ed25519 -f KEY` makes"
 
 def signature_path(fmu: Path) -> Path:
     """Return the path of the signature of an FMU, which is beside it."""
-    return fmu.with_name(f"{fmu.name}.sig")
+    return Path(f"{fmu}.sig")
 
 
 def check_library() -> None:

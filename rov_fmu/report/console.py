@@ -4,7 +4,7 @@ import os
 import re
 import shlex
 import subprocess
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 from decimal import Decimal
@@ -70,10 +70,11 @@ def shell_words(*words: str | Path) -> str:
     return subprocess.list2cmdline(clean) if os.name == "nt" else shlex.join(clean)
 
 
-def print_end(written: Sequence[Path], following: str = "") -> None:
-    """Print which files a command wrote, and what to do next: a command line, or words."""
+def print_end(written: Mapping[Path, str], following: str = "") -> None:
+    """Print which files a command wrote and what each replaced, and what to do next: a command line, or words."""
     out = console()
-    sentences = [f"Wrote {listed([shell_words(path) for path in written])}."] if written else []
+    files = [shell_words(path) + (f" (replaced {old})" if old else "") for path, old in written.items()]
+    sentences = [f"Wrote {listed(files)}."] if written else []
     sentences += [f"Next: {following}"] if following else []
     if out.is_terminal and len(" ".join(sentences)) > out.width:
         for sentence in sentences:

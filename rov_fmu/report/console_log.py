@@ -1,6 +1,6 @@
 """The printout of what logs contain."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from math import isfinite
 
 from rich.table import Table
@@ -25,11 +25,9 @@ NOT_ENOUGH = (
 )
 
 
-def print_inspected(inspected: Inspected, replaced: Sequence[str] = (), *, with_draft: bool = True) -> None:
+def print_inspected(inspected: Inspected, *, with_draft: bool = True) -> None:
     """Print what logs contain, what they cannot determine, and, `with_draft`, the lines to paste into rov.toml."""
     out = console()
-    for line in replaced:
-        paragraph(out, line)
     for inspection in inspected.logs:
         print_inspection(inspection)
     for line in inspected.warnings:

@@ -5,13 +5,14 @@ from pathlib import Path
 
 from rov_fmu.interface.model import load
 from rov_fmu.io.messages import FileError, StudyError
-from rov_fmu.io.output import Output, check_replaced, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, page_output, write_whole
 from rov_fmu.report.console import print_end
 from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import vehicle_file
 from rov_fmu.study.results.page import PAGE, study_page
 from rov_fmu.study.results.results import Results
+from rov_fmu.study.results.store import STUDY, is_description
 from rov_fmu.study.results.summary import print_summary
 from rov_fmu.study.run.run_study import run_study
 
@@ -26,7 +27,8 @@ def study_plan(
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
     motion = output / f"run-{run}.mcap"
     if output.is_dir():
-        check_replaced([output / PAGE, *([motion] if run is not None else [])], force=force)
+        targets = [output / PAGE, output / STUDY, motion if run is not None else None]
+        check_targets([(path, "") for path in targets], [plan], force=force, is_ours=is_description)
     vehicle = load_plan(plan).vehicle
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
@@ -38,14 +40,14 @@ def study_plan(
             scheduler,
             StudyParts(shown).update,
             lambda message: shown.print(f"warning: {message}"),
+            force=force,
         )
-    written = [page_output(output / PAGE, study_page(results), "study")]
-    write_whole(*written, force=force)
+    written = write_whole(page_output(output / PAGE, study_page(results), "study"), force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
-        written.append(Output(motion, _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))))
-        write_whole(written[-1], force=force)
-    print_end([one.path for one in written], "open it in a browser")
+        content = _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))
+        written |= write_whole(Output(motion, content), force=force)
+    print_end(written, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
 

@@ -160,8 +160,10 @@ def write_vehicle(vehicle: Vehicle, path: str | Path, *, force: bool = False) ->
     write_whole(vehicle_output(vehicle, Path(path)), force=force)
 
 
-def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: str, *, force: bool = False) -> None:
-    """Write a copy of the vehicle file `source` with other values of some coefficients.
+def write_tuned(
+    source: Path, path: Path, values: Mapping[str, float], reason: str, *, force: bool = False
+) -> dict[Path, str]:
+    """Write a copy of the vehicle file `source` with other values of some coefficients. Return what it replaced.
 
     - `source`, `path`: the vehicle file, and the file to write. If that is a new one, it is a vehicle of its own: its
       name, its identifier and so its FMU have other names than those of `source`.
@@ -190,7 +192,7 @@ def write_tuned(source: Path, path: Path, values: Mapping[str, float], reason: s
         document["vehicle"]["identifier"] = _own_identifier(path.stem, vehicle)
         stem = "".join(c if c.isprintable() else "_" for c in path.stem)
         document["vehicle"]["name"] = f"{vehicle.name.partition(_TUNED_AS)[0][:50]}{_TUNED_AS}{stem[:30]}"
-    write_whole(_moved(document, source, path), force=force)
+    return write_whole(_moved(document, source, path), force=force)
 
 
 _TUNED_AS = ", tuned: "

@@ -14,6 +14,7 @@ from shlex import quote, split
 from socket import AF_INET, SOCK_DGRAM, socket
 from threading import Thread
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -252,7 +253,7 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
             connection.answer(packet(50, count, NEUTRAL), HERE)
     connection.write_log()
     assert {path.read_text(encoding="utf-8") for path in (tmp_path / "dive.csv", tmp_path / "dive_2.csv")} == {"kept"}
-    assert connection.logs == [tmp_path / f"dive_{n}.csv" for n in range(3, MOST_LOGS + 3)]
+    assert connection.logs == {tmp_path / f"dive_{n}.csv": "" for n in range(3, MOST_LOGS + 3)}
     assert len(list(tmp_path.iterdir())) == MOST_LOGS + 2
     assert [hint.partition(",")[0] for hint in hints] == ["packets of other senders", "a run has 20 logs with 1"]
     assert hints[0].endswith("An autopilot that was started again is followed when the old one has been silent for 5 s")
@@ -352,6 +353,22 @@ def test_the_sensors_agree_with_each_other(name: str) -> None:
     assert max(map(abs, parsed(at[-1])["velocity"])) > 0.05
 
 
+def test_no_log_replaces_a_table_of_the_vehicle(tmp_path: Path) -> None:
+    """Also not the later logs, and not with --force, which replaces all others and tells so."""
+    table, old = tmp_path / "dive_2.csv", tmp_path / "dive_3.csv"
+    for path in (table, old):
+        path.write_text("kept", encoding="utf-8")
+    with patch.object(type(HEAVY), "files", [table]):
+        connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv", force=True))
+        for _ in range(2):
+            for count in (0, 0, *range(1, 20), 10**6):
+                connection.answer(packet(50, count, NEUTRAL), HERE)
+        connection.write_log()
+    assert table.read_text(encoding="utf-8") == "kept"
+    foreign = "a file that is not as rov-fmu wrote it: it may have been made or changed by hand"
+    assert connection.logs == {tmp_path / "dive.csv": "", old: foreign}
+
+
 def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_variables(tmp_path: Path) -> None:
     rov = rov_fmu.load("videoray")
     setup = Setup(rov, servos_of(rov.layout, None, {1: "l", 2: "-r"}), {"u_t": 0.2}, log=tmp_path / "dive.mcap")
@@ -359,8 +376,9 @@ def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_vari
     for count in range(101):
         connection.answer(packet(100, count, [2100, 1400, *[1900] * 14]), HERE)
     connection.write_log()
-    assert connection.logs == [tmp_path / "dive.mcap"]
-    found = messages(connection.logs[0].read_bytes())
+    ((path, replaced),) = connection.logs.items()
+    assert (path, replaced) == (tmp_path / "dive.mcap", "")
+    found = messages(path.read_bytes())
     commands = {"u_l": 1.0, "u_r": 0.25, "u_t": 0.2}
     assert found["/inputs"] == [(10_000_000, pytest.approx(commands))]
     assert [stamp for stamp, _ in found["/outputs"]] == [10_000_000 + 100_000_000 * n for n in range(10)]

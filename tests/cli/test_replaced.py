@@ -1,123 +1,68 @@
 """Files that a command replaces: unchanged files that rov-fmu wrote, and all others only with --force."""
 
+import re
 import shutil
 import zipfile
-from collections.abc import Sequence
 from pathlib import Path
 
-import click
 import pytest
 
 from rov_fmu.build import build
 from rov_fmu.cli import _commands, main
-from rov_fmu.io.output import Output, WriteError, check_replaced, sealed, write_whole
+from rov_fmu.io.output import Output, WriteError, check_targets, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
-from tests.commands import BARE, COMMANDS, FEW_TESTS, WRITING, without_progress
+from tests.commands import BARE, FILES, READING, WRITING, without_progress
+from tests.conftest import without_page
 
 Capsys = pytest.CaptureFixture[str]
 
 
 FOREIGN = "is not as rov-fmu wrote it: it may have been made or changed by hand"
 CHANGED = "has changed since rov-fmu wrote it"
-FILES = ("rov.toml", "r.html")
-"""What `_identify` writes."""
 
 
-def _identify(folder: Path, *options: str) -> int:
-    vehicle, report = (str(folder / name) for name in FILES)
-    return main(["identify", str(FEW_TESTS), "-o", vehicle, "--report", report, *options])
-
-
-@pytest.mark.parametrize("name", FILES)
-@pytest.mark.parametrize(
-    ("is_of_ours", "before", "after", "reason"),
-    [
-        (True, b"my", b"our", CHANGED),
-        (True, b"my", b"\xff", "is not UTF-8 text, at byte {}"),
-        (False, b"my", b"\xff", FOREIGN),
-    ],
-)
-def test_the_work_of_others_is_refused_before_anything_is_computed(
-    name: str,
-    is_of_ours: bool,
-    before: bytes,
-    after: bytes,
-    reason: str,
-    tmp_path: Path,
-    capsys: Capsys,
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    path = tmp_path / name
-    seal = ("# {}", "<!-- {} -->")[FILES.index(name)]
-    text = sealed("my notes", seal, "identify") if is_of_ours else "my notes"
-    own = text.encode().replace(before, after)
-    path.write_bytes(own)
-    monkeypatch.setattr(
-        "rov_fmu.interface.identify_command.identify", lambda *_: pytest.fail("it is computed before it is refused")
-    )
-    monkeypatch.setattr("rov_fmu.tank.folder.read_rows", lambda *_: pytest.fail("tests are read before it is refused"))
-    assert _identify(tmp_path) == 2
-    reason = reason.format(own.find(after))
-    line = f"rov-fmu: {path}: cannot be written: the file there {reason}; --force replaces it\n"
-    assert capsys.readouterr() == ("", line)
-    assert [*tmp_path.iterdir()] == [path]
-    assert path.read_bytes() == own
-
-
-def test_an_identification_tells_what_it_replaces(tmp_path: Path, capsys: Capsys) -> None:
-    paths = [tmp_path / name for name in FILES]
-    assert _identify(tmp_path) == 0
-    first, reasons = [path.read_bytes() for path in paths], ["the result of an earlier run"] * 2
-    for options in ([], ["--force"]):
-        capsys.readouterr()
-        assert _identify(tmp_path, *options) == 0
-        out, err = capsys.readouterr()
-        assert without_progress(err) == ""
-        told = [f"{path}: replaced {reason}" for path, reason in zip(paths, reasons, strict=True)]
-        assert out.splitlines()[:2] == told
-        assert [path.read_bytes() for path in paths] == first
-        paths[0].write_bytes(first[0] + b"\n")
-        paths[1].write_text("my notes", encoding="utf-8")
-        reasons = [f"a file that {CHANGED}", f"a file that {FOREIGN}"]
-
-
-def _check(paths: Sequence[Path]) -> list[str]:
-    return check_replaced(paths, force=False)
+def _check(path: Path) -> str:
+    """Return what would be replaced."""
+    return check_targets([(path, "")], force=False)[path]
 
 
 def test_a_seal_outlasts_another_form_of_line_breaks_and_nothing_else(tmp_path: Path) -> None:
     path = tmp_path / "some.toml"
-    assert _check([path]) == []
+    assert _check(path) == ""
     text = sealed("a = 1\nb = 2\n", "# {}", "identify")
     for whole in (text, text.replace("\n", "\r\n"), f"\ufeff{text}"):
         path.write_bytes(whole.encode())
-        assert _check([path]) == [f"{path}: replaced the result of an earlier run"]
-    for other in (text + "\n", text.replace("a", "c", 1), text.partition("\n")[2], f"\n{text}", "", text[:40]):
-        path.write_bytes(other.encode())
-        with pytest.raises(WriteError):
-            _check([path])
+        assert _check(path) == "the result of an earlier run"
+    ours = text.encode()
+    for other, reason in (
+        (ours + b"\n", CHANGED),
+        (ours.replace(b"a = 1", b"c = 1"), CHANGED),
+        (ours.replace(b"a = 1", b"\xff"), f"is not UTF-8 text, at byte {ours.index(b'a = 1')}"),
+        *((other, FOREIGN) for other in (ours.partition(b"\n")[2], b"\n" + ours, b"", ours[:40], b"\xff")),
+    ):
+        path.write_bytes(other)
+        with pytest.raises(WriteError, match=f"the file there {reason}; --force replaces it"):
+            _check(path)
 
 
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
-READING = {
-    *{("build", "sign"), ("simulate", "commands"), ("fly", "recording"), ("fly", "identified")},
-    *{("prove", "fmu"), ("prove", "key"), ("study", "plan"), ("tune", "points")},
-    *{("identify", "tests"), ("inspect", "tests")},
-}
-"""The arguments and options that name a file to read."""
-AGAIN = [key for key in COMMANDS if key[0] in ("simulate", "fly", "sdf", "export", "tune")]
-"""What is quick enough to be written several times."""
+_WORK = (
+    "rov_fmu.tank.folder.read_rows",
+    "rov_fmu.interface.identify_command.identify",
+    "rov_fmu.interface.inspect_command.inspect_logs",
+    "rov_fmu.interface.fly_command.fly_page",
+    "rov_fmu.interface.simulate_command.run",
+    "rov_fmu.interface.tune_command.tune",
+    "rov_fmu.interface.prove_command.prove_claims",
+    "rov_fmu.study.study_command.run_study",
+    "rov_fmu.build.compile_all",
+)
+_SLOW = dict.fromkeys(("build", "study", "identify", "inspect"), pytest.mark.long) | {"prove": pytest.mark.weekly}
 
 
-def test_every_file_that_a_command_writes_is_known_here() -> None:
-    named = {
-        (name, parameter.name)
-        for name, command in _commands.commands.items()
-        for parameter in command.params
-        if isinstance(parameter.type, click.Path)
-    }
-    assert named - READING == WRITING.keys() - {("build", "osp"), ("export", "folder"), ("study", "run")}
+def test_every_file_that_a_command_reads_or_writes_is_known_here() -> None:
+    assert WRITING.keys() - {("build", "osp"), ("export", "folder"), ("study", "run")} == FILES.keys() - READING.keys()
     assert {name for name, command in _commands.commands.items() for p in command.params if p.name == "force"} == {
         name for name, _ in WRITING
     }
@@ -125,8 +70,11 @@ def test_every_file_that_a_command_writes_is_known_here() -> None:
 
 @pytest.mark.parametrize("key", WRITING, ids=" ".join)
 def test_no_command_replaces_the_work_of_others(
-    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys
+    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    """It is refused before tests are read and before anything is computed."""
+    for work in _WORK:
+        monkeypatch.setattr(work, lambda *_, **__: pytest.fail("the work is done before it is refused"))
     command = WRITING[key]
     (tmp_path / "plan.toml").write_text(f'vehicle = "{BARE.name}"\nstop_time = 1.0\n', encoding="utf-8")
     shutil.copy(BARE, tmp_path)
@@ -141,18 +89,34 @@ def test_no_command_replaces_the_work_of_others(
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 
 
-@pytest.mark.parametrize("key", AGAIN, ids=" ".join)
-def test_a_command_replaces_its_own_file_until_somebody_changes_it(
-    key: tuple[str, str], tmp_path: Path, capsys: Capsys
+@pytest.mark.parametrize(
+    "key", [pytest.param(key, marks=_SLOW.get(key[0], ()), id=" ".join(key)) for key in WRITING if key[0] != "sitl"]
+)
+def test_a_command_tells_what_it_replaces(
+    key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
-    target = tmp_path / COMMANDS[key].name
-    words = COMMANDS[key].arguments(target)
-    assert [main(words), main(words)] == [0, 0]
+    """It replaces its own file until somebody changes it, and then with --force only. For `sitl`, see its tests."""
+    shutil.copy(BARE, tmp_path)
+    plan = f'vehicle = "{BARE.name}"\nstop_time = 1.0\nstep = 0.5\nsampler = "grid"\n'
+    plan += '[keep]\noutputs = ["w"]\nevery = 0.5\n'
+    (tmp_path / "plan.toml").write_text(plan, encoding="utf-8")
+    target = tmp_path / WRITING[key].name
+    words = WRITING[key].arguments(target, fmu=str(videoray_fmu))
+
+    def told() -> str:
+        with without_page():
+            assert main(words) == 0
+        out = " ".join(capsys.readouterr().out.split())
+        return out.partition(f"Wrote {target.parent if key[1] == 'folder' else ''}")[2]
+
+    write_whole(Output(target, b"old"))
+    assert "(replaced the result of an earlier run)" in told()
     with target.open("ab") as file:
         file.write(b"\n")
     assert main(words) == 2
     assert "wrote it" in capsys.readouterr().err
-    assert main([*words, "--force"]) == 0
+    words.append("--force")
+    assert re.search(rf"\(replaced a file that ({FOREIGN}|{CHANGED})", told())
 
 
 def test_an_fmu_proves_itself_on_any_machine(

@@ -2,17 +2,31 @@
 
 import errno
 import os
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
-from tests.commands import ALONE, COMMANDS, FEW_TESTS, REFIT, TESTS, Command, run_elsewhere, without_progress
+from tests.commands import (
+    ALONE,
+    COMMANDS,
+    FEW_TESTS,
+    FILES,
+    READING,
+    REFIT,
+    TESTS,
+    Command,
+    run_elsewhere,
+    without_progress,
+)
 from tests.conftest import without_page
 from tests.vehicles import THRUST_EFFECTS
 
@@ -152,18 +166,21 @@ BUILT = [
 ]
 OVERWRITING = [
     *(f"build {vehicle} --osp -o {output}" for vehicle, output in BUILT),
-    "fly videoray.toml --against refit.toml -o videoray.toml",
-    "fly videoray.toml --against refit.toml -o refit.toml",
     "identify tests --force -o tests/rov.toml",
     "identify tests --force -o tests/other.toml",
     "identify tests --force --report tests/steady_surge.csv",
     "identify tests --force -o new --report tests/../new",
-    "tune videoray.toml --axis heave --points points.csv -o points.csv",
     "tune effects.toml --axis surge --command 1 --v-ss 1 -o thrust_12_v.csv",
     "simulate effects.toml -o thrust_12_v.csv",
     "sitl effects.toml --log thrust_12_v.csv",
 ]
 """Commands in the folder `reading` whose output is one of their inputs, or another output."""
+OVERWRITING += [
+    f"{line} --force {FILES[key[0], option]} {'.' if key[0] == 'study' else line.split()[-1]}"
+    for key, line in READING.items()
+    for name, option in FILES.keys() - READING.keys()
+    if name == key[0] and key != ("tune", "vehicle")  # which may be tuned in its place
+]
 
 
 @pytest.fixture(scope="module")
@@ -184,8 +201,12 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "tests/rov.toml": rov.replace('"videoray"\n', '"other.toml"\n', 1),
         "refit.toml": refit.replace("\n[provenance]", '\n[provenance]\nreport = "report.html"'),
         "report.html": "a report",
-        "points.csv": "command [%],velocity [m/s]\n20,0.1\n",
+        "points.csv": "time,command [%],velocity [m/s]\n0,20,0.1\n",
+        "study.json": 'vehicle = "videoray.toml"\nstop_time = 1.0\n',
+        **dict.fromkeys(("logs.mcap", "videoray.fmu", "key.pub"), "is read once the output is checked"),
     }
+    key = Ed25519PrivateKey.generate().private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    (folder / "key.fmu").write_bytes(key)
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder
@@ -198,7 +219,7 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(
     monkeypatch.chdir(reading)
     before = {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()}
     assert main(command.split()) == 2
-    assert "would overwrite" in one_line(capsys)
+    assert re.search("would overwrite|the name must end with", one_line(capsys))
     assert {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()} == before
 
 

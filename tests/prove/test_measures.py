@@ -233,6 +233,8 @@ def _body(free: float, *braked: float) -> Callable[..., Any]:
     ("energies", "result", "words"),
     [
         ((1.00005, 0.5, 0.25), "holds", "and never rises"),
+        ((1.00005, 0.5, 0.25, 0.25 * (1.0 + 1e-13)), "holds", "and never rises"),  # by no more than rounding
+        ((1.00005, 0.5, 0.25, 0.25 + 1e-11), "fails", "but rises by 1.0e-11 in a step."),
         ((1.0002, 0.5, 0.25), "fails", "within 2.0e-04; 1e-04 is allowed."),
         ((0.9998, 0.5, 0.25), "fails", "within 2.0e-04; 1e-04 is allowed."),
         (

@@ -48,7 +48,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
 
 def test_messages_and_ends_escape_control_characters(capsys: pytest.CaptureFixture[str]) -> None:
     print_message(f"rov-fmu: warning: {FOREIGN}")
-    print_end([Path(FOREIGN)], FOREIGN)
+    print_end({Path(FOREIGN): ""}, FOREIGN)
 
     def fail() -> None:
         raise InputError(FOREIGN)
@@ -131,8 +131,8 @@ def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_
     monkeypatch.setattr(terminal, "console", lambda: out)
     for out.width, words in {29: "Wrote a.fmu. Next: open a.fmu\n", 28: "Wrote a.fmu.\nNext: open a.fmu\n"}.items():
         out.file = io.StringIO()
-        print_end([Path("a.fmu")], "open a.fmu")
-        print_end([])
+        print_end({Path("a.fmu"): ""}, "open a.fmu")
+        print_end({})
         assert out.file.getvalue() == words
     out.file, out._force_terminal = io.StringIO(), False
     print_table(found, out)

@@ -1,11 +1,14 @@
 """The mutation test: which lines it changes, and which tests it runs for them."""
 
+import signal
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 from verification import mutation
-from verification.checkouts import ROOT
+from verification.checkouts import ROOT, environment
 
 
 def test_every_file_has_tests() -> None:
@@ -52,37 +55,40 @@ def test_only_code_is_mutated(source: Path) -> None:
     assert [mutant.after for mutant in mutation.draw(1)] == [mutant.after for mutant in mutation.draw(1)]
 
 
-def test_a_kept_mutant_is_found_where_its_line_is_today(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(mutation, "ROOT", tmp_path)
-    monkeypatch.setattr(mutation, "FILES", ("*.py",))
-    (tmp_path / "a.py").write_text("x = 1\ny = 2\nx = 1\nz = 3\n")
-    rows = [mutation.kept(mutation.Mutant("a.py", n, "x = 1", "x = 2", "")) for n in (1, 3)]
-    assert [found.text for row in rows if (found := mutation.applied(row))] == [
-        "x = 2\ny = 2\nx = 1\nz = 3\n",
-        "x = 1\ny = 2\nx = 2\nz = 3\n",
+@pytest.mark.long
+@pytest.mark.parametrize(("limit", "code", "begun"), [(0.0, 0, ""), (2.5, -signal.SIGXCPU, "b")])
+@pytest.mark.skipif(sys.platform == "win32", reason="the limits are POSIX")
+def test_processor_time_ends_a_run_or_a_test(limit: float, code: int, begun: str, tmp_path: Path) -> None:
+    text = """
+def test_b():
+    open("log", "w").write("b")
+    while True: pass
+"""
+    (tmp_path / "test_a.py").write_text(text)
+    (tmp_path / "log").touch()
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-q",
+        "-p",
+        "verification.processor_time",
+        "-c",
+        "/dev/null",
+        "test_a.py",
     ]
-    (tmp_path / "a.py").write_text("x = 1\ny = 2\n" * 3)
-    alike = [mutation.applied(mutation.kept(mutation.Mutant("a.py", n, "y = 2", "y = 3", ""))) for n in (2, 4)]
-    assert [found and found.line for found in alike] == [2, 4], "the neighbours are alike, and its number tells"
-    (tmp_path / "a.py").write_text("\nx = 1\nw = 2\nx = 1\nz = 3\n")
-    assert [mutation.applied(row) for row in rows] == [None, None], "in two places, with other neighbours"
-    (tmp_path / "a.py").write_text("a = 1\n")
-    (tmp_path / "b.py").write_text("y = 2\nx = 1\nz = 3\n")
-    moved = mutation.applied(rows[1])
-    assert moved is not None
-    assert (moved.file, moved.line, moved.text) == ("b.py", 2, "y = 2\nx = 2\nz = 3\n")
+    own = environment(ROOT) | {"ROV_FMU_PROCESSOR_TIME": str(limit), "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
+    assert subprocess.run(command, cwd=tmp_path, env=own, capture_output=True, check=False).returncode == code
+    assert (tmp_path / "log").read_text() == begun
 
 
 @pytest.mark.long
-def test_verdicts_are_written_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    file = "rov_fmu/equation/alone.py"
+def test_what_fails_a_test_is_killed(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    file, before = "rov_fmu/equation/alone.py", "from dataclasses import dataclass"
     monkeypatch.setattr(mutation, "tests_of", lambda _: ["tests/equation/test_alone.py"])
-    before = "from dataclasses import dataclass"
-    line = 1 + (ROOT / file).read_text(encoding="utf-8").splitlines().index(before)
-    mutants = [mutation.Mutant(file, line, before, after, "") for after in (f"{before}  # same", "1 / 0")]
-    rows = [*map(mutation.kept, mutants), mutation.kept(mutants[0]) | {"before": "no such line"}]
-    results = tmp_path / "results.csv"
-    done = mutation.run_kept(results, rows)
-    assert [row["verdict"] for row in done] == ["survived", "killed", "no longer applies"]
-    assert mutation.read_rows(results) == done
-    assert mutation.run_kept(results, rows) == done, "nothing is left to run"
+    text = (ROOT / file).read_text(encoding="utf-8")
+    mutants = [
+        mutation.Mutant(file, 1, before, after, text.replace(before, after)) for after in (f"{before}  # same", "1 / 0")
+    ]
+    assert mutation.run(mutants, 1) == mutants[:1]
+    assert "2/2 killed" in capsys.readouterr().out

@@ -53,7 +53,7 @@ _QUICK = Effort(3, 1024, manoeuvres=1, runs=1000, study_runs=(100, 400))
     help="Also draw cost against error there (docs/cost_error.svg is one).",
 )
 def _command(quick: bool, picture_file: Path | None) -> None:
-    check_targets(filter(None, (picture_file,)))
+    check_targets([(picture_file, "")], force=True)
     if host_platform() is None:
         raise BuildError("there is no binary for this machine to measure")
     print(machine())

@@ -3,7 +3,7 @@
 The model is the motion of a vehicle with a slow force along each axis (an Ornstein-Uhlenbeck process), whose velocities
 are measured 20 times per second. All filters take one Runge-Kutta step of the mean per sample, and the covariance by
 the derivatives in its middle. The others compute the rates by `VehicleModel.rates`: with NumPy one sample after the
-other (written by hand, and by filterpy), and with JAX, which compiles the filter for many sets of parameters at once.
+other, and with JAX, which compiles the filter for many sets of parameters at once.
 """
 
 import importlib
@@ -177,25 +177,6 @@ class Case:
                 found.append(off)
         return np.array(found)[None]
 
-    def by_filterpy(self) -> Array:
-        """Run the extended Kalman filter of filterpy: 1 x samples."""
-        kalman = importlib.import_module("filterpy.kalman").ExtendedKalmanFilter(len(self.start[0]), 1)
-        kalman.x, kalman.P = (array.copy() for array in self.start)
-        kalman.R, kalman.Q = np.array([[NOISE**2]]), self.noise
-        found = []
-        for n, sample in enumerate(self.samples):
-            if n:
-                thrust = self.thrusts[(n - 1) // _HELD]
-                after, middle = self.moved(kalman.x, thrust, np)
-                kalman.F = self.transition(self.slope(middle, thrust), np)
-                kalman.predict_x = lambda u=0, after=after: setattr(kalman, "x", after)  # noqa: ARG005
-                kalman.predict()
-            for place, value in enumerate(sample):
-                row = np.eye(1, len(kalman.x), place)
-                kalman.update(np.array([value]), lambda x, row=row: row, lambda x, row=row: row @ x)  # noqa: ARG005
-                found.append(float(kalman.y[0]))
-        return np.array(found)[None]
-
     def by_jax(self, count: int) -> Callable[[], Array]:
         """Return a function that runs a filter that JAX compiles for sets of parameters: sets x samples."""
         jax = importlib.import_module("jax")
@@ -234,12 +215,8 @@ def section(vehicle: Vehicle, repetitions: int) -> Section:
         ("ours, one set", case.ours(1)),
         ("NumPy, by hand", case.by_hand),
     ]
-    for module, words, way in (
-        ("filterpy", "filterpy", case.by_filterpy),
-        ("jax", f"JAX, {_SETS} sets", lambda: case.by_jax(_SETS)),
-    ):
-        if importlib.util.find_spec(module):
-            ways.append((words, way() if module == "jax" else way))  # type: ignore[arg-type]
+    if importlib.util.find_spec("jax"):
+        ways.append((f"JAX, {_SETS} sets", case.by_jax(_SETS)))
     rows: list[Sequence[str]] = [
         [f"A sample of the filter: {vehicle.name}", "time", "times ours", "innovations differ"]
     ]

@@ -54,7 +54,7 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
         raise click.UsageError(f"--only {unknown}: there is no such data set, only {', '.join(names)}")
     output.mkdir(parents=True, exist_ok=True)
     files = [output / name for name in ("scores.csv", "coefficients.csv", "scores.svg")]
-    check_targets(files)
+    check_targets([(file, "") for file in files], force=True)
     log = Console(stderr=True)
     rows, found = [], []
     with tempfile.TemporaryDirectory(prefix="identification-") as folder:

@@ -20,11 +20,20 @@ _LOCK = ".lock"
 _PART = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
 
 
+def is_description(path: Path) -> bool:
+    """Return True if a file is the description of a study, which the same study writes again."""
+    try:
+        return path.name == STUDY and bool(Store(path.parent).description())
+    except FileError:
+        return False
+
+
 class Store:
     """A folder of results. A range of runs is done as soon as its file in runs/ exists."""
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
+    def __init__(self, folder: Path, *, force: bool = False) -> None:
+        """`force` allows replacing a file that is no description of a study, but has its name."""
+        self.folder, self._force = folder, force
 
     @contextmanager
     def held(self) -> Iterator[None]:
@@ -75,7 +84,7 @@ class Store:
         self._clean()
         head = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", "runs": runs, "plan": dict(plan), "fmu": fmu}
         text = json.dumps({**head, **description}, indent=2, ensure_ascii=False)
-        write_whole(Output(path, f"{text}\n".encode()), force=True)
+        write_whole(Output(path, f"{text}\n".encode()), force=self._force, is_ours=is_description)
 
     def description(self) -> dict[str, Any]:
         """Return the description of the study. Raises FileError."""

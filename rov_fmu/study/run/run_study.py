@@ -9,6 +9,7 @@ from pathlib import Path
 from rov_fmu.build import build
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.reading import read_bytes
 from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import prepare, vehicle_file
@@ -53,10 +54,15 @@ def run_study(
     scheduler: str | None,
     on_progress: Callable[[Progress], None],
     on_warning: Callable[[str], None] = lambda _: None,
+    *,
+    force: bool = False,
 ) -> tuple[Spent, Results]:
-    """Do the missing runs; return their times and the results. `on_warning` is called with each warning."""
+    """Do the missing runs; return their times and the results. `on_warning` is called with each warning.
+
+    `force` allows replacing the work of others that has the name of a file of the results.
+    """
     plan = load_plan(path)
-    store = Store(folder)
+    store = Store(folder, force=force)
     model = _model(plan, path)
     prepared = prepare(plan, path, model)
     for warning in prepared.warnings:
@@ -79,7 +85,8 @@ def run_study(
             warnings=prepared.warnings,
         )
         if plan.vehicle:
-            write_whole(Output(folder / model.name, model.content), force=True)
+            fmu = Output(folder / model.name, model.content)
+            write_whole(fmu, force=force, is_ours=lambda there: read_bytes(there) == fmu.content)
         spent = execute(job, design, store, workers, scheduler, on_progress)
         if spent.turned:
             count = f"in {spent.turned} of {spent.runs} runs"

@@ -358,7 +358,7 @@ def signed_fmu(keys: Path, made_once: Made) -> Path:
         path = folder / "refit.fmu"
         with without_page():
             built = build(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
-        assert [*built.beside] == [path.with_name("refit.fmu.sig")]
+        assert [*built.written] == [path, path.with_name("refit.fmu.sig")]
 
     return made_once("signed", fill) / "refit.fmu"
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu import load
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.fmu.card import card_text
 from rov_fmu.identify.beginning import begin, load_tests
@@ -130,6 +131,22 @@ def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> Non
         truth = truths["yaw", f"V_ss {100.0 * command:g} %"]
         assert abs(value / truth - 1.0) < 0.005
         assert low < truth < high
+
+
+def test_it_is_told_why_a_log_identifies_no_axis(tmp_path: Path) -> None:
+    """Nobody steers, and the heading is logged; nothing shows surge and sway."""
+    rov, time = load("bluerov2"), np.arange(0.0, 20.0, 0.2)
+    motion = rov.simulate(time, {"heave": np.repeat([0.3, -0.2, 0.4, -0.4, 0.0], 20)})
+    noise = 0.003 * np.random.default_rng(0).standard_normal((2, len(time)))
+    columns = {f"{name} [1]": values for name, values in motion.commands.items()}
+    columns |= {SENSORS[HEAVE]: motion["z"] + noise[0], SENSORS[YAW]: noise[1]}
+    folder = folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', {})
+    write_dive(folder / "dive.csv", time, columns)
+    assert {one.axis: one.reason for one in identify(load_tests(folder)).axes_of_base} == {
+        SURGE: "nothing in the logs shows it",
+        SWAY: "nothing in the logs shows it",
+        YAW: "nothing in the logs drives it",
+    }
 
 
 # ---- What every surface says -----------------------------------------------------------------------------------------
