@@ -84,7 +84,8 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     assert numbers["T_top"].narrowed == pytest.approx(ERROR / 0.15)
     assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
     assert vehicle["d_top"] == pytest.approx(0.1 * (vehicle["a_t_top"] + vehicle["b_t_top"]))
-    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "d", "T"]
+    assert vehicle["d_top_reverse"] == pytest.approx(0.1 * (vehicle["a_t_top_reverse"] + vehicle["b_t_top_reverse"]))
+    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "d", "d_reverse", "T"]
     assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
 
 

@@ -189,7 +189,7 @@ KINDS = {
             "thrust_reverse", 0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"
         ),
         "thrust astern relative to thrust ahead",
-        keys=("a_t_reverse", "b_t_reverse"),
+        keys=("a_t_reverse", "b_t_reverse", "d_reverse"),
         is_ratio=True,
         null=0.0,
         adapts=True,
@@ -215,7 +215,10 @@ KINDS = {
     ),
     "advance": Kind(
         Deviation(
-            "advance", 0.2, "the share of full thrust lost per m/s ahead", "propellers give no thrust at 3 to 10 m/s"
+            "advance",
+            0.2,
+            "the share of full thrust lost per m/s, either way",
+            "propellers give no thrust at 3 to 10 m/s",
         ),
         "loss of thrust with the speed of advance, relative to full thrust",
         keys=("d",),

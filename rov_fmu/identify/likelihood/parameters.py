@@ -166,11 +166,12 @@ class Table:
                 ratio = self._ratio(other, band) * np.exp(self.get(z, "dead band astern", curve.name))
                 values[other] = values[band] * ratio
         if "d" in curve.keys and not curve.tables:
-            lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
-            full = values[curve.coefficient("a_t")] + values[curve.coefficient("b_t")]
-            ahead = curve.coefficient("d")
-            for name in (ahead, curve.coefficient(f"d{REVERSE}")):
-                values[name] = self._ratio(name, ahead) * lost * full
+            usual = _lost(curve, self.base)
+            lost = self.get(z, "advance", curve.name, default=usual)
+            for end in (REVERSE, ""):  # both may be the same coefficient
+                full = values[curve.coefficient(f"a_t{end}")] + values[curve.coefficient(f"b_t{end}")]
+                relative = _lost(curve, self.base, end) / usual if usual else 1.0
+                values[curve.coefficient(f"d{end}")] = lost * relative * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             values[lag] = np.maximum(self.get(z, "lag", default=values[lag]), LEAST_LAG)
@@ -377,9 +378,10 @@ def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
             yield from make("advance", curve.name, mean=_lost(curve, known.coefficients))
 
 
-def _lost(curve: Curve, c: Mapping[str, float]) -> float:
-    """Return the share of the full thrust of a curve that is lost per speed of advance, s/m."""
-    return c[curve.coefficient("d")] / (c[curve.coefficient("a_t")] + c[curve.coefficient("b_t")])
+def _lost(curve: Curve, c: Mapping[str, float], end: str = "") -> float:
+    """Return the share of the full thrust of a curve ahead or astern that is lost per speed of advance, s/m."""
+    lost, a, b = (c[curve.coefficient(f"{key}{end}")] for key in ("d", "a_t", "b_t"))
+    return lost / (a + b)
 
 
 def _least_linear(curve: Curve, c: Mapping[str, float], end: str) -> float:
