@@ -315,7 +315,7 @@ HYPOTHESES = {
             "all thrusters: the speed of the rotors lags behind the command, and not the force{odds}. The vehicle file "
             'says so by lag = "speed"'
         ),
-        alarm=1.3,
+        alarm=1.0,
         changes_thrust=False,
     ),
     "momentary commands": Hypothesis(
