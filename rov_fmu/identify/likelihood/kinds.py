@@ -214,17 +214,22 @@ KINDS = {
         null=0.0,
     ),
     "advance": Kind(
-        Deviation(
-            "advance",
-            0.2,
-            "the share of full thrust lost per m/s, either way",
-            "propellers give no thrust at 3 to 10 m/s",
-        ),
+        Deviation("advance", 0.2, "the share of full thrust lost per m/s", "propellers give no thrust at 3 to 10 m/s"),
         "loss of thrust with the speed of advance, relative to full thrust",
         keys=("d",),
         low=0.0,
         null=0.0,
         unit="s/m",
+        adapts=True,
+    ),
+    "advance astern": Kind(
+        Deviation(
+            "advance_astern", 0.3, "ln of the share lost astern to that ahead", "propellers are made for one direction"
+        ),
+        "loss of thrust with the speed of advance astern relative to that ahead",
+        keys=("d_reverse",),
+        is_ratio=True,
+        null=0.0,
         adapts=True,
     ),
     "lag": Kind(
@@ -424,8 +429,6 @@ EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is
 absent. The noise of a sensor is never exact."""
-EFFECT_OF = {key: name for name, kind in EFFECTS.items() for key in kind.keys}
-"""The effect that each key of an optional coefficient belongs to."""
 ABSENT = {
     key: kind.null for kind in EFFECTS.values() if kind.null is not None and not kind.is_ratio for key in kind.keys
 }

@@ -168,10 +168,11 @@ class Table:
         if "d" in curve.keys and not curve.tables:
             usual = _lost(curve, self.base)
             lost = self.get(z, "advance", curve.name, default=usual)
-            for end in (REVERSE, ""):  # both may be the same coefficient
+            astern = np.exp(self.get(z, "advance astern", curve.name))
+            for end, own in ((REVERSE, astern), ("", 1.0)):  # both may be the same coefficient
                 full = values[curve.coefficient(f"a_t{end}")] + values[curve.coefficient(f"b_t{end}")]
                 relative = _lost(curve, self.base, end) / usual if usual else 1.0
-                values[curve.coefficient(f"d{end}")] = lost * relative * full
+                values[curve.coefficient(f"d{end}")] = lost * own * relative * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             values[lag] = np.maximum(self.get(z, "lag", default=values[lag]), LEAST_LAG)
@@ -376,6 +377,8 @@ def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
             yield from make("advance", curve.name, mean=_lost(curve, known.coefficients))
+            if f"d{REVERSE}" in curve.keys:
+                yield from make("advance astern", curve.name)
 
 
 def _lost(curve: Curve, c: Mapping[str, float], end: str = "") -> float:
