@@ -410,6 +410,16 @@ KINDS = {
         null=log(50.0),
         unit="1/s",
     ),
+    "voltage drop": Kind(
+        None,
+        "share of the thrust that is lost while all thrusters have full command",
+        ". The vehicle file does not have it",
+        mean=0.15,
+        deviation=0.15,
+        low=0.0,
+        high=0.8,
+        null=0.0,
+    ),
     "white noise": Kind(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
         is_log=True,

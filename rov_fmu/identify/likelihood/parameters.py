@@ -258,9 +258,10 @@ class Table:
         )
 
     def followed(self, z: Array, one: SampledLog) -> Array:
-        """Return the inputs that thrusters can follow, by a limit and a slew limit: (sets x) rows x inputs."""
-        limits = (self.get(z, kind, default=np.inf) for kind in ("command limit", "slew limit"))
-        some = [_followed(one, float(limit), float(slew)) for limit, slew in np.broadcast(*limits)]
+        """Return the inputs that thrusters follow, by limits and a drop of the voltage: (sets x) rows x inputs."""
+        limits = [self.get(z, kind, default=np.inf) for kind in ("command limit", "slew limit")]
+        drop = self.get(z, "voltage drop")
+        some = [_followed(one, *map(float, numbers)) for numbers in np.broadcast(*limits, drop)]
         return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
@@ -270,10 +271,10 @@ class Table:
 
 
 @lru_cache(64)
-def _followed(one: SampledLog, limit: float, slew: float) -> Array:
+def _followed(one: SampledLog, limit: float, slew: float, drop: float) -> Array:
     """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same."""
     found = one.record.inputs
-    if one.log.follows_axis or limit == slew == np.inf:
+    if one.log.follows_axis or (limit == slew == np.inf and drop == 0.0):
         return found
     found, steps = found.copy(), np.diff(one.record.told).tolist() if slew < np.inf else []
     for n in (n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands):
@@ -282,6 +283,10 @@ def _followed(one: SampledLog, limit: float, slew: float) -> Array:
         for row, (value, step) in enumerate(zip(values.tolist(), steps, strict=False)):
             before, now = now, now + min(max(value - now, -slew * step), slew * step)
             found[row, n] = 0.5 * (before + now)  # the mean over a row is that at its middle
+    places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
+    # Power and thrust grow about with the square of a command.
+    load = np.mean(found[:, places] ** 2, axis=1)
+    found[:, places] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
     return found
 
 

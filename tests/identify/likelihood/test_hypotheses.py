@@ -89,8 +89,15 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
+        "drooping": Fault("voltage drop", acting=lambda u: drooping(u, 0.3), value=0.3),
         "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=0.8),
     }
+
+
+def drooping(u: Commands, share: float) -> Commands:
+    """The commands whose thrust is that of some commands at a voltage that falls with the load."""
+    left = np.sqrt(1.0 - share * np.mean(np.square([*u.values()]), axis=0))
+    return {name: c * left for name, c in u.items()}
 
 
 def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
