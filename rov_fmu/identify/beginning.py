@@ -297,6 +297,8 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             more[curve.coefficient("T")] = ABSENT["T"]
         if logged and not (layout.has_wrench or curve.tables):
             more[curve.coefficient("d")] = ABSENT["d"]
+            if curve.coefficient("d") not in values:
+                more[curve.name_of(f"d{REVERSE}")] = ABSENT["d"]
     more = {name: base.get(name, value) for name, value in more.items()}
     return _with(vehicle.layout, vehicle.coefficients, more | values)
 

@@ -19,7 +19,7 @@ from rov_fmu.equation.parts import EVERY_COMMAND, Part, Range
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECT_OF, EXACT_BAND
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Identification, Interval
@@ -291,10 +291,12 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
             return with_voltage
         if coefficients[name] == ABSENT.get(key.removesuffix(REVERSE)):
             return False
-        if name in base or not key.endswith(REVERSE) or key not in EFFECT_OF:
+        effects = {effect: kind.keys for effect, kind in EFFECTS.items() if key in kind.keys}
+        if not key.endswith(REVERSE) or not effects:
             return True
-        effect, (_, of, _) = EFFECT_OF[key], table.layout.keys_in_file[name]
-        return (effect, of) in present
+        _, of, _ = table.layout.keys_in_file[name]
+        others = {part.name_of(other) for keys in effects.values() for other in keys}
+        return not (others.isdisjoint(base) and present.isdisjoint((effect, of) for effect in effects))
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)

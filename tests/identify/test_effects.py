@@ -49,7 +49,7 @@ def found(fit: Fit, **others: float) -> Fit:
 
 def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(fit: Fit, short: given.Tests) -> None:
     """A number is determined where its error is at most 0.8 times that of its prior, which is 0.5 for the inertia."""
-    clear = found(fit, dead_band_astern=0.0)
+    clear = found(fit, dead_band_astern=0.0, advance_astern=log(1.2))
     inertia = {"heave": 0.79 * 0.5, "yaw": 0.81 * 0.5}
     table = fit.posterior.table
     of = [inertia.get(p.of, 0.0) * (p.kind == "inertia") for p in table.parameters]
@@ -84,13 +84,14 @@ def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(
     assert numbers["T_top"].narrowed == pytest.approx(ERROR / 0.15)
     assert (vehicle.command_range, vehicle.measured_from) == ((0.2, 0.8), "tank tests")
     assert vehicle["d_top"] == pytest.approx(0.1 * (vehicle["a_t_top"] + vehicle["b_t_top"]))
-    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "d", "T"]
+    assert vehicle["d_top_reverse"] == pytest.approx(0.12 * (vehicle["a_t_top_reverse"] + vehicle["b_t_top_reverse"]))
+    keys = ["a_t", "b_t", "a_t_reverse", "b_t_reverse", "c_0", "d", "d_reverse", "T"]
     assert [[*curve.keys] for curve in vehicle.layout.curves] == [[key for key in CURVE if key in keys]] * 2
 
 
 def test_the_vehicle_of_a_fit_without_effects_has_none(fit: Fit, short: given.Tests) -> None:
     bare = dict.fromkeys(("dead_time", "dead_band", "advance", "drag_astern", "load"), 0.0)
-    plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, lag=0.02, **bare))
+    plain, _ = identified_vehicle(short, found(fit, dead_band_astern=0.0, advance_astern=0.0, lag=0.02, **bare))
     assert [[*curve.keys] for curve in plain.layout.curves] == [["a_t", "b_t", "a_t_reverse", "b_t_reverse"]] * 2
     assert [form.keys for form in plain.layout.axes] == [("a_d", "b_d")] * 2
 
@@ -110,7 +111,6 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
         null=1.0,
     )
     monkeypatch.setitem(kinds.KINDS, "wake", wake)
-    monkeypatch.setitem(kinds.EFFECT_OF, "alpha", "wake")
     assert wake.prior
     monkeypatch.setitem(kinds.PRIORS, "wake", wake.prior)
     known, old = replace(fit.known, deviations={"wake": 0.3}), fit.posterior.table

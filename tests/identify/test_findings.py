@@ -157,6 +157,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
+    ("voltage drop", structured(HEALTH, kind="voltage drop"), "they lose 50% of their thrust while all have", quiet()),
     ("slew limit", structured(HEALTH, kind="slew limit", value=0.8, unit="1/s"), "at most 0.80 1/s, where 1", quiet()),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),

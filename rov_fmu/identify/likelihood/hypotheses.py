@@ -255,6 +255,12 @@ def _commanded(known: Prior, logs: Logs) -> Iterator[Of]:
         yield ()
 
 
+def _without_voltage(known: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield one variant, about all thrusters, if no log has the voltage of the battery."""
+    if known.layout.voltage is None and not known.layout.has_wrench:
+        yield from _commanded(known, logs)
+
+
 def _lagging(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield one variant, about all thrusters, if all forces may lag, and no curve is a table or a wrench's force."""
     curves = known.layout.curves
@@ -315,11 +321,11 @@ HYPOTHESES = {
             "all thrusters: the speed of the rotors lags behind the command, and not the force{odds}. The vehicle file "
             'says so by lag = "speed"'
         ),
-        alarm=1.3,
+        alarm=1.0,
         changes_thrust=False,
     ),
     "momentary commands": Hypothesis(
-        0.2,
+        0.15,
         _momentary_files,
         _momentary,
         sentence=(
@@ -347,6 +353,15 @@ HYPOTHESES = {
         (0.4, 0.6, 0.8),
         "all thrusters: beyond a command of {value}, they push no more{odds}. Check the limits of the speed "
         "controllers, and use only commands below",
+    ),
+    "voltage drop": Hypothesis(
+        0.05,
+        _without_voltage,
+        _with_parameter("voltage drop"),
+        (0.1, 0.3),
+        "all thrusters: they lose {value} of their thrust while all have full command, as if the voltage fell with the "
+        "load{odds}. Log the voltage of the battery",
+        alarm=1.0,
     ),
     "slew limit": Hypothesis(
         0.03,

@@ -214,7 +214,7 @@ KINDS = {
             "thrust_reverse", 0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"
         ),
         "thrust astern relative to thrust ahead",
-        keys=("a_t_reverse", "b_t_reverse"),
+        keys=("a_t_reverse", "b_t_reverse", "d_reverse"),
         is_ratio=True,
         null=0.0,
         adapts=True,
@@ -239,14 +239,22 @@ KINDS = {
         null=0.0,
     ),
     "advance": Kind(
-        Deviation(
-            "advance", 0.2, "the share of full thrust lost per m/s ahead", "propellers give no thrust at 3 to 10 m/s"
-        ),
+        Deviation("advance", 0.2, "the share of full thrust lost per m/s", "propellers give no thrust at 3 to 10 m/s"),
         "loss of thrust with the speed of advance, relative to full thrust",
         keys=("d",),
         low=0.0,
         null=0.0,
         unit="s/m",
+        adapts=True,
+    ),
+    "advance astern": Kind(
+        Deviation(
+            "advance_astern", 0.3, "ln of the share lost astern to that ahead", "propellers are made for one direction"
+        ),
+        "loss of thrust with the speed of advance astern relative to that ahead",
+        keys=("d_reverse",),
+        is_ratio=True,
+        null=0.0,
         adapts=True,
     ),
     "lag": Kind(
@@ -444,6 +452,16 @@ KINDS = {
         null=log(50.0),
         unit="1/s",
     ),
+    "voltage drop": Kind(
+        None,
+        "share of the thrust that is lost while all thrusters have full command",
+        ". The vehicle file does not have it",
+        mean=0.15,
+        deviation=0.15,
+        low=0.0,
+        high=0.8,
+        null=0.0,
+    ),
     "white noise": Kind(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
         is_log=True,
@@ -464,8 +482,6 @@ EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is
 absent. The noise of a sensor is never exact."""
-EFFECT_OF = {key: name for name, kind in EFFECTS.items() for key in kind.keys}
-"""The effect that each key of an optional coefficient belongs to."""
 ABSENT = {
     key: kind.null for kind in EFFECTS.values() if kind.null is not None and not kind.is_ratio for key in kind.keys
 }

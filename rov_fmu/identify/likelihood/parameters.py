@@ -188,11 +188,13 @@ class Table:
                 ratio = self._ratio(other, band) * np.exp(self.get(z, "dead band astern", curve.name))
                 values[other] = values[band] * ratio
         if "d" in curve.keys and not curve.tables:
-            lost = self.get(z, "advance", curve.name, default=_lost(curve, self.base))
-            full = values[curve.coefficient("a_t")] + values[curve.coefficient("b_t")]
-            ahead = curve.coefficient("d")
-            for name in (ahead, curve.coefficient(f"d{REVERSE}")):
-                values[name] = self._ratio(name, ahead) * lost * full
+            usual = _lost(curve, self.base)
+            lost = self.get(z, "advance", curve.name, default=usual)
+            astern = np.exp(self.get(z, "advance astern", curve.name))
+            for end, own in ((REVERSE, astern), ("", 1.0)):  # both may be the same coefficient
+                full = values[curve.coefficient(f"a_t{end}")] + values[curve.coefficient(f"b_t{end}")]
+                relative = _lost(curve, self.base, end) / usual if usual else 1.0
+                values[curve.coefficient(f"d{end}")] = lost * own * relative * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
             values[lag] = np.maximum(self.get(z, LAG, default=values[lag]), LEAST_LAG)
@@ -302,9 +304,9 @@ class Table:
         return larger
 
     def followed(self, z: Array, one: SampledLog) -> Array:
-        """Return the inputs that thrusters can follow, by a limit and a slew limit: (sets x) rows x inputs."""
-        limits = np.broadcast(self.limit(z), self.get(z, "slew limit", default=np.inf))
-        some = [_followed(one, float(limit), float(slew)) for limit, slew in limits]
+        """Return the inputs that thrusters follow, by limits and a drop of the voltage: (sets x) rows x inputs."""
+        numbers = np.broadcast(self.limit(z), self.get(z, "slew limit", default=np.inf), self.get(z, "voltage drop"))
+        some = [_followed(one, *map(float, each)) for each in numbers]
         return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
@@ -314,10 +316,10 @@ class Table:
 
 
 @lru_cache(64)
-def _followed(one: SampledLog, limit: float, slew: float) -> Array:
+def _followed(one: SampledLog, limit: float, slew: float, drop: float) -> Array:
     """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same."""
     found = one.record.inputs
-    if one.log.follows_axis or limit == slew == np.inf:
+    if one.log.follows_axis or (limit == slew == np.inf and drop == 0.0):
         return found
     found, steps = found.copy(), np.diff(one.record.told).tolist() if slew < np.inf else []
     for n in (n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands):
@@ -326,6 +328,10 @@ def _followed(one: SampledLog, limit: float, slew: float) -> Array:
         for row, (value, step) in enumerate(zip(values.tolist(), steps, strict=False)):
             before, now = now, now + min(max(value - now, -slew * step), slew * step)
             found[row, n] = 0.5 * (before + now)  # the mean over a row is that at its middle
+    places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
+    # Power and thrust grow about with the square of a command.
+    load = np.mean(found[:, places] ** 2, axis=1)
+    found[:, places] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
     return found
 
 
@@ -417,11 +423,14 @@ def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
             yield make("advance", curve.name, mean=_lost(curve, known.coefficients))
+            if f"d{REVERSE}" in curve.keys:
+                yield make("advance astern", curve.name)
 
 
-def _lost(curve: Curve, c: Mapping[str, float]) -> float:
-    """Return the share of the full thrust of a curve that is lost per speed of advance, s/m."""
-    return c[curve.coefficient("d")] / (c[curve.coefficient("a_t")] + c[curve.coefficient("b_t")])
+def _lost(curve: Curve, c: Mapping[str, float], end: str = "") -> float:
+    """Return the share of the full thrust of a curve ahead or astern that is lost per speed of advance, s/m."""
+    lost, a, b = (c[curve.coefficient(f"{key}{end}")] for key in ("d", "a_t", "b_t"))
+    return lost / (a + b)
 
 
 def _least_linear(curve: Curve, c: Mapping[str, float], end: str) -> float:

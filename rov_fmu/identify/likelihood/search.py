@@ -383,8 +383,8 @@ class StructureSearch:
         rivals = list[Trial]()
         for _ in range(_ROUNDS):
             fits = self._round()
-            best = max(fits, key=lambda one: one.score, default=self.now)
-            if best.score <= self.now.score + WINS:
+            best = max(fits, key=self._gain, default=self.now)
+            if self._gain(best) <= 0.0:
                 rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = best
@@ -395,6 +395,10 @@ class StructureSearch:
         )
         posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
         return Explained(now, tuple(adopted), tuple(posteriors))
+
+    def _gain(self, other: Trial) -> float:
+        """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""
+        return other.score - self.now.score - (-WINS if len(other.starts) < len(self.now.starts) else WINS)
 
     @cached_property
     def variants(self) -> list[Variant]:
@@ -449,10 +453,10 @@ class StructureSearch:
         predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
         if any(one.lost and not one.is_momentary for one in now.model.logs):
             filtered = max(structure(now.objective, now.minimum).values(), default=0.0)
-        if predicted <= min(one.alarm for one in HYPOTHESES.values()):
-            return
         shown, others = list[Starts](), list[Starts]()
-        for one in self.variants:
+        # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
+        (shown if filtered > ALARM else others).extend(self._smaller[1:])
+        for one in self.variants if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
             hypothesis = HYPOTHESES[one.kind]
             if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
@@ -460,7 +464,6 @@ class StructureSearch:
                 if len(some) < _MOST and not any(one.excludes(other) for other in some):
                     sets = [{**some, one: start} for start in hypothesis.starts or (None,)]
                     (shown if hypothesis.changes_thrust else others).extend(sets)
-        shown += self._smaller[1:] if filtered > ALARM else []
         shown = [some for some in shown if frozenset(some) not in self.tried]
         if shown:
             yield from self._ranked(shown)

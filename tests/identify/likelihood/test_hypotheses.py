@@ -8,6 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
     Comparison,
+    Starts,
     StructureSearch,
     Trial,
     fitted,
@@ -87,8 +89,15 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
+        "drooping": Fault("voltage drop", acting=lambda u: drooping(u, 0.3), value=0.3),
         "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=0.8),
     }
+
+
+def drooping(u: Commands, share: float) -> Commands:
+    """The commands whose thrust is that of some commands at a voltage that falls with the load."""
+    left = np.sqrt(1.0 - share * np.mean(np.square([*u.values()]), axis=0))
+    return {name: c * left for name, c in u.items()}
 
 
 def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
@@ -507,6 +516,32 @@ def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> 
     }
     assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
     assert values["health", ("r",)] < at.value({})
+
+
+@pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])
+def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
+    alone: float, names: list[Variant], reversed_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No alarm asks for it: the fit with both is as good as that with the right one."""
+    scores = {frozenset[Variant](): 0.0, frozenset({DEAD, REVERSED}): 30.0}
+    scores |= {frozenset({REVERSED}): alone, frozenset({DEAD}): 12.0}
+
+    def trial(model: Model, starts: Starts, *_: object) -> Trial:
+        score = scores[frozenset(starts)]
+        return Trial(starts, model, cast("Objective", None), cast("Minimum", None), score, score)
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", trial)
+    search = StructureSearch(trial(reversed_model, {}), _search)
+    search.variants = [REVERSED, DEAD]
+    search.now = trial(reversed_model, dict.fromkeys([DEAD, REVERSED]))
+    search.tried[frozenset(search.now.starts)] = search.now
+    found = search.explained()
+    assert {one.variant for one in found.adopted} == {*names}
+    best = scores[frozenset(names)]
+    assert {one.variant: one.odds for one in found.adopted} == {
+        name: best - max(scores[some] for some in scores if name not in some) for name in names
+    }
 
 
 @pytest.mark.long

@@ -74,7 +74,9 @@ logging offset log_surge_0.csv: -0.1 ± 0.1, -inf to inf
 logging width log_surge_0.csv: 0.5 ± 0.5, 0 to 1
 current log_surge_0.csv to the north: 0 ± 0.1, -inf to inf, absent at 0
 advance rear: 0 ± 0.2, 0 to inf, absent at 0
+advance astern rear: 0 ± 0.3, -inf to inf, absent at 0
 advance top: 0 ± 0.2, 0 to inf, absent at 0
+advance astern top: 0 ± 0.3, -inf to inf, absent at 0
 slow force surge: ln 0.001 ± 2.5, 1e-07 to 0.1, absent at -16.1
 slow force heave: ln 0.001 ± 2.5, 1e-07 to 0.1, absent at -16.1
 slow gain: ln 0.01 ± 0.35, 1e-06 to 0.2, absent at -13.8
@@ -125,6 +127,8 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
             of("voltage"),
             pytest.approx(of("advance", curve) * (c[f"a_t_{curve}"] + c[f"b_t_{curve}"])),
         ]
+        lost = of("advance", curve) * exp(of("advance astern", curve))
+        assert c[f"d_{curve}_reverse"] == pytest.approx(lost * (c[f"a_t_{curve}_reverse"] + c[f"b_t_{curve}_reverse"]))
     assert c["c_0_top_reverse"] == pytest.approx(of("dead band", "top") * exp(of("dead band astern", "top")))
     assert "c_0_rear_reverse" not in c, "no force of it was measured astern"
     for axis, v in ((SURGE.name, "u"), (HEAVE.name, "w")):
