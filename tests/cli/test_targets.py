@@ -178,7 +178,7 @@ OVERWRITING = [
 OVERWRITING += [
     f"{line} --force {FILES[key[0], option]} {'.' if key[0] == 'study' else line.split()[-1]}"
     for key, line in READING.items()
-    for name, option in FILES.keys() - READING.keys()
+    for name, option in sorted(FILES.keys() - READING.keys())
     if name == key[0] and key != ("tune", "vehicle")  # which may be tuned in its place
 ]
 

@@ -113,14 +113,18 @@ class Body:
         e = self.beyond(command)
         return copysign(self.full * (self.astern if command < 0.0 else 1.0) * abs(e) ** self.power, e)
 
-    def answers(self, axis: str, command: float, health: Sequence[float]) -> tuple[float, float, float]:
-        """Return V_ss, the time to 63 % of it, and the stopping distance of the axis alone, by quadrature."""
+    def answers(self, axis: str, command: float, health: Sequence[float], *, rotor: bool) -> tuple[float, float, float]:
+        """Return V_ss, the time to 63 % of it, and the stopping distance of the axis alone, by quadrature.
+
+        The loss of thrust is in proportion to the command, or with `rotor` to the rotor's speed.
+        """
         signs = {"surge": (1.0, 1.0), "yaw": (1.0, -1.0), "heave": (1.0,)}[axis]  # port turns it to starboard
         lever = self.arm if axis == "yaw" else 1.0
         pair = [(h, sign * command, sign * lever) for h, sign in zip(health, signs, strict=False)]
         push = sum(h * self.force(c) * lever for h, c, lever in pair) + (self.load if axis == "heave" else 0.0)
+        turns = abs(self.beyond(command) if rotor else command)
         loss = sum(
-            h * self.loss * self.full * (self.astern if c < 0.0 else 1.0) * abs(c) * lever**2 for h, c, lever in pair
+            h * self.loss * self.full * (self.astern if c < 0.0 else 1.0) * turns * lever**2 for h, c, lever in pair
         )
         a, b, ratio = self.drag[axis]
         if push < 0.0:
@@ -186,7 +190,7 @@ class Drawn:
             for command in ANSWERED:
                 names = [(axis, name) for name in answer_names(command)]
                 followed = copysign(min(abs(command), self.fault.saturation), command)
-                found |= zip(names, body.answers(axis, followed, health), strict=True)
+                found |= zip(names, body.answers(axis, followed, health, rotor=self.fault.rotor), strict=True)
         return found
 
     def _body(self, random: np.random.Generator) -> Body:

@@ -49,6 +49,7 @@ WRONG: dict[str, Drawn] = {
     "cubic thrust": Drawn(power=3.0),
     "late sensors": Drawn(fault=Fault(late=0.3)),
     "feet as m": Drawn(fault=Fault(unit=3.281)),
+    "voltage that falls under load": Drawn(fault=Fault(battery=Battery(1.5, droop=0.2))),
     "voltage without a column": Drawn(fault=Fault(battery=Battery(1.5, sag=0.15, droop=0.05))),
 }
 """The kinds that it does not know."""
