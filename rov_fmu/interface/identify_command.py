@@ -52,17 +52,17 @@ def identify_tests(
     tests = load_tests(folder, check_outputs, base, files, draft)
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
-    if report:
-        from rov_fmu.report.report import report_page  # imports Matplotlib, which takes a second
-
-        page = report_page(identification, begin("drawing the report"))
-        outputs.append(page_output(report, page, "identify"))
     if vehicle:
         identified = identification.vehicle
         if report:
             assert identified.provenance
             identified = replace(identified, provenance=identified.provenance.model_copy(update={"report": report}))
         outputs.append(vehicle_output(identified, vehicle))
+    if report:
+        from rov_fmu.report.report import report_page  # imports Matplotlib, which takes a second
+
+        page = report_page(identification, begin("drawing the report"))
+        outputs.append(page_output(report, page, "identify"))
     if mcap:
         from rov_fmu.bridges.mcap_logs import identification_mcap
 
