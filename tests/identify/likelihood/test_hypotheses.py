@@ -23,6 +23,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
     Comparison,
+    Starts,
     StructureSearch,
     Trial,
     fitted,
@@ -507,6 +508,19 @@ def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> 
     }
     assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
     assert values["health", ("r",)] < at.value({})
+
+
+def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(reversed_model: Model) -> None:
+    quick = reversed_model.objective(thinned=True)
+    plain = Trial({}, reversed_model, quick, minimise(quick, quick.mean, most=0, last=False), 0.0, 0.0)
+    search = StructureSearch(plain, _search)
+    sets: list[Starts] = [{REVERSED: None}, {DEAD: 0.5}]
+    (first, fall), (second, _) = search._ranked(sets)
+    assert (first, second) == tuple(sets)
+    search.lost[REVERSED] = fall
+    assert [some for some, _ in search._ranked(sets)] == [second]
+    search.lost[REVERSED] = 0.9 * fall
+    assert [some for some, _ in search._ranked(sets)] == [first, second]
 
 
 @pytest.mark.long
