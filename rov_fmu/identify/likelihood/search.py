@@ -25,7 +25,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cos
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, SampledLog, unchanged
-from rov_fmu.identify.likelihood.solve import Minimum, evidence, evidence_at, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each
@@ -329,26 +329,19 @@ class Explained:
     """The fits with hypotheses that did not win, and whose odds are near even."""
 
 
-def fitted(
-    model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf, needed: float = -inf
-) -> Trial | None:
+def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf) -> Trial | None:
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `prior` is 2 ln of their prior probability, and `search` fits thinned logs. The result is None if a motion diverges,
-    or if the evidence of thinned logs is below `enough`. The fit to all samples ends early where it does not promise a
-    score above what is `needed`.
+    or if the evidence of thinned logs is below `enough`.
     """
     model = model.applied(*starts)
     thinned, objective = model.objective(thinned=True), model.objective()
-
-    def promises(value: float, information: Array) -> bool:
-        return evidence(objective, value, information) + prior > needed
-
     with suppress(DivergedError):
         end = search(thinned, numbers_of(thinned.table, starts))
         quick = evidence_at(thinned, end)
         if quick > enough:
-            full = minimise(objective, scaled(objective, end.z), last=False, promises=promises)
+            full = minimise(objective, scaled(objective, end.z), last=False)
             ends = dict.fromkeys(starts) | {
                 one: float(full.z[place])
                 for one in starts
@@ -455,7 +448,7 @@ class StructureSearch:
                 continue
             is_shown = gain > -inf
             enough = max(one.quick for one in (self.now, *fits)) - (WINS if is_shown else _FAR)
-            trial = fitted(self.model, starts, self._prior(starts), self.search, enough, self.now.score - CLOSE)
+            trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
             self.tried[frozenset(starts)] = trial
             is_worse = trial.score < self.now.score if trial else enough < self.now.quick
             if is_shown and is_worse and starts.keys() > self.now.starts.keys():
