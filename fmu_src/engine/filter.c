@@ -86,9 +86,8 @@ typedef struct {
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
-    const double *changing; /* rows: the longest step in which the commands change to those of the row, s */
-    double longest;         /* the longest step, s */
-    double share;           /* the longest step relative to the fastest time constant */
+    double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
+    double share;                /* the longest step relative to the fastest time constant */
 } record;
 
 /* The numbers of the parameters. */
@@ -996,7 +995,7 @@ static int pieces_over(const filter *f, double from, double to)
     }
     for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
         if (ends(f, j) > from - MARGIN) {
-            fastest = fmax(fastest, 1.0 / f->log->changing[j]);
+            fastest = fmax(fastest, 1.0 / f->log->changing);
         }
     }
     return (int)fmin(fmax(ceil((to - from) * fastest - 1e-6), 1.0), 1e5);

@@ -32,8 +32,6 @@ MOST_SENSORS = 16
 _USUAL_RATE = {False: 0.1, True: 0.3}
 """How fast a measured value changes when a log begins, per second (standard deviation): False for a translation, True
 for a rotation."""
-_USUAL_CHANGE = 0.1
-"""The change of an input, relative to its strongest value, from which steps are as short as they may be."""
 AT_ORIGIN = (0.0, 0.0, 0.0)
 """The place of a sensor at the origin."""
 _CURRENT = ("V_N", "V_E", "V_D")
@@ -154,8 +152,8 @@ class _Record(ctypes.Structure):
         *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
         ("tilts", ctypes.c_ssize_t),
-        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside", "changing")),
-        *((name, ctypes.c_double) for name in ("longest", "share")),
+        *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
+        *((name, ctypes.c_double) for name in ("longest", "changing", "share")),
     ]
 
 
@@ -183,12 +181,11 @@ class Filter:
     def __init__(self, vehicle: Vehicle, longest: float = 0.1, changing: float = 0.0125, share: float = 0.5) -> None:
         """Load the filter. Raises BuildError.
 
-        `longest` is the longest step of the mean, s, and `changing` that in which a command changes by a tenth of the
-        strongest one, or by more. No step is longer than this share of the fastest time constant.
+        `longest` is the longest step of the mean, s, and `changing` that in which a command changes. No step is longer
+        than this share of the fastest time constant.
         """
         layout = vehicle.layout
-        self.layout, self._steps, self._vehicle = layout, (longest, share), vehicle
-        self._changing = changing
+        self.layout, self._steps, self._vehicle = layout, (longest, changing, share), vehicle
         self._libraries: dict[Path, tuple[Callable[..., None], list[int]]] = {}
         self.states, axes, sensors, self.variables, self.inputs, *_ = self._library(FILTER_FILE)[1]
         assert (axes, sensors) == (len(layout.axes), MOST_SENSORS)
@@ -349,12 +346,10 @@ class Filter:
         sizes = len(record.time), len(record.told), len(record.sensors)
         tilt = [np.ascontiguousarray(row) for row in record.tilt - np.array([[first], [0.0], [0.0]])]
         beside = None if record.beside is None else np.ascontiguousarray(record.beside)
-        changing = self._changing * _longer(record.inputs)
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
         lines = None if beside is None else beside.ctypes.data
-        kept: list[object] = [*arrays, *tilt, beside, changing]
-        ends = *pointers[1], lines, changing.ctypes.data
-        return _Record(*sizes, *pointers[0], len(tilt[0]), *ends, *self._steps), kept
+        kept: list[object] = [*arrays, *tilt, beside]
+        return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], lines, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
         """Return the kind and the place of a sensor, as filter.c wants them."""
@@ -366,18 +361,6 @@ class Filter:
             state = "psi" if axis is YAW else ""
             return (STATE, self._places[state]) if state in self.vehicle_states else (ANGLE, axis.place)
         return STATE, self._places[DRIFTS[axis.place]]
-
-
-def _longer(inputs: Array) -> Array:
-    """Return how much longer than usual a step may be in which the inputs change to those of each of m rows, m.
-
-    Over a step, the mean thrust moves the vehicle by a wrong length, which grows like the change times the square of
-    the step. The commands of a controller change little each time. Rows that repeat the inputs before them are those of
-    a slew limit, and have usual steps.
-    """
-    changes = np.abs(np.diff(inputs, axis=0, prepend=inputs[:1])) / np.maximum(np.abs(inputs).max(axis=0), 1e-300)
-    largest = changes.max(axis=1, initial=0.0)
-    return np.sqrt(_USUAL_CHANGE / np.where(largest > 0.0, np.minimum(largest, _USUAL_CHANGE), _USUAL_CHANGE))
 
 
 def _inputs(record: Record, parameters: Parameters) -> Array:

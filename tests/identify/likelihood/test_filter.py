@@ -321,21 +321,6 @@ def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
     assert np.ptp(variables, axis=1).min() > 0.01
 
 
-@pytest.mark.parametrize("times", [0.01, 0.04, 1.0])
-def test_what_changes_little_needs_fewer_steps_and_moves_the_vehicle_as_far(times: float) -> None:
-    """Commands that change 50 times a second, as of a controller, and swing `times` a second."""
-    told = 0.02 * np.arange(500.0)
-    rows = told, 0.3 + 0.3 * np.sin(2.0 * pi * times * told) + 0.05
-    log = record([DEPTH], [(0.1 * n, 0) for n in range(1, 99)], rows=rows, between=0.02)
-    silent = parameters(LAGGING, 1, white=(1e9,), width=1.0)
-    usual, fine = (Filter(LAGGING, **steps).run(log, silent, with_states=True) for steps in ({}, {"changing": 1e-3}))
-    w, z = ([*LAGGING.layout.state].index(name) for name in ("w", "z"))
-    for state in (w, z):
-        assert usual.states[:, state] == pytest.approx(fine.states[:, state], abs=1e-4 * np.ptp(fine.states[:, state]))
-    steps, short = int(usual.pieces.sum()), 98 * 8  # eight steps of 12.5 ms between two samples
-    assert steps < 0.6 * short if times < 0.1 else steps == pytest.approx(short, rel=0.4)
-
-
 def test_a_measured_tilt_turns_the_net_weight_and_the_way() -> None:
     """Of a vehicle without roll and pitch; the tilt is the same from the first to the last sample."""
     share, sensors = cos(0.5) * cos(0.3), (TOLD["w"], DEPTH)
