@@ -16,6 +16,7 @@ from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import folder_of
+from tests.frozen.known import HERE
 from tests.identify.conftest import FORCES, KNOWN, TRUTH
 from tests.recordings import run, with_more, write_log
 
@@ -45,6 +46,20 @@ def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: 
     assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
     with pytest.raises(RuntimeError, match="differs by"):
         written(fit, vehicle.with_(a_d_w=1.1 * vehicle["a_d_w"]), tmp_path)
+
+
+@pytest.mark.parametrize(
+    "name", ["pool", "tadpole", *(pytest.param(name, marks=pytest.mark.long) for name in ("harbour", "otter"))]
+)
+def test_what_is_told_is_the_vehicle_of_the_file_with_its_weak_effects(name: str) -> None:
+    """Only measured forces bend a curve in what is told: the shapes of others would explain noise."""
+    tests = load_tests(HERE / "tank_tests" / name)
+    fit = fit_all(tests.folder.path, *begin(tests))
+    assert fit.file.minimum.value - fit.best.value <= 2.0
+    parameters = fit.objective.table.parameters
+    shapes = [n for n, p in enumerate(parameters) if p.kind == "thrust shape" and p.of not in fit.known.measured_curves]
+    assert not fit.best.z[shapes].any()
+    assert (fit.posterior.errors[shapes] > 0.05).all()
 
 
 @pytest.mark.parametrize(

@@ -48,13 +48,14 @@ the model, and another minimum may explain it."""
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """The objective at its minimum."""
+    """The objective at its minimum: what is told, predicted and, without weak effects, written."""
 
     known: Prior
     objective: Objective
+    """Where no test measured the forces of a curve, it is quadratic, as in the file."""
     best: Minimum
     posterior: Posterior
-    """With all effects, also those without evidence."""
+    """With all effects, also those without evidence, and with the shapes of all curves."""
     file: FileFit
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
@@ -149,18 +150,16 @@ def fit_all(
     ]
     if max(apart, default=0.0) < 2.0 or adopted:  # other vehicles had the wrong structure
         difference = 0.0
-    file, least = full, best
-    if known.bent:
-        file = replace(model, known=replace(known, bent=frozenset[str]())).objective()
-        show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
-        least = minimise(file, best.z, show, near=best.data, enough=_QUICK)
-    errors = with_shared(known.layout, structure(full, best))
-    unseen = unseen_errors(full, best.z, held)
-    of_file = without_weak_effects(file, least)
+    measured, told = known.bent.intersection(known.measured_curves), (full, best)
+    if measured < known.bent:
+        told = _less_bent(model, known, measured, best, on_progress)
+    file = _less_bent(model, known, frozenset(), told[1], on_progress) if measured else told
+    errors = with_shared(known.layout, structure(*told))
+    unseen = unseen_errors(told[0], told[1].z, held)
+    of_file = without_weak_effects(*file)
     return Fit(
         known,
-        full,
-        best,
+        *told,
         posterior.widened(errors, unseen),
         replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
         float(difference),
@@ -168,6 +167,15 @@ def fit_all(
         explained.rivals,
         errors,
     )
+
+
+def _less_bent(
+    model: Model, known: Prior, bent: frozenset[str], near: Minimum, on_progress: Progress
+) -> tuple[Objective, Minimum]:
+    """Return J where only some curves bend, and its minimum, from that where more do."""
+    objective = replace(model, known=replace(known, bent=bent)).objective()
+    show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
+    return objective, minimise(objective, near.z, show, near=near.data, enough=_QUICK)
 
 
 def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
@@ -179,7 +187,7 @@ def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple
             break
         show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
-            ends.append(_least(quick, start_of(quick, n), show, _QUICK))
+            ends.append(_least(quick, start_of(quick, n), show))
         except DivergedError:
             continue
     if not ends:
@@ -187,16 +195,16 @@ def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple
     return sorted(ends, key=lambda end: end.value), is_enough
 
 
-def _least(objective: Objective, start: Array, on_step: Callable[[int], None], enough: float) -> Minimum:
+def _least(objective: Objective, start: Array, on_step: Callable[[int], None] = lambda _: None) -> Minimum:
     """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
     In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
-    end = minimise(objective, start, on_step=on_step, enough=enough, last=False)
+    end = minimise(objective, start, on_step=on_step, enough=_QUICK, last=False)
     larger = objective.table.with_larger_dead_bands(end.z)
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=enough, last=False)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=_QUICK, last=False)
     return min(end, other, key=lambda found: found.value)
 
 
@@ -204,7 +212,7 @@ def _search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
     """Return the minimum of J of thinned logs from the first start, in which some parameters have other numbers."""
     start = start_of(objective)
     start[[*numbers]] = [*numbers.values()]
-    return _least(objective, start, lambda _: None, _QUICK)
+    return _least(objective, start)
 
 
 def start_of(objective: Objective, number: int = 0) -> Array:

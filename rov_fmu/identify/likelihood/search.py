@@ -377,6 +377,8 @@ class StructureSearch:
         self.model, self.search = plain.model, search
         self.now = self.plain = plain
         self.tried: dict[frozenset[Variant], Trial | None] = {frozenset(): plain}
+        self.lost = dict[Variant | None, float]()
+        """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
 
     def explained(self) -> Explained:
         """Try the hypotheses where the alarm asks for it, and return the fit with those that win."""
@@ -438,6 +440,9 @@ class StructureSearch:
             enough = max(one.quick for one in (self.now, *fits)) - (WINS if is_shown else _FAR)
             trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
             self.tried[frozenset(starts)] = trial
+            is_worse = trial.score < self.now.score if trial else enough < self.now.quick
+            if is_shown and is_worse and starts.keys() > self.now.starts.keys():
+                self.lost[self._new(starts)] = gain
             if trial:
                 fits.append(trial)
                 if is_shown and trial.score > self.now.score + _FAR:
@@ -472,21 +477,27 @@ class StructureSearch:
     def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
         """Yield the best sets at either of two places with the fall of J at the better one, the largest fall first.
 
-        Of the starts of one set, the best one counts.
+        Of the starts of one set, the best one counts. A fall that the prior odds outweigh is not enough, and a
+        hypothesis that made a fit worse is tried again only where J falls by more than it did before that fit.
         """
         now = self.now
         at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
-        falls = [[_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets]
+        found = ([_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets)
+        falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), 0.0)}
         chosen = dict[frozenset[Variant], int]()
-        for here in zip(*falls, strict=True):
+        for place in (0, 1):
             best = dict[frozenset[Variant], int]()
-            for n in sorted(range(len(sets)), key=here.__getitem__, reverse=True):
-                if here[n] > 0.0:
+            for n in sorted(falls, key=lambda one: falls[one][place], reverse=True):
+                if falls[n][place] > WINS + self._prior(now.starts) - self._prior(sets[n]):
                     best.setdefault(frozenset(sets[n]), n)
             for key, n in islice(best.items(), _FITTED):
                 chosen.setdefault(key, n)
         order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
         yield from ((sets[n], fall) for fall, n in order)
+
+    def _new(self, starts: Starts) -> Variant | None:
+        """Return the hypothesis of a set that is not among those that won; None if there is none."""
+        return next(iter(starts.keys() - self.now.starts.keys()), None)
 
 
 def _fall(at: Comparison, before: Starts, after: Starts) -> float:

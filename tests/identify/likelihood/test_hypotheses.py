@@ -544,6 +544,19 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
     }
 
 
+def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(reversed_model: Model) -> None:
+    quick = reversed_model.objective(thinned=True)
+    plain = Trial({}, reversed_model, quick, minimise(quick, quick.mean, most=0, last=False), 0.0, 0.0)
+    search = StructureSearch(plain, _search)
+    sets: list[Starts] = [{REVERSED: None}, {DEAD: 0.5}]
+    (first, fall), (second, _) = search._ranked(sets)
+    assert (first, second) == tuple(sets)
+    search.lost[REVERSED] = fall
+    assert [some for some, _ in search._ranked(sets)] == [second]
+    search.lost[REVERSED] = 0.9 * fall
+    assert [some for some, _ in search._ranked(sets)] == [first, second]
+
+
 @pytest.mark.long
 def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
     """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays."""
