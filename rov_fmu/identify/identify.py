@@ -17,6 +17,7 @@ from rov_fmu.identify.findings import beyond_thrusters, may_rock, told
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import (
@@ -47,7 +48,11 @@ __all__ = ["identify", "load_tests"]
 def identify(tests: Tests, on_progress: Progress = silent) -> Identification:
     """Identify a vehicle from its tests. Raises DataFileError if nothing can be identified, and VehicleFileError."""
     with threadpool_limits(limits=1, user_api="blas"):  # the matrices are small: more threads would wait for each other
-        return _identify(tests, on_progress)
+        try:
+            return _identify(tests, on_progress)
+        except DivergedError:
+            reason = "no simulation of the logs stays finite. Are units and signs right?"
+            raise DataFileError(f"{tests.folder.path}: {reason}") from None
 
 
 def _identify(tests: Tests, on_progress: Progress) -> Identification:
@@ -58,7 +63,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     if not (known.fitted or known.curves):
         own = ", ".join(sorted(tests.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
-    fit = fit_all(tests.folder.path, known, logs, rows, on_progress)
+    fit = fit_all(known, logs, rows, on_progress)
     show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
     show(0)
     predicted = []

@@ -73,4 +73,4 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Tests:
 @pytest.fixture(scope="session")
 def fit(short: Tests) -> Fit:
     """Fit the short logs."""
-    return fit_all(short.folder.path, *begin(short))
+    return fit_all(*begin(short))

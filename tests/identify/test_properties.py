@@ -29,7 +29,7 @@ def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehi
     path = folder_of(folder, KNOWN, FORCES)
     write_log(path, "a", run(truth, HEAVE, PLAN, 10.0).noisy(np.random.default_rng(seed), noise=noise))
     tests = load_tests(path)
-    fit = fit_all(path, *begin(tests))
+    fit = fit_all(*begin(tests))
     return fit, written(fit, identified_vehicle(tests, fit)[0], path), truth
 
 
@@ -54,7 +54,7 @@ def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: 
 def test_what_is_told_is_the_vehicle_of_the_file_with_its_weak_effects(name: str) -> None:
     """Only measured forces bend a curve in what is told: the shapes of others would explain noise."""
     tests = load_tests(HERE / "tank_tests" / name)
-    fit = fit_all(tests.folder.path, *begin(tests))
+    fit = fit_all(*begin(tests))
     assert fit.file.minimum.value - fit.best.value <= 2.0
     parameters = fit.objective.table.parameters
     shapes = [n for n, p in enumerate(parameters) if p.kind == "thrust shape" and p.of not in fit.known.measured_curves]
@@ -88,7 +88,7 @@ def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
     log.write_text("\n".join(log.read_text(encoding="utf-8").splitlines()[:110]), encoding="utf-8")
     half = load_tests(folder)
     widths = []
-    for tests, one in ((short, fit), (half, fit_all(folder, *begin(half)))):
+    for tests, one in ((short, fit), (half, fit_all(*begin(half)))):
         vehicle = identified_vehicle(tests, one)[0]
         answers = (assess.answers(one.posteriors, axis, vehicle, strongest=0.3) for axis in (HEAVE, YAW))
         ends = [[answer.steady[1] for answer in of if answer.command in (-0.3, 0.3, 0.5)] for of in answers]

@@ -167,6 +167,6 @@ def test_a_slow_force_that_the_other_parameters_explain_as_well_is_none(tmp_path
     recording = run(TRUTH, HEAVE, PLANS["heave"][0][:4], 10.0).noisy(np.random.default_rng(0), noise=0.01)
     drift = 0.1 * np.sin(2.0 * np.pi * recording.time / 60.0)
     write_log(path, "a", replace(recording, values=recording.values + drift))
-    fit = fit_all(path, *begin(load_tests(path)))
+    fit = fit_all(*begin(load_tests(path)))
     found = disturbances(fit.objective, fit.best, fit.posterior, followed(fit.objective, fit.best.z))
     assert not [one for one in found if one.kept]

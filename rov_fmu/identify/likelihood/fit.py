@@ -4,7 +4,6 @@ samples, and the posterior there."""
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from pathlib import Path
 
 import numpy as np
 
@@ -29,7 +28,6 @@ from rov_fmu.identify.likelihood.search import (
 )
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, evidence_at, minimise, scaled
 from rov_fmu.identify.result import KEPT
-from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.columns import COMMAND
@@ -104,9 +102,7 @@ class Fit:
         return float(-every.min(initial=0.0)), float(every.max(initial=0.0))
 
 
-def fit_all(
-    folder: Path, known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent
-) -> Fit:
+def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
@@ -115,7 +111,7 @@ def fit_all(
     model = Model(known, logs, rows)
     quick, full = model.objective(thinned=True), model.objective()
     table = full.table
-    ends, is_enough = _from_starts(folder, quick, on_progress)
+    ends, is_enough = _from_starts(quick, on_progress)
     show = moving(on_progress, "all samples", 0.3, 0.7)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
     on_progress("hypotheses", 0.65)
@@ -178,7 +174,7 @@ def _less_bent(
     return objective, minimise(objective, near.z, show, near=near.data, enough=_QUICK)
 
 
-def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
+def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
@@ -191,7 +187,7 @@ def _from_starts(folder: Path, quick: Objective, on_progress: Progress) -> tuple
         except DivergedError:
             continue
     if not ends:
-        raise DataFileError(f"{folder}: no simulation of the logs stays finite. Are units and signs right?")
+        raise DivergedError
     return sorted(ends, key=lambda end: end.value), is_enough
 
 

@@ -483,7 +483,7 @@ class StructureSearch:
         now = self.now
         at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
         found = ([_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets)
-        falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), 0.0)}
+        falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), -inf)}
         chosen = dict[frozenset[Variant], int]()
         for place in (0, 1):
             best = dict[frozenset[Variant], int]()

@@ -83,7 +83,7 @@ def test_drag_relative_to_inertia_follows_from_logs_without_thrust(quantity: str
     tests = load_tests(tmp_path)
     assert [finding.kind for finding in tests.folder.findings] == ["free decay"] * 2
     known, logs, rows = begin(tests)
-    posterior = fit_all(tmp_path, known, logs, rows).file.posterior
+    posterior = fit_all(known, logs, rows).file.posterior
     table, S = posterior.table, posterior.covariance
     found = table.coefficients(posterior.z.tolist())
     inertia = table.place("inertia", "surge")

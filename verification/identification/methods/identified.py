@@ -27,7 +27,7 @@ class Identified:
         """Fit all parameters to the training recordings."""
         self.tests = split.tests
         with threadpool_limits(limits=1, user_api="blas"):
-            self.found = fit_all(split.tests.folder.path, split.known, [r.log for r in split.training], split.rows)
+            self.found = fit_all(split.known, [r.log for r in split.training], split.rows)
 
     def predict(self, recording: Recording, begin: float, span: float) -> tuple[Array, Array]:
         """Run the filter until each start, and the model from there on."""
