@@ -20,7 +20,7 @@ from rov_fmu.identify.result import AxisResult, Identification, coverage_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
-from tests.folders import DOWN, FORCE, HEAD, SPEED, folder_of, read, responses
+from tests.folders import BLUEROV2, DOWN, FORCE, HEAD, SPEED, folder_of, read, responses
 from tests.identify.conftest import FORCES, KNOWN, Identified, add_voltage
 from tests.recordings import PLANS, Measured, run, with_more, write_log
 from tests.vehicles import VIDEORAY
@@ -389,12 +389,23 @@ ALL = "".join(
 TABLES = {**FORCES, **responses(TRUTH, HEAVE)}
 
 
+def unrelated() -> str:
+    """Return a dive of a BlueROV2 whose depth has nothing to do with its commands."""
+    names = ",".join(f"u_{n} [1]" for n in range(1, 7))
+    time = np.arange(0.0, 10.0, 0.1)
+    up = np.repeat(np.random.default_rng(0).uniform(-0.45, 0.45, (10, 2)), 10, axis=0)
+    rows = np.column_stack([time, np.zeros((100, 4)), up, np.sin(time), 0.01 * np.sin(3.0 * time)])
+    lines = [f"time [s],{names},depth [m],heading [rad]", *(",".join(f"{x:.6f}" for x in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
 @pytest.mark.parametrize(
     ("rov", "tables", "words"),
     [
         (KNOWN, {"thrust_top.csv": f"{FORCE}\n0.2,0\n0.5,0\n"}, "thrust_top*.csv: must give a force above 0"),
         (KNOWN + ALL, {"steady_heave.csv": TABLES["steady_heave.csv"]}, "nothing is identifiable: rov.toml gives all"),
         (KNOWN, {**TABLES, "thrust_top.csv": BACKWARD}, "thrust_top"),
+        (BLUEROV2, {"dive.csv": unrelated()}, "no simulation of the logs stays finite"),
         (KNOWN, {**FORCES, "steady_heave.csv": UP}, "steady_heave"),
         (
             KNOWN,
