@@ -106,8 +106,6 @@ def build(
     targets = [output, *(other.path for other in beside), *([signature_path(output)] if key else [])]
     check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])])
     check_written(output, FMU)
-    if output.suffix.lower() != ".fmu":
-        raise FileError(f"{output}: the name must end with .fmu")
     signature = signature_path(output)
     if not key and not force and signature.is_file():
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")

@@ -41,15 +41,16 @@ def identify_tests(
         check_report(vehicle, report)
     if mcap and not is_mcap(mcap):
         raise InputError(f"--mcap {mcap}: the name must end with .mcap")
+    if vehicle:
+        check_written(vehicle, VEHICLE_FILE)
+    if report:
+        check_written(report, PAGE)
+    targets = [path for path in (vehicle, report, mcap) if path]
+    check_targets(targets)
 
     def check_outputs(inputs: Sequence[Path]) -> None:
         """Check the files to write as soon as the input files are known."""
-        targets = [path for path in (vehicle, report, mcap) if path]
         check_targets(targets, inputs)
-        if vehicle:
-            check_written(vehicle, VEHICLE_FILE)
-        if report:
-            check_written(report, PAGE)
         replaced.extend(check_replaced(targets, force=force))
 
     begin("reading the tests")
