@@ -1,4 +1,4 @@
-"""Completing a rov.toml, whatever its form: what was there stays, what it lacks comes, and a second time nothing does."""
+"""Completing a rov.toml of any form: what was there stays, what it lacks is added, and a second time nothing is."""
 
 import json
 from collections.abc import Mapping
@@ -90,7 +90,7 @@ def own_files(draw: st.DrawFn) -> str:
 
 
 @given(own_files(), st.booleans())
-def test_a_file_of_any_form_is_completed_and_not_damaged(own: str, has_vehicle: bool) -> None:  # noqa: FBT001
+def test_a_file_of_any_form_is_completed_and_not_damaged(own: str, has_vehicle: bool) -> None:
     before, lacks = tomllib.loads(own), lacking(own, DRAFT, has_vehicle=has_vehicle)
     text = completed(own, lacks)
     after, more = tomllib.loads(text), tomllib.loads(lacks)
