@@ -143,17 +143,14 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
         return f"V_ss = {value:g} {axis.unit} must have a size of at least {_LEAST:g} {axis.unit}"
     if _holding(vehicle, axis, value) * (thrust := _thrust(vehicle, axis, c, value)) > 0.0:
         return None
-    if thrust * force <= 0.0:
-        least = value * force / (force - thrust)
-        return (
-            f"V_ss = {value:g} {axis.unit} must be slower than {least:g} {axis.unit}, at which a command of {c:g} has "
-            f"lost its {axis.push} by the speed of advance (d)"
-        )
     form, allowed = vehicle.layout.by_name[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
         drift = vehicle.motion_at(axis, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
     reason = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
+    if thrust * force <= 0.0:
+        allowed = f"slower than {value * force / (force - thrust):g} {axis.unit}"
+        reason = f"a command of {c:g} has lost its {axis.push} there by the speed of advance (d)"
     return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {reason}"
 
 

@@ -182,7 +182,7 @@ def test_a_speed_at_which_the_thrust_is_lost_is_refused(sign: float) -> None:
     end = sign * thrust / (9.0 * 0.5)
     assert tuned_to(slips, HEAVE, sign * 0.5, 0.9 * end)["alpha_w"] > 50.0
     with pytest.raises(
-        TuningError, match=f"must be slower than {end:g} m/s, at which .* has lost its thrust by the sp"
+        TuningError, match=f"must be slower than {end:g} m/s, for a .* has lost its thrust there by the sp"
     ):
         tuned_to(slips, HEAVE, sign * 0.5, 1.001 * end)
 
