@@ -106,8 +106,6 @@ def build(
     signature = signature_path(output)
     targets = [(output, FMU), *((other.path, "") for other in beside), (signature if key else None, "")]
     check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])], force=force, is_ours=_is_as_built)
-    if output.suffix.lower() != ".fmu":
-        raise FileError(f"{output}: the name must end with .fmu")
     if not key and not force and signature.is_file():
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
     chosen = chosen_platforms(platforms, fmi) if native else None

@@ -62,9 +62,9 @@ STOPPING = (
     "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The "
     "stopping distance is that without thrust, from the steady speed to a tenth of it."
 )
-_ASIDE = 0.2
+_ASIDE = 0.1
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
-which gives it almost half of its full speed. A symmetric pair leaves less, if its thrust astern is above 60 %."""
+which gives it almost a third of its full speed. A symmetric pair leaves less, if its thrust astern is above 80 %."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _SURE = 0.99
@@ -382,9 +382,10 @@ def driven_aside(identification: Identification) -> list[str]:
     """
     vehicle, lines = identification.vehicle, []
     for axis in (result.axis for result in identification.axes):
+        pushes = [one for command in (1.0, -1.0) for one in vehicle.side_effects(axis, command)]
         others = [
             f"{other.positive if push > 0.0 else other.negative} ({other.name})"
-            for other, push in vehicle.side_effects(axis, 1.0)
+            for other, push in dict(sorted(pushes, key=lambda one: abs(one[1]))).items()  # the stronger one stays
             if abs(push) > _ASIDE * vehicle.strongest(other) and not {axis, other} & {ROLL, PITCH}
         ]
         if others:

@@ -1,7 +1,8 @@
 """The tuning guide of section 5: α for the wanted V_ss, then β for the wanted Tau, in closed form, (17), (18).
 
-It holds for any vehicle and axis, with thrust and drag by direction, dead band and constant load. α and β for many
-points minimise the sum of the squared relative errors, and the closed form is where this fit starts.
+It holds for any vehicle and axis, with thrust and drag by direction, dead band, loss of thrust by the speed of advance,
+and constant load. α and β for many points minimise the sum of the squared relative errors, and the closed form is where
+this fit starts.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -11,7 +12,7 @@ from math import exp, inf, log
 import numpy as np
 from scipy.optimize import least_squares
 
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import TUNING, Axis
 from rov_fmu.identify.result import Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
@@ -90,15 +91,11 @@ def tune(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Tuning:
 
 def _closed_form(vehicle: Vehicle, axis: Axis, points: Sequence[Target]) -> Vehicle:
     """Take the median of the α that give each V_ss, then of the β that give each Tau. Raises TuningError."""
-    if vehicle.motion_at(axis, 1.0).B != vehicle.motion_at(axis, 0.0).B:
-        raise TuningError(
-            f"{axis.name}: its thrust decreases with the speed of advance. Tuning cannot take this into "
-            "account: remove d"
-        )
     for p in points:
         if reason := impossible(vehicle, axis, p):
             raise TuningError(f"{axis.name}: {reason}")
-    alphas = [_holding(vehicle, axis, p.value) / vehicle.force(axis, p.command) for p in points if p.quantity == "V_ss"]
+    steady = [p for p in points if p.quantity == "V_ss"]
+    alphas = [_holding(vehicle, axis, p.value) / _thrust(vehicle, axis, p.command, p.value) for p in steady]
     if not alphas:
         raise TuningError(f"{axis.name}: there is no V_ss, and alpha is tuned to V_ss")
     tuned, beta = _with(vehicle, axis.coefficient("alpha"), alphas), axis.coefficient("beta")
@@ -116,8 +113,18 @@ def _with(vehicle: Vehicle, name: str, wanted: Sequence[float]) -> Vehicle:
     return vehicle.with_(**{name: float(np.median(wanted))})
 
 
+def _thrust(vehicle: Vehicle, axis: Axis, command: float, V: float) -> float:
+    """Return F - L V, the thrust or torque at a velocity before α, with what it loses by the speed of advance.
+
+    L is the part of the linear drag that appears with the command.
+    """
+    plain = vehicle.with_(**{axis.coefficient(kind): 1.0 for kind in TUNING})
+    lost = plain.motion_at(axis, command).B - plain.motion_at(axis, 0.0).B
+    return vehicle.force(axis, command) - plain.effective_inertia(vehicle.layout.by_name[axis.name]) * lost * V
+
+
 def _holding(vehicle: Vehicle, axis: Axis, V: float) -> float:
-    """Return α F that balances drag and constant load at a velocity: a_d V^2 + b_d V = α F + F_0."""
+    """Return the thrust that balances drag and constant load at a velocity: a_d V^2 + b_d V = α (F - L V) + F_0."""
     plain, form = vehicle.with_(**{axis.coefficient("beta"): 1.0}), vehicle.layout.by_name[axis.name]
     return -plain.effective_inertia(form) * plain.motion_at(axis, 0.0).acceleration(V)
 
@@ -134,14 +141,17 @@ def impossible(vehicle: Vehicle, axis: Axis, point: Target) -> str | None:
         return None if _LEAST <= value < inf else f"Tau = {value:g} s must be at least {_LEAST:g} s"
     if not _LEAST <= abs(value) < inf:
         return f"V_ss = {value:g} {axis.unit} must have a size of at least {_LEAST:g} {axis.unit}"
-    if _holding(vehicle, axis, value) * force > 0.0:
+    if _holding(vehicle, axis, value) * (thrust := _thrust(vehicle, axis, c, value)) > 0.0:
         return None
     form, allowed = vehicle.layout.by_name[axis.name], "positive" if force > 0.0 else "negative"
     if "F_0" in form.keys:
         drift = vehicle.motion_at(axis, 0.0).steady_velocity()
         allowed = f"{'above' if force > 0.0 else 'below'} the {drift:g} {axis.unit} that F_0 alone gives"
-    thrust = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
-    return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {thrust}"
+    reason = f"a command of {c:g} gives a {axis.push} of {force:g} {axis.load}"
+    if thrust * force <= 0.0:
+        allowed = f"slower than {value * force / (force - thrust):g} {axis.unit}"
+        reason = f"a command of {c:g} has lost its {axis.push} there by the speed of advance (d)"
+    return f"V_ss = {value:g} {axis.unit} must be {allowed}, for {reason}"
 
 
 def implausible(tuning: Tuning) -> Iterator[Finding]:

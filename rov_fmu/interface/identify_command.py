@@ -41,10 +41,12 @@ def identify_tests(
         check_report(vehicle, report)
     if mcap and not is_mcap(mcap):
         raise InputError(f"--mcap {mcap}: the name must end with .mcap")
+    targets = [(vehicle, VEHICLE_FILE), (report, PAGE), (mcap, "")]
+    check_targets(targets, force=force)
 
     def check_outputs(inputs: Sequence[Path]) -> None:
         """Check the files to write as soon as the input files are known."""
-        check_targets([(vehicle, VEHICLE_FILE), (report, PAGE), (mcap, "")], inputs, force=force)
+        check_targets(targets, inputs, force=force)
 
     begin("reading the tests")
     folder, files = folder_and_files(paths)

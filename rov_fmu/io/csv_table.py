@@ -725,7 +725,7 @@ def _find_columns(
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
         reason = _what_lacks(missing, _others(header, file_columns), hint)
-        wrong.append(f"{path}, line {line}, column {len(header) + 1}: {reason}")
+        wrong.append(f"{path}, line {line}: {reason}")
     if wrong:
         raise DataFileError(*wrong[:MOST])
     return file_columns

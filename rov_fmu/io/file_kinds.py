@@ -26,6 +26,13 @@ TABLE_SUFFIXES = (".csv", ".mat")
 _OWN = {".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL}
 OWN_SUFFIXES = (*_OWN,)
 """The suffixes of files that this program writes, or reads where another file or a command names them."""
+_WRITTEN = {
+    VEHICLE_FILE: (".toml",),
+    FMU: (".fmu",),
+    PAGE: (".html", ".htm"),
+    GAZEBO_MODEL: (".sdf", ".urdf", ".world", ".xml", ".xacro"),
+}
+"""The suffixes that a file may have which a command writes, by its kind."""
 _BY_SUFFIX = {
     **_OWN,
     **dict.fromkeys((".csv", ".tsv"), _TABLE),
@@ -61,9 +68,12 @@ def check_keys(path: Path, keys: Iterable[str], wanted: str, failure: type[FileE
 
 
 def check_written(path: Path, kind: str) -> None:
-    """Raise FileError if the suffix of a path to write belongs to another kind of file."""
-    if other := _other_kind(path, kind):
-        raise FileError(f"{path}: would be {kind}, but {path.suffix} is the suffix of {other}")
+    """Raise FileError unless the suffix of a path to write is one of this kind of file."""
+    if path.suffix.lower() not in _WRITTEN[kind]:
+        other = _BY_SUFFIX.get(path.suffix.lower())
+        reason = f"{path.suffix} is the suffix of {other}" if other else ""
+        reason = reason or f"the name must end with {' or '.join(_WRITTEN[kind])}"
+        raise FileError(f"{path}: would be {kind}, but {reason}")
 
 
 def _other_kind(path: Path, wanted: str) -> str | None:

@@ -142,6 +142,7 @@ _FACTS = {
     "rows sorted": "{files}: {count:#row} out of order sorted",
     "time stamps merged": "{files}: {count:#repeated time stamp} merged",
     "rows without time": "{files}: {count:#row} without a time left out",
+    "rows without numbers": "{files}: {count:#row} with a time and no number left out",
     "rows before commands": "{files}: {count:#row} before the first command left out",
     "torn rows": "{files}: {count:#row} with a wrong number of cells left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",

@@ -98,7 +98,7 @@ TYPED: dict[str, tuple[str, str]] = {
         "build -o mine.toml",
         "mine.toml: would be an FMU, but .toml is the suffix of a TOML file",
     ),
-    "an FMU with the name of an archive": ("build -o x.zip", "x.zip: the name must end with .fmu"),
+    "an FMU with the name of an archive": ("build -o x.zip", "x.zip: would be an FMU, but the name must end with .fmu"),
     "Python and a platform": (
         "build --platform host --backend pythonfmu",
         "--platform: the PythonFMU flavour is the same for all platforms",

@@ -23,6 +23,7 @@ from tests.commands import (
     READING,
     REFIT,
     TESTS,
+    WRITING,
     Command,
     run_elsewhere,
     without_progress,
@@ -77,6 +78,24 @@ def test_an_impossible_target_is_refused_before_the_work(
     assert str(target.parent) in line
     assert reason in line
     assert sorted(tmp_path.rglob("*")) == before
+
+
+SUFFIXED = {key: of for key, of in WRITING.items() if of.line.endswith(f"{{f}}/{of.name}")}
+"""What is written to the path that the command line ends with."""
+
+
+@pytest.mark.parametrize("key", SUFFIXED, ids=" ".join)
+@pytest.mark.parametrize("suffix", ["", ".txt", ".ulg"])
+def test_a_name_that_does_not_tell_its_kind_is_refused_before_the_work(
+    key: tuple[str, str], suffix: str, tmp_path: Path, capsys: Capsys
+) -> None:
+    command = SUFFIXED[key]
+    assert main(command.arguments(tmp_path / f"x{suffix}", "--force", fmu=str(VIDEORAY))) == 2
+    out, err = capsys.readouterr()
+    assert (out, err.count("\n")) == ("", 1), "no part of the work is done"
+    assert f"x{suffix}: " in err
+    assert "must end with ." in err or "is the suffix of" in err
+    assert not list(tmp_path.iterdir())
 
 
 def bound_by_permissions() -> list[str]:

@@ -104,11 +104,6 @@ def test_an_implausible_alpha_or_beta_is_told(alpha: float, beta: float, told: d
     assert len(of_alpha_alone) == ("alpha" in told), "beta was not tuned"
 
 
-def test_thrust_that_falls_with_the_speed_cannot_be_tuned() -> None:
-    with pytest.raises(TuningError, match="heave: its thrust decreases with the speed of advance"):
-        tuned_to(extended(k, d_top=1.0), HEAVE, 0.3, 0.2)
-
-
 # ---- Of another vehicle, by direction --------------------------------------------------------------------------------
 
 BUOYANT = Vehicle(
@@ -129,8 +124,11 @@ BUOYANT = Vehicle(
 )
 
 
-def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
-    """Return the velocity of BUOYANT in heave after some seconds from rest, by integration of its equation."""
+def heave_after(t: float, command: float, alpha: float, beta: float, d: float) -> float:
+    """Return the velocity of BUOYANT in heave after some seconds from rest, by integration of its equation.
+
+    Each of the two thrusters loses d |c| v.
+    """
     c = abs(command)
     thrust = 2.0 * (30.0 * (c - 0.08) ** 2 + 31.0 * (c - 0.08))
     if command < 0.0:
@@ -139,7 +137,7 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
     def rate(_: float, state: list[float]) -> list[float]:
         (v,) = state
         drag = 40.0 * v * v + 5.0 * v if v > 0.0 else -70.0 * v * v + 3.0 * v
-        return [beta * (alpha * thrust - 3.0 - drag) / 25.0]
+        return [beta * (alpha * (thrust - 2.0 * d * c * v) - 3.0 - drag) / 25.0]
 
     return float(solve_ivp(rate, (0.0, t), [0.0], method="DOP853", rtol=1e-12, atol=1e-12).y[0, -1])
 
@@ -147,12 +145,13 @@ def heave_after(t: float, command: float, alpha: float, beta: float) -> float:
 @pytest.mark.parametrize(
     ("command", "V_ss", "Tau"), [(0.5, 0.6, 0.9), (-0.5, -0.5, 0.9), (0.12, -0.15, 2.0), (1.0, 0.01, 0.5)]
 )
-def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float) -> None:
-    tuned = tuned_to(BUOYANT, HEAVE, command, V_ss, Tau)
+@pytest.mark.parametrize("d", [0.0, 9.0])
+def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float, Tau: float, d: float) -> None:
+    tuned = tuned_to(extended(BUOYANT, d_prop=d) if d else BUOYANT, HEAVE, command, V_ss, Tau)
     alpha, beta = tuned["alpha_w"], tuned["beta_w"]
-    assert heave_after(100.0 * Tau, command, alpha, beta) == pytest.approx(V_ss, rel=1e-9)
+    assert heave_after(100.0 * Tau, command, alpha, beta, d) == pytest.approx(V_ss, rel=1e-9)
     risen = (1.0 - 1.0 / e) * V_ss
-    assert heave_after(Tau, command, alpha, beta) == pytest.approx(risen, rel=1e-9)
+    assert heave_after(Tau, command, alpha, beta, d) == pytest.approx(risen, rel=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -172,6 +171,20 @@ def test_each_direction_has_its_thrust_drag_and_load(command: float, V_ss: float
 def test_what_no_tuning_of_a_direction_gives(axis: Axis, command: float, V_ss: float, reason: str) -> None:
     with pytest.raises(TuningError, match=f"^{re.escape(reason)}$"):
         tuned_to(BUOYANT, axis, command, V_ss)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_speed_at_which_the_thrust_is_lost_is_refused(sign: float) -> None:
+    """The two thrusters of heave lose 2 d |c| v of their thrust, 2 (30 (c - 0.08)^2 + 31 (c - 0.08)) ahead."""
+    slips = extended(BUOYANT, d_prop=9.0)
+    excess = 0.42 if sign > 0.0 else 0.4
+    thrust = 30.0 * excess**2 + 31.0 * excess if sign > 0.0 else 22.0 * excess**2 + 25.0 * excess
+    end = sign * thrust / (9.0 * 0.5)
+    assert tuned_to(slips, HEAVE, sign * 0.5, 0.9 * end)["alpha_w"] > 50.0
+    with pytest.raises(
+        TuningError, match=f"must be slower than {end:g} m/s, for a .* has lost its thrust there by the sp"
+    ):
+        tuned_to(slips, HEAVE, sign * 0.5, 1.001 * end)
 
 
 # ---- rov-fmu tune ----------------------------------------------------------------------------------------------------

@@ -15,6 +15,7 @@ from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.io.messages import FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import VECTORED
@@ -278,6 +279,39 @@ def test_a_draft_completes_what_is_there_and_keeps_it(name: str, tmp_path: Path,
     for key, value in before.items():
         assert after[key] == value or after[key] == after[key] | value
     assert inspect()[1] == text, "a second time, nothing is lacking"
+
+
+REFUSED = {
+    "an axis": ("rov.toml", "[axes.sway]", "[axes.sawy]"),
+    "a curve": ("rov.toml", 'curve = "t200"', 'curve = "t300"'),
+    "a column": ("log_sway_1.csv", "distance [m]", "distance [furlong]"),
+    "a time": ("log_sway_1.csv", "time [s],", "when,"),
+    "nothing": ("rov.toml", "[axes.sway]", "[axes.sway]"),
+}
+"""What is misspelt in a folder: the file, the word, and what stands there in its place."""
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_identify_refuses_is_not_recommended(name: str, tmp_path: Path, capsys: Capsys) -> None:
+    (tmp_path / "rov.toml").write_text(VECTORED, encoding="utf-8")
+    for n in (1, 2):
+        table(tmp_path / f"log_sway_{n}.csv", "time [s],command [%],distance [m]", TIME, 100 * THRUSTERS[n], DEPTH)
+    file, word, other = REFUSED[name]
+    text = (tmp_path / file).read_text(encoding="utf-8")
+    assert word in text
+    (tmp_path / file).write_text(text.replace(word, other), encoding="utf-8")
+    assert main(["inspect", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    try:
+        load_tests(tmp_path)
+    except FileError as error:
+        refusals = str(error).splitlines()
+        assert "\nNext: correct this, then rov-fmu identify " in out
+        assert all(err.count(line) == 1 for line in refusals)
+        assert "left out as unreadable" not in err, "it is told already"
+    else:
+        assert name == "nothing"
+        assert "\nNext: rov-fmu identify " in out
 
 
 UNREADABLE: dict[str, bytes] = {

@@ -116,12 +116,15 @@ def test_text_of_the_files_is_escaped() -> None:
 
 def test_thrusters_that_also_drive_another_axis_are_told_only_where_they_do() -> None:
     """Both rear thrusters together do not turn the vehicle, as in the vehicles that ship, and push it forward in a turn
-    only if they are much weaker astern."""
+    only if they are weaker astern. With one of them weak, surge turns the vehicle, and a turn drives it forward."""
     symmetric = example().vehicle
-    astern = [{f"{name}_reverse": share * symmetric[name] for name in ("a_t_rear", "b_t_rear")} for share in (0.7, 0.5)]
+    astern = [{f"{name}_reverse": share * symmetric[name] for name in ("a_t_rear", "b_t_rear")} for share in (0.9, 0.7)]
     weaker, weak = (replace(example(), vehicle=extended(symmetric, **values)) for values in astern)
     assert not driven_aside(weaker)
     assert [line.partition(":")[0] for line in driven_aside(weak)] == ["yaw"]
+    one = symmetric.layout.thrusters_along(YAW)[0].name
+    lame = replace(example(), vehicle=symmetric.with_(**{f"health_{one}": 0.7}))
+    assert [line.partition(":")[0] for line in driven_aside(lame)] == ["surge", "yaw"]
     for path in SHIPPED.values():
         vehicle = load_vehicle(path)
         axes = tuple(replace(example().axes[0], axis=form.axis) for form in vehicle.layout.axes)

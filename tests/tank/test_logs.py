@@ -43,13 +43,14 @@ def read(
 def test_rows_that_cannot_be_used_are_left_out_and_counted(tmp_path: Path) -> None:
     rows = [f"{n / 10},{100 * STEP[n]},{n}" for n in range(N)]
     rows[5], rows[6] = rows[6], rows[5]  # 0.6 before 0.5
-    rows[21:21] = ["2.05,,5", "2.06,on,5", "2.07,-,5", "2.08,30,x", "2.09,3,4,5"]
+    rows[21:21] = ["2.05,,5", "2.06,on,5", "2.07,-,5", "2.08,30,x", "2.09,3,4,5", "2.04,nan,-"]
     rows[20:20] = ["1.9,30,", "1.9,25,77", ",30,5", "nan,30,5"]
     log = read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
     assert [(finding.kind, finding.words["count"]) for finding in log.findings] == [
         ("rows sorted", 1),
         ("time stamps merged", 2),
         ("rows without time", 2),
+        ("rows without numbers", 1),
         ("torn rows", 1),
         ("unread cells", 1),
         ("unread cells", 1),

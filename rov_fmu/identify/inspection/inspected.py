@@ -47,6 +47,8 @@ class Inspected:
     headers: TableHeaders
     name: str
     """The name of the draft's vehicle."""
+    is_refused: bool = False
+    """True if `identify` refuses the logs, or rov.toml; the warnings say why."""
 
     @property
     def missing(self) -> list[str]:
@@ -54,7 +56,7 @@ class Inspected:
         has_commands = any(one.commands or any(row.name == COMMAND for row in one.channels) for one in self.logs)
         has_names = all(finding.kind != "unnamed table" for one in self.logs for finding in one.findings)
         steps = {"add the commands, or name their columns": has_commands, "rename the tables": has_names}
-        return [step for step, is_done in steps.items() if not is_done]
+        return [step for step, is_done in steps.items() if not is_done] or ["correct this"] * self.is_refused
 
     @property
     def is_enough(self) -> bool:

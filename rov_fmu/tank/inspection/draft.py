@@ -7,7 +7,7 @@ from math import inf, isfinite
 from pathlib import Path
 
 import tomlkit
-from tomlkit.items import AbstractTable
+from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
 from rov_fmu.io.messages import brief, first_of, listed, one_line
@@ -93,23 +93,26 @@ def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     Where the file has the vehicle of the logs, nothing is added to one with a base, and only the mass to one with
     thrusters, so that what a user has described stays as it is.
     """
-    document, more = tomlkit.parse(own), tomlkit.parse(draft)
-    body = {"m_rov", *(["I_r"] if "yaw" in document.get("axes", {}) else [])} if "thruster" in document else {*()}
-    body -= {*document.get("body", {}), *document.get("known", {})}
-    files = [name for dive in document.get("dives", {}).values() for name in dive.get("files", ())]
+    document, more = tomlkit.parse(own).unwrap(), tomlkit.parse(draft)
+    has_vehicle = has_vehicle or not {"base", "thruster"}.isdisjoint(document)  # it may have mistakes
+    tables = {name: value for name, value in document.items() if isinstance(value, dict)}
+    body = {"m_rov", *(["I_r"] if "yaw" in tables.get("axes", {}) else [])} if "thruster" in document else {*()}
+    body -= {*tables.get("body", {}), *tables.get("known", {})}
+    dives = [dive.get("files") for dive in tables.get("dives", {}).values() if isinstance(dive, dict)]
+    files = [name for names in dives if isinstance(names, list) for name in names]
     told = tomlkit.document()
     for name, table in more.items():
         if has_vehicle and name in _HARDWARE and name != "body":
             continue
-        if not isinstance(table, AbstractTable):
+        if not isinstance(table, AbstractTable) or not isinstance(document.get(name, {}), dict):
             if name not in document:
                 told.add(name, table)
             continue
-        keys = {key: value for key, value in table.items() if key not in document.get(name, {})}
+        keys = {key: value for key, value in table.items() if key not in tables.get(name, {})}
         if has_vehicle and name == "body":
             keys = {key: value for key, value in keys.items() if key in body}
         if name == "dives":  # a dive of the same files may have any name
-            keys = {key: value for key, value in keys.items() if {*value["files"]}.isdisjoint(files)}
+            keys = {key: value for key, value in keys.items() if not any(file in files for file in value["files"])}
         if keys:
             told.add(name, rest := tomlkit.table())
             for key, value in keys.items():
@@ -122,16 +125,21 @@ def completed(own: str, lacks: str) -> str:
     if not own:
         return lacks
     document, more = tomlkit.parse(own), tomlkit.parse(lacks)
-    keys = {name: value for name, value in more.items() if not isinstance(value, AbstractTable)}
-    for name, table in more.items():
-        if name in document and name not in keys:
-            for key, value in table.items():
-                document[name].add(key, value)
-    head = "".join(f"{name} = {value.as_string()}\n" for name, value in keys.items())
-    tables = tomlkit.document()
-    for name, table in more.items():
-        if name not in document and name not in keys:
-            tables.add(name, table)
+    head, tables = "", tomlkit.document()
+    for name, item in more.items():
+        if not isinstance(item, AbstractTable | AoT):
+            head += f"{name} = {item.as_string()}\n"
+        elif name not in document:
+            tables.add(name, item)
+        else:
+            there = document[name]
+            for key, value in item.items():
+                if isinstance(there, InlineTable):
+                    there[key] = value.unwrap()  # a table becomes an inline table there
+                elif isinstance(value, Table):  # keys without a header may follow the other tables of this one
+                    tables.setdefault(name, tomlkit.table(is_super_table=True)).add(key, value)
+                else:
+                    there[key] = value
     text = f"{head}{tomlkit.dumps(document)}"
     return f"{text.rstrip()}\n\n{tomlkit.dumps(tables).strip()}".strip() + "\n"
 

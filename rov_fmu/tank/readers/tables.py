@@ -255,6 +255,9 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     content.count("time stamps merged", merged)
     content.count("stray times", int(stray.sum()))
     content.count("rows without time", int((~timed).sum() - stray.sum()))
+    if len(table.headers) == len(table.header):  # otherwise the numbers of a row may be in columns that are not read
+        has_number = np.any([np.isfinite(values[rows]) for name, values in columns.items() if name != "time"], axis=0)
+        content.count("rows without numbers", int((~has_number).sum()))
     content.count("rows before commands", int((columns["time"][rows] < columns["time"][told].min()).sum()))
 
 

@@ -1,0 +1,114 @@
+"""Completing a rov.toml of any form: what was there stays, what it lacks is added, and a second time nothing is."""
+
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from rov_fmu.io.toml_file import tomllib
+from rov_fmu.tank.inspection.draft import completed, lacking
+
+DRAFT = """# A draft.
+base = "?"
+
+[vehicle]
+name = "x"
+version = "1.0"
+
+[body]
+m_rov = { value = "?", unit = "kg" }   # weigh it
+
+[curves.all]   # the forces of one thruster
+
+[[thruster]]
+name = "A"
+direction = { value = ["?", "?", "?"] }   # of its thrust
+
+[[thruster]]
+name = "B"
+
+[axes.heave]
+[axes.yaw]
+
+[columns]  # what headers stand for
+"T.1 (us)" = "u_A [us]"
+"Tiefe" = "depth [m]"
+
+[dives.dive_1]
+files = ["a.csv", "b.csv"]   # of one dive
+[dives.dive_2]
+files = ["c.csv", "d.csv"]
+"""
+WHOLE = tomllib.loads(DRAFT)
+
+
+def value_text(value: Any) -> str:
+    """Return a value in one line of TOML."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{json.dumps(key)} = {value_text(one)}' for key, one in value.items())} }}"
+    return f"[{', '.join(map(value_text, value))}]" if isinstance(value, list) else json.dumps(value)
+
+
+def parts_of(name: str, value: Any, form: str) -> list[str]:
+    """Return the parts of a file that have a key or a table in one of the forms of TOML; those with headers last."""
+    if form == "inline" or not value or not isinstance(value, dict | list):
+        return [f"{name} = {value_text(value)}  # mine\n"]
+    if isinstance(value, list):
+        rows = ["".join(f"{key} = {value_text(one)}\n" for key, one in row.items()) for row in value]
+        return ["".join(f"\n[[{name}]]  # mine\n{row}" for row in rows)]
+    if form == "dotted":
+        return ["".join(f"{name}.{json.dumps(key)} = {value_text(one)}\n" for key, one in value.items())]
+    nested = {key: one for key, one in value.items() if form == "headers" and isinstance(one, dict)}
+    keys = "".join(
+        f"{json.dumps(key)} = {value_text(one)}  # mine\n" for key, one in value.items() if key not in nested
+    )
+    parts = [f"[{name}]\n{keys}"] if keys else []
+    return parts + [
+        f"[{name}.{json.dumps(key)}]\n{''.join(f'{k} = {value_text(v)}{chr(10)}' for k, v in one.items())}"
+        for key, one in nested.items()
+    ]
+
+
+@st.composite
+def own_files(draw: st.DrawFn) -> str:
+    """Return a rov.toml with some of the tables and keys of the draft, and with others, in any order and form."""
+    parts = []
+    for name, value in (WHOLE | {"limits": {"duration": 60.0}}).items():
+        if not draw(st.booleans()):
+            continue
+        mine: Any = value
+        if isinstance(value, dict):
+            mine = {key: one for key, one in value.items() if draw(st.booleans())}
+            mine |= draw(st.sampled_from([{}, {"dive 9": {"files": ["a.csv", "z.csv"]}}] if name == "dives" else [{}]))
+        parts += parts_of(name, mine, draw(st.sampled_from(["inline", "dotted", "table", "headers"])))
+    parts = draw(st.permutations(parts))
+    ordered = sorted(parts, key=lambda part: part.lstrip().startswith("["))
+    return draw(st.sampled_from(["", "# Ours.\n\n"])) + draw(st.sampled_from(["", "\n"])).join(ordered) + "# the end"
+
+
+@given(own_files(), st.booleans())
+def test_a_file_of_any_form_is_completed_and_not_damaged(own: str, has_vehicle: bool) -> None:
+    before, lacks = tomllib.loads(own), lacking(own, DRAFT, has_vehicle=has_vehicle)
+    text = completed(own, lacks)
+    after, more = tomllib.loads(text), tomllib.loads(lacks)
+    assert after == before | {
+        name: before[name] | value if isinstance(value, dict) and name in before else value
+        for name, value in more.items()
+    }
+    assert {*WHOLE["columns"].items()} <= {*after["columns"].items()}, "nothing that is wanted is left out"
+    assert text.count("# mine") == own.count("# mine"), "comments stay"
+    assert "# the end" in text
+    assert not ("base" in before and "thruster" not in before and "thruster" in after), "a base has its own thrusters"
+    assert lacking(text, DRAFT, has_vehicle=has_vehicle) == "", "a second time, nothing is lacking"
+
+
+@pytest.mark.parametrize(
+    "own", ["axes = 3", 'columns = "x"\nvehicle = []', "dives.a = 3", "dives = []", "[dives.a]\nfiles = 3"]
+)
+def test_a_key_of_a_wrong_type_stays_as_it_is(own: str) -> None:
+    text = completed(own, lacking(own, DRAFT, has_vehicle=False))
+    assert tomllib.loads(own).items() <= tomllib.loads(text).items() or "dives" in own
+    assert lacking(text, DRAFT, has_vehicle=False) == ""
