@@ -10,7 +10,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
-from rov_fmu.identify.likelihood.posterior import QUANTILE, around
+from rov_fmu.identify.likelihood.posterior import QUANTILE, around, hull
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
@@ -25,9 +25,10 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
-        posterior, kind = fit.posterior if n in file.absent else file, KINDS[p.kind]
-        value = p.offset + p.factor * float(posterior.z[n])
-        low, high = around(value, p.factor * max(posterior.errors[n], kind.finest / QUANTILE))
+        kind, posteriors = KINDS[p.kind], fit.posteriors if n not in file.absent else (fit.posterior,)
+        posterior, values = posteriors[0], [p.offset + p.factor * float(one.z[n]) for one in posteriors]
+        errors = [p.factor * max(one.errors[n], kind.finest / QUANTILE) for one in posteriors]
+        value, (low, high) = values[0], hull(*map(around, values, errors))
         if kind.is_ratio or p.is_log:
             value, low, high = np.exp([value, low, high]).tolist()
         name = kind.words + (f" {p.part}" if p.part else "")

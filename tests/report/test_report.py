@@ -12,7 +12,7 @@ import pytest
 from lxml import html
 
 from rov_fmu.cli import main
-from rov_fmu.equation.catalogue import HEAVE, SURGE
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.fmu.content import native_content, python_content
 from rov_fmu.identify.findings import driven_aside
 from rov_fmu.io.output import page_output, write_whole
