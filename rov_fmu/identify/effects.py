@@ -10,7 +10,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
-from rov_fmu.identify.likelihood.posterior import around
+from rov_fmu.identify.likelihood.posterior import around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
@@ -26,13 +26,14 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
-        posterior, kind = fit.posterior if n in file.absent else file, p.of_kind
-        numbers = p.number(posterior.ends(n))
-        value, low, high = (np.exp(numbers) if kind.is_ratio else numbers).tolist()
+        posteriors, kind = (fit.posterior,) if n in file.absent else fit.posteriors, p.of_kind
+        numbers = [p.number(one.ends(n)) for one in posteriors]
+        numbers = [(np.exp(one) if kind.is_ratio else one).tolist() for one in numbers]
+        posterior, value, interval = posteriors[0], numbers[0][0], hull(*((low, high) for _, low, high in numbers))
         name = kind.words + (f" {p.part}" if p.part else "")
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
-        yield Effect(p.kind, p.of, name, value, (low, high), p.unit, evidence, float(beyond), least)
+        yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:

@@ -60,7 +60,7 @@ SHARES = (0.3, 0.5, 1.0)
 """The commands of the answers that are told first: weak, half and full."""
 STOPPING = (
     "The time is that from rest to 63% of the steady speed, without the lag of the thrusters. The "
-    "stopping distance is that without thrust, from the steady speed to a tenth of it."
+    "stopping distance is that without thrust and constant load, from the steady speed to a tenth of it."
 )
 _ASIDE = 0.1
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
@@ -382,11 +382,14 @@ def driven_aside(identification: Identification) -> list[str]:
     """
     vehicle, lines = identification.vehicle, []
     for axis in (result.axis for result in identification.axes):
-        pushes = [one for command in (1.0, -1.0) for one in vehicle.side_effects(axis, command)]
-        others = [
-            f"{other.positive if push > 0.0 else other.negative} ({other.name})"
-            for other, push in dict(sorted(pushes, key=lambda one: abs(one[1]))).items()  # the stronger one stays
+        pushes = {
+            other: push
+            for command in (-1.0, 1.0)
+            for other, push in vehicle.side_effects(axis, command)
             if abs(push) > _ASIDE * vehicle.strongest(other) and not {axis, other} & {ROLL, PITCH}
+        }
+        others = [
+            f"{other.positive if push > 0.0 else other.negative} ({other.name})" for other, push in pushes.items()
         ]
         if others:
             lines.append(
@@ -397,7 +400,8 @@ def driven_aside(identification: Identification) -> list[str]:
 
 
 def extrapolated(identification: Identification) -> list[str]:
-    """Return sentences about answers to full command, and to commands in a direction, of which there was no test."""
+    """Return sentences about answers to full command, and to commands in a direction, of which there was no test, and
+    about the voltage of all answers, if the thrust depends on it."""
     low, high = identification.vehicle.command_range
     full = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
     untested = [
@@ -407,6 +411,8 @@ def extrapolated(identification: Identification) -> list[str]:
         if strongest < LEAST_TESTED
     ]
     lines = [full] if SHARES[-1] > high else []
+    if (voltage := identification.vehicle.layout.voltage) is not None:
+        lines.insert(0, f"The numbers are for a supply of {voltage:g} V.")
     if untested:
         lines.append(f"No test drives the vehicle {listed(untested)}, so the numbers for that are extrapolated.")
     return lines

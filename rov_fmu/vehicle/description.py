@@ -164,7 +164,7 @@ def _report(name: object, info: ValidationInfo) -> Path:
         raise ValueError("must not be blank" if name else "must have at least 1 character")
     path, coming = inside(folder_of(info), printable(name)), (info.context or {})["coming"]
     if not (os.path.isfile(path) or (coming and is_same(path, coming))):  # noqa: PTH113 (as above)
-        raise ValueError("there is no such file beside this one")
+        raise ValueError("there is no such file beside this one: copy it there, or remove this key")
     return folder_of(info) / name
 
 

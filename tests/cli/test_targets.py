@@ -187,8 +187,7 @@ OVERWRITING = [
     *(f"build {vehicle} --osp -o {output}" for vehicle, output in BUILT),
     "identify tests --force -o tests/rov.toml",
     "identify tests --force -o tests/other.toml",
-    "identify tests --force --report tests/steady_surge.csv",
-    "identify tests --force -o new --report tests/../new",
+    "tune videoray.toml --axis heave --points points.csv -o points.csv",
     "tune effects.toml --axis surge --command 1 --v-ss 1 -o thrust_12_v.csv",
     "simulate effects.toml -o thrust_12_v.csv",
     "sitl effects.toml --log thrust_12_v.csv",
@@ -257,7 +256,7 @@ def test_a_vehicle_may_be_tuned_in_its_place(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("there", [True, False])
 def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Path) -> None:
-    target, other = tmp_path / "target", tmp_path / "other"
+    target, other = tmp_path / "target.toml", tmp_path / "other"
     if there:
         other.write_bytes(OLD)
     target.symlink_to(other)
@@ -269,20 +268,21 @@ def test_a_link_is_replaced_and_what_it_leads_to_stays(there: bool, tmp_path: Pa
 
 
 def test_a_path_of_any_characters_is_written_and_printed(tmp_path: Path, capsys: Capsys) -> None:
-    for name in ("Röv [bold] 4 [", "\udcff", "a\nb", "n" * 250):
-        folder = tmp_path / name[:200]
+    for stem in ("Röv [bold] 4 [", "\udcff", "a\nb", "n" * 245):
+        folder, name = tmp_path / stem[:200], f"{stem}.toml"
         try:
             folder.mkdir()
         except OSError:  # a file system that takes Unicode alone
             continue
-        for target, code in ((folder / name, 0), (folder / "no" / name, 2), (folder, 2)):
+        (folder / "folder.toml").mkdir()
+        for target, code in ((folder / name, 0), (folder / "no" / name, 2), (folder / "folder.toml", 2)):
             capsys.readouterr()
             assert COMMANDS["tune", "output"].run(target) == code
         one_line(capsys)
         assert load_vehicle(folder / name)
     there = sorted(tmp_path.rglob("*"))
     report = ["--report", str(tmp_path / "\udcff.html")]
-    assert main(["identify", str(FEW_TESTS), "--force", "-o", str(tmp_path / "x"), *report]) == 2
+    assert main(["identify", str(FEW_TESTS), "--force", "-o", str(tmp_path / "x.toml"), *report]) == 2
     assert "not Unicode" in one_line(capsys)
     assert sorted(tmp_path.rglob("*")) == there
     with without_page():

@@ -47,6 +47,21 @@ def found(fit: Fit, **others: float) -> Fit:
     return replace(fit, posterior=replace(posterior, z=kept), file=replace(fit.file, posterior=file))
 
 
+@pytest.mark.parametrize("wider", ["file", "all effects"])
+def test_an_effect_has_the_interval_of_its_coefficient(wider: str, fit: Fit, short: given.Tests) -> None:
+    """It contains those of both fits, in the facts as in the table of the coefficients."""
+    one = found(fit)
+    widened = [replace(of, covariance=4.0 * of.covariance) for of in one.posteriors]
+    if wider == "file":
+        one = replace(one, file=replace(one.file, posterior=widened[0]))
+    else:
+        one = replace(one, posterior=widened[1])
+    _, coefficients = identified_vehicle(short, one)
+    (band,) = [effect for effect in effects_of(one) if effect.kind == "dead band" and effect.of == "top"]
+    assert band.interval == pytest.approx(coefficients["c_0_top"].interval, rel=1e-6)
+    assert band.interval[1] - band.interval[0] == pytest.approx(4.0 * HALF, rel=1e-6)
+
+
 def test_the_vehicle_of_a_fit_has_its_effects_and_says_what_the_tests_determine(fit: Fit, short: given.Tests) -> None:
     """A number is determined where its error is at most 0.8 times that of its prior, which is 0.5 for the inertia."""
     clear = found(fit, dead_band_astern=0.0, advance_astern=log(1.2))

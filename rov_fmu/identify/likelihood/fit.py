@@ -4,6 +4,7 @@ samples, and the posterior there."""
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import count
 
 import numpy as np
 
@@ -112,13 +113,18 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     quick, full = model.objective(thinned=True), model.objective()
     table = full.table
     ends, is_enough = _from_starts(quick, on_progress)
-    show = moving(on_progress, "all samples", 0.3, 0.7)
+    show = moving(on_progress, "all samples", 0.3, 0.6)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
-    on_progress("hypotheses", 0.65)
+    tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
+
+    def search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
+        show_tried(next(tried))
+        return _search(objective, numbers)
+
     plain = Trial({}, model, full, near, evidence_at(full, near), evidence_at(quick, ends[0]))
-    plain, first = settled(plain, _search)
+    plain, first = settled(plain, search)
     held = windows(plain.objective, plain.minimum.z)
-    explained = StructureSearch(plain, _search).explained()
+    explained = StructureSearch(plain, search).explained()
     adopted = (*first, *explained.adopted)
     model, full, near = explained.trial.model, explained.trial.objective, explained.trial.minimum
     known = model.known

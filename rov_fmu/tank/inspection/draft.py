@@ -129,7 +129,7 @@ def completed(own: str, lacks: str) -> str:
     for name, item in more.items():
         if not isinstance(item, AbstractTable | AoT):
             head += f"{name} = {item.as_string()}\n"
-        elif name not in document:
+        elif name not in document or isinstance(item, AoT):
             tables.add(name, item)
         else:
             there = document[name]

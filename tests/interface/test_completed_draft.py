@@ -1,6 +1,7 @@
 """Completing a rov.toml of any form: what was there stays, what it lacks is added, and a second time nothing is."""
 
 import json
+import sys
 from collections.abc import Mapping
 from typing import Any
 
@@ -8,8 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rov_fmu.io.toml_file import tomllib
 from rov_fmu.tank.inspection.draft import completed, lacking
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 DRAFT = """# A draft.
 base = "?"
