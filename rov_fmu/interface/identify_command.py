@@ -42,7 +42,7 @@ def identify_tests(
     if mcap and not is_mcap(mcap):
         raise InputError(f"--mcap {mcap}: the name must end with .mcap")
     targets = [(vehicle, VEHICLE_FILE), (report, PAGE), (mcap, "")]
-    check_targets(targets, force=force)
+    check_targets(targets, force=True)  # whose files they are matters once the inputs are known
 
     def check_outputs(inputs: Sequence[Path]) -> None:
         """Check the files to write as soon as the input files are known."""

@@ -60,7 +60,7 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
         ),
         ("length [m],time [s]\n0,5,25\n", r"column 3 = '25': there is no such column \(are these decimal commas\?"),
         ('length [m],time [s]\n"0,5",25\n', "must be a number with a decimal point, unless ; separates the columns"),
-        ("time [s]\n1\n", r"column 2: 'length \[m\]' is missing$"),
+        ("time [s]\n1\n", r"line 1: 'length \[m\]' is missing$"),
         (
             "0,1\n",
             r"line 1 = '0, 1': the first line must be a header that names the columns, such as length \[m\], time",
@@ -86,7 +86,7 @@ def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     for header, hint in {"note [1]": ". The other columns are 'note [1]'!", "tim": "; is it the column 'tim'?"}.items():
         with pytest.raises(DataFileError) as error:
             read_columns(_file(tmp_path, f"{header}\n1\n"), {"length": LENGTH, "time": MAYBE}, others=True, hint="!")
-        assert str(error.value).endswith(f", line 1, column 2: 'length [m]' is missing, and so is 'time [s]'{hint}")
+        assert str(error.value).endswith(f", line 1: 'length [m]' is missing, and so is 'time [s]'{hint}")
 
 
 def test_a_loose_reading_counts_texts_that_are_not_numbers(tmp_path: Path) -> None:
