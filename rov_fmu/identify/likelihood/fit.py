@@ -27,7 +27,7 @@ from rov_fmu.identify.likelihood.search import (
     windows,
     with_shared,
 )
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, Minimum, evidence, evidence_at, minimise, scaled
+from rov_fmu.identify.likelihood.solve import MOST_STEPS, QUICK, Minimum, evidence, evidence_at, minimise, scaled
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
@@ -38,8 +38,6 @@ _SAME = 0.01
 _STARTS = ("start 1", "start 2", "a more careful start")
 """Two starts, and one for a motion that diverges from both. The kinds of the parameters say where they begin: with much
 noise, J has few minima far from the data, and a heavier vehicle with less drag is careful."""
-_QUICK = 8.0
-"""The reduction of J by new derivatives at which a quick fit ends."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -137,7 +135,7 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
 
         low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
         show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
-        found = minimise(objective, near.z, show, enough=_QUICK, last=False, promises=bends)
+        found = minimise(objective, near.z, show, enough=QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
@@ -177,7 +175,7 @@ def _less_bent(
     """Return J where only some curves bend, and its minimum, from that where more do."""
     objective = replace(model, known=replace(known, bent=bent)).objective()
     show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
-    return objective, minimise(objective, near.z, show, near=near.data, enough=_QUICK)
+    return objective, minimise(objective, near.z, show, near=near.data, enough=QUICK)
 
 
 def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
@@ -202,11 +200,11 @@ def _least(objective: Objective, start: Array, on_step: Callable[[int], None] = 
 
     In the valley between both, J has a kink wherever the dead band passes a command of the tests.
     """
-    end = minimise(objective, start, on_step=on_step, enough=_QUICK, last=False)
+    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False)
     larger = objective.table.with_larger_dead_bands(end.z)
     if np.array_equal(larger, end.z):
         return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=_QUICK, last=False)
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=QUICK, last=False)
     return min(end, other, key=lambda found: found.value)
 
 

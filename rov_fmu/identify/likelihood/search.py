@@ -24,7 +24,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cos
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -38,8 +38,7 @@ _MOST, _ROUNDS = 3, 6
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted in a round, for each place at which J compares them."""
 _FAR = 100.0
-"""Where one has won, others are not fitted whose J is so much above its own. Nor is one that does not change the thrust
-fitted to all samples if its evidence of thinned logs, which hardly tell it, is so much below the largest one."""
+"""Where one has won, others are not fitted whose J is so much above its own."""
 _FORCE, _LOUD = 0.03, 1.0
 """The size of the slow forces, relative to full thrust, and how many deviations of the prior the white noise is above
 its mean where J compares hypotheses before any fit."""
@@ -248,7 +247,7 @@ class Comparison:
 
     def _start(self, objective: Objective, starts: Starts) -> Array:
         """Return the place with the coordinates from which the parameters of some hypotheses begin."""
-        z = np.array([self.place.get(p.key, p.mean) for p in objective.table.parameters])
+        z = coordinates(self.place, objective.table)
         for place, start in numbers_of(objective.table, starts).items():
             z[place] = start
         return z
@@ -267,6 +266,11 @@ def rough(table: Table) -> dict[Key, float]:
 def place_of(table: Table, z: Array) -> dict[Key, float]:
     """Return the coordinates of all parameters by their keys."""
     return dict(zip((p.key for p in table.parameters), z.tolist(), strict=True))
+
+
+def coordinates(place: Mapping[Key, float], table: Table) -> Array:
+    """Return the coordinates of a place. Parameters that it lacks have their means."""
+    return np.array([place.get(p.key, p.mean) for p in table.parameters])
 
 
 def numbers_of(table: Table, starts: Starts) -> dict[int, float]:
@@ -328,13 +332,35 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
         quick = evidence_at(thinned, end)
         if quick > enough:
             full = minimise(objective, scaled(objective, end.z), last=False)
-            ends = dict.fromkeys(starts) | {
-                one: float(full.z[place])
-                for one in starts
-                if (place := objective.table.place(*one.parameter)) is not None
-            }
-            return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick)
+            return _trial(starts, model, objective, full, prior, quick)
     return None
+
+
+def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
+    """Return the minimum of J with some hypotheses for all samples, from a fit that they hardly move.
+
+    It ends where the evidence within reach is clearly below that of this fit. The result is None if a motion diverges.
+    """
+    model, least = model.applied(*starts), near.score - CLOSE - prior
+    thinned, objective = model.objective(thinned=True), model.objective()
+
+    def promises(value: float, information: Array) -> bool:
+        return evidence(objective, value, information) > least
+
+    with suppress(DivergedError):
+        start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
+        full, quick = minimise(objective, start, last=False, promises=promises), -inf
+        if promises(full.value, full.information):
+            quick = evidence_at(thinned, minimise(thinned, full.z, enough=QUICK, last=False))
+        return _trial(starts, model, objective, full, prior, quick)
+    return None
+
+
+def _trial(starts: Starts, model: Model, objective: Objective, full: Minimum, prior: float, quick: float) -> Trial:
+    """Return the fit with some hypotheses, whose parameters are where it ends."""
+    places = {one: objective.table.place(*one.parameter) for one in starts}
+    ends = {one: None if place is None else float(full.z[place]) for one, place in places.items()}
+    return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick)
 
 
 def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
@@ -436,9 +462,12 @@ class StructureSearch:
         for starts, gain in [*self._promising()]:
             if gain < won - _FAR:
                 continue
-            is_shown = gain > -inf
-            enough = max(one.quick for one in (self.now, *fits)) - (WINS if is_shown else _FAR)
-            trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
+            is_shown, prior = gain > -inf, self._prior(starts)
+            enough = max(one.quick for one in (self.now, *fits)) - WINS
+            if is_shown:
+                trial = fitted(self.model, starts, prior, self.search, enough)
+            else:
+                trial = refitted(self.model, starts, prior, self.now)
             self.tried[frozenset(starts)] = trial
             is_worse = trial.score < self.now.score if trial else enough < self.now.quick
             if is_shown and is_worse and starts.keys() > self.now.starts.keys():
