@@ -531,7 +531,8 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
         return Trial(starts, model, cast("Objective", None), cast("Minimum", None), score, score)
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", trial)
+    for name in ("fitted", "refitted"):
+        monkeypatch.setattr(f"rov_fmu.identify.likelihood.search.{name}", trial)
     search = StructureSearch(trial(reversed_model, {}), _search)
     search.variants = [REVERSED, DEAD]
     search.now = trial(reversed_model, dict.fromkeys([DEAD, REVERSED]))
