@@ -506,8 +506,8 @@ class StructureSearch:
     def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
         """Yield the best sets at either of two places with the fall of J at the better one, the largest fall first.
 
-        Of the starts of one set, the best one counts. A fall that the prior odds outweigh is not enough, and a
-        hypothesis that made a fit worse is tried again only where J falls by more than it did before that fit.
+        Of the starts of one set, the best one counts. A hypothesis that made a fit worse is tried again only where J
+        falls by more than it did before that fit.
         """
         now = self.now
         at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
@@ -517,7 +517,7 @@ class StructureSearch:
         for place in (0, 1):
             best = dict[frozenset[Variant], int]()
             for n in sorted(falls, key=lambda one: falls[one][place], reverse=True):
-                if falls[n][place] > WINS + self._prior(now.starts) - self._prior(sets[n]):
+                if falls[n][place] > 0.0:
                     best.setdefault(frozenset(sets[n]), n)
             for key, n in islice(best.items(), _FITTED):
                 chosen.setdefault(key, n)
