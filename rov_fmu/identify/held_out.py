@@ -162,7 +162,7 @@ def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> floa
 
 
 def cautious(objective: Objective, z: Array) -> Array:
-    """Return the parameters with at least the least change of thrust, which is never predicted to better."""
+    """Return the parameters with no size below its least one on unseen data: thrust is never predicted to better."""
     least = [log(p.of_kind.least_unseen) if p.of_kind.least_unseen else -inf for p in objective.table.parameters]
     return np.maximum(z, least)
 

@@ -71,8 +71,8 @@ def check_written(path: Path, kind: str) -> None:
     """Raise FileError unless the suffix of a path to write is one of this kind of file."""
     if path.suffix.lower() not in _WRITTEN[kind]:
         other = _BY_SUFFIX.get(path.suffix.lower())
-        reason = f"{path.suffix} is the suffix of {other}" if other else ""
-        reason = reason or f"the name must end with {' or '.join(_WRITTEN[kind])}"
+        must_end = f"the name must end with {' or '.join(_WRITTEN[kind])}"
+        reason = f"{path.suffix} is the suffix of {other}" if other else must_end
         raise FileError(f"{path}: would be {kind}, but {reason}")
 
 

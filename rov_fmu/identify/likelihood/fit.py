@@ -105,7 +105,7 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
-    bends.
+    bends. The shapes of the other curves only widen the intervals: what is told is a fit in which these are quadratic.
     """
     model = Model(known, logs, rows)
     quick, full = model.objective(thinned=True), model.objective()
@@ -150,16 +150,17 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     ]
     if max(apart, default=0.0) < 2.0 or adopted:  # other vehicles had the wrong structure
         difference = 0.0
-    measured, told = known.bent.intersection(known.measured_curves), (full, best)
+    measured, told, least = known.bent.intersection(known.measured_curves), full, best
     if measured < known.bent:
-        told = _less_bent(model, known, measured, best, on_progress)
-    file = _less_bent(model, known, frozenset(), told[1], on_progress) if measured else told
-    errors = with_shared(known.layout, structure(*told))
-    unseen = unseen_errors(told[0], told[1].z, held)
+        told, least = _less_bent(model, known, measured, best, on_progress)
+    file = _less_bent(model, known, frozenset(), least, on_progress) if measured else (told, least)
+    errors = with_shared(known.layout, structure(told, least))
+    unseen = unseen_errors(told, least.z, held)
     of_file = without_weak_effects(*file)
     return Fit(
         known,
-        *told,
+        told,
+        least,
         posterior.widened(errors, unseen),
         replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
         float(difference),

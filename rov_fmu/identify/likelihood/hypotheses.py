@@ -370,7 +370,7 @@ HYPOTHESES = {
         (log(0.3), log(1.0), log(3.0)),
         "all thrusters: commands act at a rate of at most {value}, where 1 is full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
-        most=5.0,  # beyond, it is rather a delay or a lag
+        most=5.0,  # a ramp to full command within 0.2 s is rather a delay or a lag
     ),
 }
 """All hypotheses about the structure, by the kind of their parameter, in the order in which they change a model: first

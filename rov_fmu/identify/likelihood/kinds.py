@@ -179,6 +179,11 @@ def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
     )
 
 
+def _astern(prior: Deviation, words: str, **own: Any) -> Kind:
+    """Return the kind of what something is astern relative to what it is ahead, which is the same if it is absent."""
+    return Kind(prior, words, is_ratio=True, null=0.0, **own)
+
+
 def _drag_astern(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
     return {} if form.axis in prior.fitted and _free(prior, form, f"a_d{REVERSE}") else None
 
@@ -209,14 +214,12 @@ KINDS = {
     ),
     "thrust shape": Kind(_SHAPE),
     "linear thrust": Kind(_SHAPE),
-    "reverse thrust": Kind(
+    "reverse thrust": _astern(
         Deviation(
             "thrust_reverse", 0.10, "thrust astern to thrust ahead, relatively", "propellers are made for one direction"
         ),
         "thrust astern relative to thrust ahead",
         keys=("a_t_reverse", "b_t_reverse", "d_reverse"),
-        is_ratio=True,
-        null=0.0,
         adapts=True,
     ),
     "dead band": Kind(
@@ -229,14 +232,12 @@ KINDS = {
         high=0.5,
         null=0.0,
     ),
-    "dead band astern": Kind(
+    "dead band astern": _astern(
         Deviation(
             "dead_band_astern", 0.3, "ln of the dead band astern to that ahead", "propellers are made for one direction"
         ),
         "dead band astern relative to dead band ahead",
         keys=("c_0_reverse",),
-        is_ratio=True,
-        null=0.0,
     ),
     "advance": Kind(
         Deviation("advance", 0.2, "the share of full thrust lost per m/s", "propellers give no thrust at 3 to 10 m/s"),
@@ -247,14 +248,12 @@ KINDS = {
         unit="s/m",
         adapts=True,
     ),
-    "advance astern": Kind(
+    "advance astern": _astern(
         Deviation(
             "advance_astern", 0.3, "ln of the share lost astern to that ahead", "propellers are made for one direction"
         ),
         "loss of thrust with the speed of advance astern relative to that ahead",
         keys=("d_reverse",),
-        is_ratio=True,
-        null=0.0,
         adapts=True,
     ),
     "lag": Kind(
@@ -303,14 +302,12 @@ KINDS = {
         speed_power=-1.0,
         starts=(0.0, 0.0, -1.0),
     ),
-    "drag astern": Kind(
+    "drag astern": _astern(
         Deviation("drag_astern", 0.2, "ln of the drag astern to the drag ahead", "few hulls differ by more than 20 %"),
         "drag astern relative to drag ahead",
         keys=("a_d_reverse", "b_d_reverse"),
         told_by=("log", "astern"),
         of_axis=_drag_astern,
-        is_ratio=True,
-        null=0.0,
         adapts=True,
     ),
     "centre of buoyancy": Kind(

@@ -322,14 +322,14 @@ def _followed(one: SampledLog, limit: float, slew: float, drop: float) -> Array:
     if one.log.follows_axis or (limit == slew == np.inf and drop == 0.0):
         return found
     found, steps = found.copy(), np.diff(one.record.told).tolist() if slew < np.inf else []
-    for n in (n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands):
+    places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
+    for n in places:
         values = found[:, n] = np.clip(found[:, n], -limit, limit)
         now = float(values[0])
         for row, (value, step) in enumerate(zip(values.tolist(), steps, strict=False)):
             before, now = now, now + min(max(value - now, -slew * step), slew * step)
             found[row, n] = 0.5 * (before + now)  # the mean over a row is that at its middle
-    places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
-    # Power and thrust grow about with the square of a command.
+    # Power and thrust grow about with the square of a command. The load is the mean of these squares.
     load = np.mean(found[:, places] ** 2, axis=1)
     found[:, places] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
     return found

@@ -342,7 +342,7 @@ def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial |
     It ends where the evidence within reach is clearly below that of this fit. The result is None if a motion diverges.
     """
     model, least = model.applied(*starts), near.score - CLOSE - prior
-    thinned, objective = model.objective(thinned=True), model.objective()
+    objective = model.objective()
 
     def promises(value: float, information: Array) -> bool:
         return evidence(objective, value, information) > least
@@ -351,6 +351,7 @@ def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial |
         start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
         full, quick = minimise(objective, start, last=False, promises=promises), -inf
         if promises(full.value, full.information):
+            thinned = model.objective(thinned=True)
             quick = evidence_at(thinned, minimise(thinned, full.z, enough=QUICK, last=False))
         return _trial(starts, model, objective, full, prior, quick)
     return None
@@ -463,15 +464,16 @@ class StructureSearch:
             if gain < won - _FAR:
                 continue
             is_shown, prior = gain > -inf, self._prior(starts)
-            enough = max(one.quick for one in (self.now, *fits)) - WINS
             if is_shown:
+                enough = max(one.quick for one in (self.now, *fits)) - WINS
                 trial = fitted(self.model, starts, prior, self.search, enough)
+                # Without a trial, the evidence of thinned logs is not enough.
+                is_worse = trial.score < self.now.score if trial else enough < self.now.quick
+                if is_worse and starts.keys() > self.now.starts.keys():
+                    self.lost[self._new(starts)] = gain
             else:
                 trial = refitted(self.model, starts, prior, self.now)
             self.tried[frozenset(starts)] = trial
-            is_worse = trial.score < self.now.score if trial else enough < self.now.quick
-            if is_shown and is_worse and starts.keys() > self.now.starts.keys():
-                self.lost[self._new(starts)] = gain
             if trial:
                 fits.append(trial)
                 if is_shown and trial.score > self.now.score + _FAR:
