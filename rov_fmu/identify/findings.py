@@ -30,6 +30,7 @@ from rov_fmu.identify.result import (
     Prediction,
     Structure,
     half_width,
+    is_extrapolated,
     is_known,
     relative_error,
 )
@@ -400,17 +401,22 @@ def driven_aside(identification: Identification) -> list[str]:
 
 
 def extrapolated(identification: Identification) -> list[str]:
-    """Return sentences about answers to full command, and to commands in a direction, of which there was no test, and
-    about the voltage of all answers, if the thrust depends on it."""
-    low, high = identification.vehicle.command_range
-    full = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
+    """Return sentences about answers to commands that were not tested, and about the voltage of all answers, if the
+    thrust depends on it."""
+    tested = [
+        f"{one.axis.name} from {-one.tested[0]:.0%} to {one.tested[1]:.0%}"
+        for one in identification.axes
+        if any(is_extrapolated(answer.command, one.tested) for answer in one.answers)
+    ]
     untested = [
         f"{direction} ({one.axis.name})"
         for one in identification.axes
         for direction, strongest in zip((one.axis.negative, one.axis.positive), one.tested, strict=True)
         if strongest < LEAST_TESTED
     ]
-    lines = [full] if SHARES[-1] > high else []
+    lines = (
+        [f"The tests had commands of {listed(tested)}. Numbers for stronger ones are extrapolated."] if tested else []
+    )
     if (voltage := identification.vehicle.layout.voltage) is not None:
         lines.insert(0, f"The numbers are for a supply of {voltage:g} V.")
     if untested:

@@ -19,6 +19,8 @@ from rov_fmu.vehicle.vehicle import Vehicle
 Interval = tuple[float, float]
 Estimate = tuple[float, Interval]
 """A number with its 95 % interval."""
+Tested = tuple[float, float]
+"""The strongest command along an axis, astern and ahead, that the tests show for long enough; 0 without one."""
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
@@ -33,6 +35,8 @@ MOST_UNKNOWN = 0.05
 this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
 LEAST_TESTED = 0.05
 """A direction of an axis is tested by commands from this one."""
+_ABOUT = 1.05
+"""Commands that differ by less than this factor are not told apart."""
 LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
 USUAL, ALARM = 1.5, 3.0
@@ -348,6 +352,17 @@ class AxisOfBase:
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
 
 
+def is_extrapolated(command: float, tested: Tested) -> bool:
+    """Return True if a command is stronger than those of the tests, or in a direction without a test."""
+    strongest = tested[command > 0.0]
+    return abs(command) > _ABOUT * strongest or strongest < LEAST_TESTED
+
+
+def are_alike(one: float, other: float) -> bool:
+    """Return True if two commands are about the same."""
+    return one * other > 0.0 and max(one / other, other / one) <= _ABOUT
+
+
 def half_width(estimate: Estimate) -> float:
     """Return the larger half of the interval of a number, relative to the number."""
     value, interval = estimate
@@ -399,9 +414,9 @@ class AxisResult:
     axis: Axis
     verdict: Verdict = Verdict("not identified", ())
     answers: tuple[Answer, ...] = ()
-    tested: tuple[float, float] = (1.0, 1.0)
-    """The strongest command of the tests in the negative and in the positive direction. Answers to stronger ones, and
-    those in a direction that no test has, are extrapolated, and do not count for the verdict."""
+    tested: Tested = (1.0, 1.0)
+    """Answers to stronger commands, and those in a direction that no test has, are extrapolated, and do not count for
+    the verdict."""
     known: tuple[Coefficient, ...] = ()
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
     predictions: tuple[Prediction, ...] = ()

@@ -9,9 +9,9 @@ factor (Laplace approximation), with the prior probability, decides. What wins i
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import islice
-from math import inf, log, nan
+from math import hypot, inf, log, nan, sqrt
 
 import numpy as np
 
@@ -51,8 +51,9 @@ constant this changes."""
 MOST_OF_ROW = 0.5
 """Commands that change within more than this part of the time between two rows are momentary values: they change at any
 time."""
-_SCALE = 0.01
-"""The standard error of the scale of a sensor in a log of an autopilot, whose estimates it has."""
+LEAST_LACK, _LACKS = 0.01, 1.5
+"""What the structure lacks, as a standard error of the logarithms of speeds and inertias: at least the first number,
+and so many times the errors over 10 s beyond the noise, relative to the motion."""
 _IDLE_STEP = 0.1
 """The time between two values of the unknown force that tell when commands do not act, s."""
 _IDLE = 0.5
@@ -70,38 +71,58 @@ Starts = Mapping[Variant, float | None]
 # ---- The alarm -------------------------------------------------------------------------------------------------------
 
 
-def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, float]:
-    """Return how much larger the errors along each axis are than the noise of the sensor: near 1 for a right structure.
+@dataclass(frozen=True)
+class Misfit:
+    """The errors of predictions over 10 s along an axis, the largest ones of its sensors."""
+
+    ratio: float = 0.0
+    """R: relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells it."""
+    lack: float = 0.0
+    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²."""
+
+    def or_larger(self, other: "Misfit") -> "Misfit":
+        """Return the larger one of each number."""
+        return Misfit(max(self.ratio, other.ratio), max(self.lack, other.lack))
+
+
+def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, Misfit]:
+    """Return how much larger the errors along each axis are than the noise of the sensor.
 
     The fit has seen these data, so only its structure can be wrong. The errors are those of predictions over 10 s, even
     where noise explains each next sample. Outliers do not count. The noise is at least 1 % of the motion.
 
     The motion in a log whose commands change between its rows cannot be predicted over 10 s, least of all a heading
     that is unstable without them. The errors of such a log are the innovations of a filter without slow processes,
-    relative to its own standard deviations. If `ahead` is True, they are those of predictions over 10 s there, too, as
-    long as the log has no short force, which stands for these commands.
+    relative to its own standard deviations, and say nothing about the motion. If `ahead` is True, they are those of
+    predictions over 10 s there, too, as long as the log has no short force, which stands for these commands.
     """
-    found: dict[Axis, float] = {}
+    found: dict[Axis, Misfit] = {}
     for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
         places = [usual & (record.sensor == number) for number in range(len(one.measured))]
-        least = [
-            least_error(m.noise, unchanged(record.time[at], record.value[at], AHEAD)) if at.sum() >= 10 else nan
-            for m, at in zip(one.measured, places, strict=True)
-        ]
+        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in places]
+        least = [least_error(m.noise, change) for m, change in zip(one.measured, motion, strict=True)]
+        is_motion = not (one.is_momentary or (one.lost and not ahead))
         try:
-            if one.is_momentary or (one.lost and not ahead):
-                run = objective.run(_without_slow_noise(objective.table, best.z), n)
-                errors = run.innovations / np.sqrt(run.variances)
-            else:
+            if is_motion:
                 run = objective.run(best.z, n, begin=SETTLING, span=AHEAD)
                 errors = run.innovations / np.array(least)[record.sensor]
+            else:
+                run = objective.run(_without_slow_noise(objective.table, best.z), n)
+                errors = run.innovations / np.sqrt(run.variances)
         except DivergedError:
             errors = np.full(len(record.time), inf)
-        for m, at in zip(one.measured, places, strict=True):
+        for m, at, noise, change in zip(one.measured, places, least, motion, strict=True):
             if at.sum() >= 10:
-                found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), rms(errors[at]))
+                R = rms(errors[at])
+                lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and change > 0.0 else 0.0
+                found[m.sensor.axis] = Misfit(R, lack).or_larger(found.get(m.sensor.axis, Misfit()))
     return found
+
+
+def worst(found: Mapping[Axis, Misfit]) -> float:
+    """Return the largest error R of all axes; 0 where nothing tells it."""
+    return max((one.ratio for one in found.values()), default=0.0)
 
 
 def _without_slow_noise(table: Table, z: Array) -> Array:
@@ -121,44 +142,46 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
     return {file: 1.0 if width > MOST_OF_ROW else max(float(width), _NARROWEST) for file, width in found.items()}
 
 
-def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -> Array:
-    """Return the covariance of the parameters by errors that a log does not show if its commands change between rows.
+def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
+    """Return the covariance of the parameters by errors that do not become smaller with the number of samples.
 
-    Along each axis, commands act a small part of their window earlier or later, because a stick and a controller change
-    them at other times. The axis then answers earlier or later, as if it had another inertia, and a fast axis the more.
-    Such a log also has the estimates of an autopilot, whose scale is not exact. With a scale s, a velocity v reads s v,
-    as if the drag were a/s² and b/s, and the inertia m/s.
+    What the structure of an axis lacks acts on its speed V_ss as a scale s, with which the drag is a/s² and b/s, and on
+    its times as a scale of its inertia. It also acts on unseen data, so it has the size of the errors over 10 s.
+
+    Where commands change between the rows of a log, they act a small part of their window earlier or later along each
+    axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
+    had another inertia, and a fast axis the more.
 
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
     now, parameters = windows(objective, z), objective.table.parameters
     widths = [one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.lost]
     found = np.zeros((len(z), len(z)))
-    if not widths:
-        return found
     vehicle, shapes = objective.table.model(z)
-    for axis in vehicle.layout.bare_axes:
+    for axis, misfit in misfits.items():
+        lack = hypot(LEAST_LACK, min(_LACKS * misfit.lack, 1.0))
+        is_drag = np.array([p.of == axis.name and p.kind != INERTIA for p in parameters])
+        is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
+        scale = is_drag * objective.table.each("of_kind.speed_power")
+        found += lack**2 * (np.outer(scale, scale) + np.diag(is_inertia))
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
-        own = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
-        found += _SCALE**2 * np.outer(own, own)
-        if 0.0 < time < inf:
-            is_inertia = np.array([p.kind == INERTIA and p.of == axis.name for p in parameters])
+        if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (_LATE * max(widths) / time) ** 2)
     return found
 
 
-def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
-    """Return the error of each axis. Where nothing measures one, it is the largest of those that share a thruster.
+def with_shared(layout: Layout, errors: Mapping[Axis, Misfit]) -> dict[Axis, Misfit]:
+    """Return the misfit of each axis. Where nothing measures one, it is the largest of those that share a thruster.
 
     Where both are measured, a fault of the thrusters shows in both. What shows in one alone acts on this one alone,
     such as waves or a tether.
     """
-    return {
-        axis: errors[axis]
-        if axis in errors
-        else max((error for other, error in errors.items() if layout.shares_thrusters(axis, other)), default=0.0)
-        for axis in layout.bare_axes
-    }
+
+    def shared(axis: Axis) -> Misfit:
+        along = (error for other, error in errors.items() if layout.shares_thrusters(axis, other))
+        return reduce(Misfit.or_larger, along, Misfit())
+
+    return {axis: errors[axis] if axis in errors else shared(axis) for axis in layout.bare_axes}
 
 
 # ---- Before any fit --------------------------------------------------------------------------------------------------
@@ -370,7 +393,7 @@ def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
     Only J of the other samples is compared.
     """
     adopted = list[Adopted]()
-    if max(structure(plain.objective, plain.minimum, ahead=True).values(), default=0.0) > ALARM:
+    if worst(structure(plain.objective, plain.minimum, ahead=True)) > ALARM:
         for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
             variants = [Variant(kind, of) for of in HYPOTHESES[kind].variants(plain.model.known, plain.model.logs)]
             for one in variants:
@@ -486,9 +509,9 @@ class StructureSearch:
         The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
         """
         now = self.now
-        predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
+        predicted = filtered = worst(structure(now.objective, now.minimum, ahead=True))
         if any(one.lost and not one.is_momentary for one in now.model.logs):
-            filtered = max(structure(now.objective, now.minimum).values(), default=0.0)
+            filtered = worst(structure(now.objective, now.minimum))
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
