@@ -5,7 +5,7 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import floor, inf, isfinite, log, log10
+from math import floor, inf, isfinite, isnan, log, log10
 
 import numpy as np
 
@@ -101,6 +101,10 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
+        "nearest": (
+            "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It does "
+            "not explain the errors, and the model is without it"
+        ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
         "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
@@ -630,8 +634,11 @@ def _structure(one: Structure) -> Finding | None:
     if one.value > HYPOTHESES[one.kind].most:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
+    words = {"of": one.of, "value": value, **dict(one.words)}
+    if isnan(one.probability):
+        return Finding("nearest", words={"nearest": HYPOTHESES[one.kind].sentence.format(odds="", **words)})
     odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
-    return Finding(one.kind, words={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
+    return Finding(one.kind, words={**words, "odds": odds})
 
 
 def _logging(one: Logging) -> Finding | None:

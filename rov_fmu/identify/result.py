@@ -194,14 +194,15 @@ class Effect:
 
 @dataclass(frozen=True)
 class Structure:
-    """A hypothesis about the structure of the model that won, so that it is part of the model."""
+    """A hypothesis about the structure that is more probable than the others, and usually part of the model."""
 
     kind: str
     """Its key in HYPOTHESES (likelihood/hypotheses.py)."""
     of: str
     """The thrusters or files in words; empty where it is about all of them."""
     probability: float
-    """Against the model without it."""
+    """Against the model without it; NaN for one that comes nearest, and does not explain what the model lacks. The
+    model is then without it."""
     value: float = nan
     """The number of its parameter; NaN if it has none."""
     interval: Interval = (nan, nan)

@@ -20,6 +20,7 @@ from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import (
     Adopted,
     Misfit,
+    Starts,
     StructureSearch,
     Trial,
     settled,
@@ -61,6 +62,8 @@ class Fit:
     """The hypotheses about the structure that won."""
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
+    nearest: Starts = field(default_factory=dict)
+    """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their numbers."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
     """The errors of predictions over 10 s along each axis."""
 
@@ -152,6 +155,7 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
         float(difference),
         adopted,
         explained.rivals,
+        explained.nearest,
         misfits,
     )
 

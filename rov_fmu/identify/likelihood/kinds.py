@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import inf, log
 from typing import Any, Literal
 
+import numpy as np
+
 from rov_fmu.equation.catalogue import CURVE, REVERSE
 from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.identify.likelihood.prior import Prior
@@ -80,6 +82,10 @@ class Coordinate:
     """False for noise and slow processes, which change the covariance of the filter and not its mean."""
     unit: str = "1"
 
+    def number(self, z: Any) -> Any:
+        """Return the number that a coordinate stands for."""
+        return np.exp(z) if self.is_log else self.offset + self.factor * z
+
 
 @dataclass(frozen=True)
 class Kind(Coordinate):
@@ -124,6 +130,8 @@ class Kind(Coordinate):
     """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
     least_unseen: float = 0.0
     """Its least size where unseen data are predicted."""
+    is_of_structure: bool = False
+    """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
     is_of_water: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
@@ -426,6 +434,7 @@ KINDS = {
         low=0.0,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "command limit": Kind(
         None,
@@ -436,6 +445,7 @@ KINDS = {
         low=0.1,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "slew limit": Kind(
         None,
@@ -448,6 +458,7 @@ KINDS = {
         high=log(50.0),
         null=log(50.0),
         unit="1/s",
+        is_of_structure=True,
     ),
     "voltage drop": Kind(
         None,
@@ -458,6 +469,7 @@ KINDS = {
         low=0.0,
         high=0.8,
         null=0.0,
+        is_of_structure=True,
     ),
     "white noise": Kind(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),

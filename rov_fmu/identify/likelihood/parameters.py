@@ -83,10 +83,6 @@ class Parameter(Coordinate):
         """What all parameters of its kind are."""
         return KINDS[self.kind]
 
-    def number(self, z: Any) -> Any:
-        """Return the number that a coordinate stands for."""
-        return np.exp(z) if self.is_log else self.offset + self.factor * z
-
     @property
     def step(self) -> float:
         """The change of z for its numerical derivative."""

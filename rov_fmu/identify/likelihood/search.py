@@ -6,7 +6,7 @@ the structure is right. Above ALARM, each hypothesis changes the model, J is min
 factor (Laplace approximation), with the prior probability, decides. What wins is part of the model.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
@@ -18,13 +18,13 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
+from rov_fmu.identify.likelihood.hypotheses import CONTRAST, HYPOTHESES, Model, Variant, contrasts, in_order
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, evidence_at, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -37,6 +37,8 @@ _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted in a round, for each place at which J compares them."""
+_LEFT = 0.3
+"""A hypothesis about the thrust explains the errors over 10 s if at most this share of R² - 1 is left."""
 _FAR = 100.0
 """Where one has won, others are not fitted whose J is so much above its own."""
 _FORCE, _LOUD = 0.03, 1.0
@@ -340,6 +342,8 @@ class Explained:
     adopted: tuple[Adopted, ...]
     rivals: tuple[Posterior, ...]
     """The fits with hypotheses that did not win, and whose odds are near even."""
+    nearest: Starts
+    """The hypotheses that are more probable than the others that are known, but do not explain the errors over 10 s."""
 
 
 def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf) -> Trial | None:
@@ -356,27 +360,6 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
         if quick > enough:
             full = minimise(objective, scaled(objective, end.z), last=False)
             return _trial(starts, model, objective, full, prior, quick)
-    return None
-
-
-def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
-    """Return the minimum of J with some hypotheses for all samples, from a fit that they hardly move.
-
-    It ends where the evidence within reach is clearly below that of this fit. The result is None if a motion diverges.
-    """
-    model, least = model.applied(*starts), near.score - CLOSE - prior
-    objective = model.objective()
-
-    def promises(value: float, information: Array) -> bool:
-        return evidence(objective, value, information) > least
-
-    with suppress(DivergedError):
-        start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
-        full, quick = minimise(objective, start, last=False, promises=promises), -inf
-        if promises(full.value, full.information):
-            thinned = model.objective(thinned=True)
-            quick = evidence_at(thinned, minimise(thinned, full.z, enough=QUICK, last=False))
-        return _trial(starts, model, objective, full, prior, quick)
     return None
 
 
@@ -440,13 +423,47 @@ class StructureSearch:
                 rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = best
-        now, trials = self.now, [one for one in self.tried.values() if one]
+        now, nearest = self._explaining()
+        trials = [one for one in self.tried.values() if one]
         adopted = (
             Adopted(variant, now.score - max(one.score for one in trials if variant not in one.starts))
             for variant in in_order(now.starts)
         )
         posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
-        return Explained(now, tuple(adopted), tuple(posteriors))
+        return Explained(now, tuple(adopted), tuple(posteriors), nearest)
+
+    def _explaining(self) -> tuple[Trial, Starts]:
+        """Return the fit with those hypotheses that explain the errors over 10 s, and the others that had won.
+
+        Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
+        else. A lag hardly shows in these errors, and J sees it.
+        """
+        now, nearest = self.now, dict[Variant, float | None]()
+        while doubtful := {v: z for v, z in now.starts.items() if not self._explains(now, v)}:
+            nearest |= doubtful
+            now = self._best_of(now.starts.keys() - doubtful.keys())
+        return now, nearest
+
+    def _best_of(self, variants: Collection[Variant]) -> Trial:
+        """Return the most probable fit with only some of these hypotheses."""
+        some = (one for one in self.tried.values() if one and one.starts.keys() <= {*variants})
+        return max(some, key=lambda one: one.score)
+
+    def _explains(self, now: Trial, variant: Variant) -> bool:
+        """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger."""
+        if not HYPOTHESES[variant.kind].changes_thrust or HYPOTHESES[variant.kind].has_times:
+            return True
+        layout = now.model.known.layout
+        without = self._best_of(now.starts.keys() - {variant})
+        before, after = (structure(one.objective, one.minimum) for one in (without, now))
+        ill = [t for t in layout.thrusters if t.name in variant.of or not variant.of]
+        on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
+        others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
+        worst_of = max(on, key=lambda axis: before[axis].ratio, default=None)
+        if worst_of is None:
+            return others
+        left = (after[worst_of].ratio ** 2 - 1.0) / max(before[worst_of].ratio ** 2 - 1.0, 1e-9)
+        return others and left <= _LEFT and all(after[axis].ratio <= ALARM for axis in on)
 
     def _gain(self, other: Trial) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""
@@ -459,7 +476,20 @@ class StructureSearch:
         kinds = ((kind, one) for kind, one in HYPOTHESES.items() if not one.is_first)
         every = (Variant(kind, of) for kind, one in kinds for of in one.variants(known, logs))
         some = (timed(self.model, plain.objective, plain.minimum.z, one) for one in every)
-        return [one for one in some if one.of or not HYPOTHESES[one.kind].has_times]
+        return [
+            one
+            for one in some
+            if (one.of or not HYPOTHESES[one.kind].has_times)
+            and (not HYPOTHESES[one.kind].is_contrast or self.told_apart.issuperset(one.of))
+        ]
+
+    @cached_property
+    def told_apart(self) -> frozenset[str]:
+        """The thrusters whose health the data tell."""
+        errors = dict[str, float]()
+        with suppress(DivergedError):
+            errors = contrasts(self.model, place_of(self.plain.objective.table, self.plain.minimum.z))
+        return frozenset(name for name, error in errors.items() if error < CONTRAST)
 
     @property
     def _smaller(self) -> list[Starts]:
@@ -486,20 +516,16 @@ class StructureSearch:
         for starts, gain in [*self._promising()]:
             if gain < won - _FAR:
                 continue
-            is_shown, prior = gain > -inf, self._prior(starts)
-            if is_shown:
-                enough = max(one.quick for one in (self.now, *fits)) - WINS
-                trial = fitted(self.model, starts, prior, self.search, enough)
-                # Without a trial, the evidence of thinned logs is not enough.
-                is_worse = trial.score < self.now.score if trial else enough < self.now.quick
-                if is_worse and starts.keys() > self.now.starts.keys():
-                    self.lost[self._new(starts)] = gain
-            else:
-                trial = refitted(self.model, starts, prior, self.now)
+            enough = max(one.quick for one in (self.now, *fits)) - WINS
+            trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
+            # Without a trial, the evidence of thinned logs is not enough.
+            is_worse = trial.score < self.now.score if trial else enough < self.now.quick
+            if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():
+                self.lost[self._new(starts)] = gain
             self.tried[frozenset(starts)] = trial
             if trial:
                 fits.append(trial)
-                if is_shown and trial.score > self.now.score + _FAR:
+                if trial.score > self.now.score + _FAR:
                     won = max(won, gain)
         return fits
 
@@ -519,7 +545,7 @@ class StructureSearch:
             hypothesis = HYPOTHESES[one.kind]
             if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
-            for some in self._smaller if hypothesis.changes_thrust else [now.starts]:
+            for some in self._smaller:
                 if len(some) < _MOST and not any(one.excludes(other) for other in some):
                     sets = [{**some, one: start} for start in hypothesis.starts or (None,)]
                     (shown if hypothesis.changes_thrust else others).extend(sets)
