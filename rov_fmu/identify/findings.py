@@ -102,8 +102,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
         "nearest": (
-            "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It does "
-            "not explain the errors, and the model is without it"
+            "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It "
+            "does not explain the errors, and the model is without it"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",

@@ -23,6 +23,7 @@ USUAL_EXPONENT = 1.5
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
 INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "logging width", "white noise"
+WANDER = "wander"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
@@ -126,6 +127,8 @@ class Kind(Coordinate):
     """True for the size of a slow or short process."""
     slow: Process | None = None
     """The slow process whose size it is."""
+    is_of_sensor: bool = False
+    """True for a slow process that is an error of a sensor, and no disturbance of the motion."""
     hides_structure: bool = False
     """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
     least_unseen: float = 0.0
@@ -408,6 +411,17 @@ KINDS = {
         0.2,
         least_unseen=0.03,  # batteries and water differ from day to day
     ),
+    "wander": _slow(
+        Deviation(
+            "wander", 2.5, "ln of the size of the wander of an estimator's velocity", "1 mm/s, within a factor of 12"
+        ),
+        Process(8.0, "Wander of the velocity", "velocity", "", ""),
+        0.001,
+        1e-7,
+        0.3,
+        unit="m/s",
+        is_of_sensor=True,
+    ),
     "slow velocity": _slow(
         Deviation(
             "slow_velocity", 2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"
@@ -485,8 +499,8 @@ KINDS = {
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative
 to white noise."""
-SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow}
-"""The slow processes, by the kinds of their sizes."""
+SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow and not kind.is_of_sensor}
+"""The slow processes that disturb the motion, by the kinds of their sizes."""
 EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is

@@ -103,7 +103,8 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
         places = [usual & (record.sensor == number) for number in range(len(one.measured))]
         motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in places]
-        least = [least_error(m.noise, change) for m, change in zip(one.measured, motion, strict=True)]
+        noise_of = (hypot(m.noise, objective.table.wander(best.z, one, m.sensor)) for m in one.measured)
+        least = [least_error(noise, change) for noise, change in zip(noise_of, motion, strict=True)]
         is_motion = not (one.is_momentary or (one.lost and not ahead))
         try:
             if is_motion:
@@ -128,12 +129,13 @@ def worst(found: Mapping[Axis, Misfit]) -> float:
 
 
 def _without_slow_noise(table: Table, z: Array) -> Array:
-    """Return the parameters with no slow processes. Coloured noise and short forces are at most as large as usual."""
+    """Return the parameters without what disturbs the motion slowly. Coloured noise and short forces are at most as
+    large as usual."""
     quiet = z.copy()
     for n, p in enumerate(table.parameters):
         if p.of_kind.hides_structure:
             quiet[n] = min(z[n], p.mean)
-        elif p.of_kind.is_size:
+        elif p.of_kind.is_size and not p.of_kind.is_of_sensor:
             quiet[n] = p.low
     return quiet
 
