@@ -18,6 +18,7 @@ from rov_fmu.identify.result import (
     DISAGREEMENT,
     LEAST_TESTED,
     MOST_UNKNOWN,
+    USUAL,
     Answer,
     AxisResult,
     Coefficient,
@@ -101,6 +102,10 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
+        "unlogged motion": (
+            "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
+            "moment), and is the likely cause. Turn on the spot in a log of its own, or log the velocity"
+        ),
         "nearest": (
             "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It "
             "does not explain the errors, and the model is without it"
@@ -231,6 +236,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             findings.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
             findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
+        if result.structure > USUAL and _turns_unseen(identification, result):
+            findings.append(Finding("unlogged motion", result.axis.name))
         if may_rock(identification.folder, result.axis):
             findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -541,6 +548,13 @@ def may_rock(folder: Folder, axis: Axis) -> bool:
     logs = [log for log in folder.logs if log.axis in (None, axis)]
     are_level = (log.axis or (log.used("roll angle") and log.used("pitch angle")) for log in logs)
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
+
+
+def _turns_unseen(identification: Identification, result: AxisResult) -> bool:
+    """Return True if yaw is tested in dives, and none of them shows a motion ahead or sideways."""
+    dives = [log for log in identification.folder.logs if log.axis is None]
+    shown = {channel.quantity.axis for log in dives for channel in log.channels if not channel.unused}
+    return result.axis is YAW and bool(dives) and not {SURGE, SWAY} & shown
 
 
 def assumed_scale(identification: Identification, unit: str = "N") -> str:

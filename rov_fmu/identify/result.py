@@ -39,9 +39,9 @@ _ABOUT = 1.05
 """Commands that differ by less than this factor are not told apart."""
 LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
-USUAL, ALARM = 1.5, 3.0
-"""The largest error of predictions over 10 s that a right structure usually has, relative to the noise, and that from
-which the structure is clearly wrong."""
+USUAL, ALARM, WRONG = 1.5, 3.0, 5.0
+"""The largest error of predictions over 10 s that a right structure usually has, relative to the noise, that from which
+the structure is clearly wrong, and that from which no answer is worth much."""
 DISAGREEMENT = 40.0
 """The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
 
