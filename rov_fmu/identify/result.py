@@ -359,6 +359,11 @@ def is_extrapolated(command: float, tested: Tested) -> bool:
     return abs(command) > _ABOUT * strongest or strongest < LEAST_TESTED
 
 
+def is_whole(tested: Tested) -> bool:
+    """Return True if full command was tested in both directions."""
+    return not any(is_extrapolated(command, tested) for command in (-1.0, 1.0))
+
+
 def are_alike(one: float, other: float) -> bool:
     """Return True if two commands are about the same."""
     return one * other > 0.0 and max(one / other, other / one) <= _ABOUT

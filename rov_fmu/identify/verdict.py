@@ -18,6 +18,7 @@ from rov_fmu.identify.result import (
     coverage_of,
     is_extrapolated,
     is_known,
+    is_whole,
     relative_error,
     score_of,
 )
@@ -90,16 +91,16 @@ def _error_of_tables(e: AxisResult) -> float:
 def _widest(e: AxisResult, *of: str) -> tuple[float, Answer | None]:
     """Return the largest half-width of some answers within the tests, and the answer; NaN without any.
 
-    It is relative to the largest of these answers: a few millimetres per second of a speed that is next to nothing do
-    not matter.
+    That of a time is relative to it, and that of a speed or a distance to the largest one of these answers: a few
+    millimetres per second of a speed that is next to nothing do not matter.
     """
     within = [a for a in e.answers if not is_extrapolated(a.command, e.tested)] or e.answers
     widths = list[tuple[float, Answer]]()
     for key in of:
-        largest = max((abs(getattr(a, key)[0]) for a in within), default=nan)
+        largest = 0.0 if key == "rise" else max((abs(getattr(a, key)[0]) for a in within), default=nan)
         for a in within:
             value, ends = getattr(a, key)
-            widths.append((max(abs(end - value) for end in ends) / largest, a))
+            widths.append((max(abs(end - value) for end in ends) / max(largest, abs(value)), a))
     return max(widths, key=lambda pair: pair[0], default=(nan, None))
 
 
@@ -112,14 +113,14 @@ def _known(e: AxisResult, *of: str) -> dict[str, str]:
     width, answer = _widest(e, *of)
     if answer is None:
         return {}
-    known = f"known to no better than {percent(width)}" if is_known(width) else "not known"
-    return {"command": f"{answer.command:.0%}", "known": f"{known} of the largest tested one"}
+    known = f"known to no better than {percent(width)} of the largest tested one" if is_known(width) else "not known"
+    return {"command": f"{answer.command:.0%}", "known": known}
 
 
 def _reach_of_tests(e: AxisResult) -> dict[str, str]:
     """Return the commands between which the answers are tested."""
     astern, ahead = e.tested
-    return {"low": f"{-astern:.0%}", "high": f"{ahead:.0%}"}
+    return {"low": f"{0.0 - astern:.0%}", "high": f"{ahead:.0%}"}
 
 
 RULES = (
@@ -208,7 +209,7 @@ RULES = (
     ),
     Rule(
         "the strongest tested command in the direction that is tested less",
-        lambda e: min(e.tested) if e.answers else nan,
+        lambda e: min(e.tested) if e.answers and not is_whole(e.tested) else nan,
         None,
         None,
         "It holds for commands from {low} to {high}.",

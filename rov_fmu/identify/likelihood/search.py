@@ -149,8 +149,9 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
 def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
     """Return the covariance of the parameters by errors that do not become smaller with the number of samples.
 
-    What the structure of an axis lacks acts on its speed V_ss as a scale s, with which the drag is a/s² and b/s, and on
-    its times as a scale of its inertia. It also acts on unseen data, so it has the size of the errors over 10 s.
+    What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
+    and the inertia m/s. It acts on times as a scale of the inertia alone. It is as large in unseen data, so it has the
+    size of the errors over 10 s.
 
     Where commands change between the rows of a log, they act a small part of their window earlier or later along each
     axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
@@ -164,9 +165,8 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     vehicle, shapes = objective.table.model(z)
     for axis, misfit in misfits.items():
         lack = hypot(LEAST_LACK, min(_LACKS * misfit.lack, 1.0))
-        is_drag = np.array([p.of == axis.name and p.kind != INERTIA for p in parameters])
+        scale = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
         is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
-        scale = is_drag * objective.table.each("of_kind.speed_power")
         found += lack**2 * (np.outer(scale, scale) + np.diag(is_inertia))
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
         if widths and 0.0 < time < inf:

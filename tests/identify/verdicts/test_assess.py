@@ -15,6 +15,9 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
 from tests.vehicles import VIDEORAY, extended
 
+FULL = (1.0, 1.0)
+"""Tests of all commands."""
+
 
 def of_drag(deviation: float) -> Posterior:
     """Return the posterior of the drag in surge."""
@@ -33,7 +36,7 @@ def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
         return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_distance(abs(V), 0.1)])
 
     more, less = (VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(s)) for s in (0.01, -0.01))
-    found = answers([uncertain], SURGE, file)
+    found = answers([uncertain], SURGE, file, FULL)
     assert axis
     assert [one.command for one in found] == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0]
     for one in found:
@@ -47,7 +50,7 @@ def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
             assert low < value < high
             ends = np.minimum(fitted * np.exp(-width), number * 0.99), np.maximum(fitted * np.exp(width), number * 1.01)
             assert sorted(map(abs, (low, high))) == pytest.approx(ends, rel=1e-3)
-    for one in answers([of_drag(0.0)], SURGE, VIDEORAY):
+    for one in answers([of_drag(0.0)], SURGE, VIDEORAY, FULL):
         for value, (low, high) in (one.steady, one.rise):
             assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
 
@@ -60,7 +63,7 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     z = np.array([0.2, np.log(rov.effective_inertia(rov.layout.by_name["surge"]))])
 
     def half(posterior: Posterior) -> float:
-        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov) if one.command == 0.5)
+        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov, FULL) if one.command == 0.5)
         assert lagged
         assert lagged[1][0] < lagged[0] < lagged[1][1]
         return half_width(lagged)
@@ -71,14 +74,14 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     )
     assert opposed < alone < equal
     assert alone**2 == pytest.approx(0.5 * (opposed**2 + equal**2), rel=0.05), "as variances add"
-    assert not any(one.lagged for one in answers([of_drag(0.04)], SURGE, VIDEORAY)), "it has no lag"
+    assert not any(one.lagged for one in answers([of_drag(0.04)], SURGE, VIDEORAY, FULL)), "it has no lag"
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:
     losing, exact = extended(VIDEORAY, d_rear=3.0), of_drag(0.0)
     table = replace(exact.table, layout=losing.layout, base=losing.coefficients)
     half, full = (
-        next(a for a in answers([replace(exact, table=table)], SURGE, losing, strongest=0.5) if a.command == command)
+        next(a for a in answers([replace(exact, table=table)], SURGE, losing, (0.5, 0.5)) if a.command == command)
         for command in (0.5, 1.0)
     )
     V, _ = losing.response(SURGE, 0.5)
@@ -97,7 +100,7 @@ def test_intervals_contain_what_a_part_of_the_data_says_where_it_differs_by_more
     part, difference = of_drag(0.05), share * t.ppf(0.975, 10) * 0.04
     other = replace(part, z=part.z + difference)
     V, Tau = VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(difference)).response(SURGE, 0.5)
-    alone, both = (answers([of_drag(0.03)], SURGE, VIDEORAY, fits=fits)[2] for fits in ((), [other]))
+    alone, both = (answers([of_drag(0.03)], SURGE, VIDEORAY, FULL, fits=fits)[2] for fits in ((), [other]))
     if share < 1.0:
         assert (both.steady, both.rise, both.stop) == (alone.steady, alone.rise, alone.stop)
     else:
