@@ -25,7 +25,7 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
-from rov_fmu.identify.result import ALARM, least_error
+from rov_fmu.identify.result import ALARM, USUAL, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
@@ -462,9 +462,11 @@ class StructureSearch:
         on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
         others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
         worst_of = max(on, key=lambda axis: before[axis].ratio, default=None)
-        if worst_of is None:
+        if worst_of is None:  # nothing tells these errors
             return others
-        left = (after[worst_of].ratio ** 2 - 1.0) / max(before[worst_of].ratio ** 2 - 1.0, 1e-9)
+        if before[worst_of].ratio <= min(USUAL, HYPOTHESES[variant.kind].alarm):
+            return False
+        left = (after[worst_of].ratio ** 2 - 1.0) / (before[worst_of].ratio ** 2 - 1.0)
         return others and left <= _LEFT and all(after[axis].ratio <= ALARM for axis in on)
 
     def _gain(self, other: Trial) -> float:

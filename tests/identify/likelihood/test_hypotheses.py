@@ -18,7 +18,16 @@ from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.fit import _search, start_of
-from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order, probability, twins
+from rov_fmu.identify.likelihood.hypotheses import (
+    CONTRAST,
+    HYPOTHESES,
+    Model,
+    Variant,
+    contrasts,
+    in_order,
+    probability,
+    twins,
+)
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
@@ -537,6 +546,50 @@ def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> 
     }
     assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
     assert values["health", ("r",)] < at.value({})
+
+
+def test_the_data_tell_the_health_of_a_thruster_that_turns_the_vehicle_and_not_of_one_that_is_alone(
+    model: Model,
+) -> None:
+    """Of the vertical one, less drag, inertia and load explain the motion as well."""
+    told = contrasts(model, {})
+    assert max(told["l"], told["r"]) < 0.1 * CONTRAST
+    assert told["t"] > 2.0 * CONTRAST
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "names"),
+    [
+        ({SURGE: 9.0, YAW: 9.0, HEAVE: 1.0}, {SURGE: 1.2, YAW: 1.5, HEAVE: 1.0}, [DEAD]),
+        ({SURGE: 9.0, YAW: 9.0, HEAVE: 1.0}, {SURGE: 1.2, YAW: 1.5, HEAVE: 4.0}, []),
+        ({SURGE: 9.0, YAW: 9.0, HEAVE: 1.0}, {SURGE: 1.2, YAW: 6.0, HEAVE: 1.0}, []),
+        ({SURGE: 3.2, YAW: 1.0, HEAVE: 1.0}, {SURGE: 2.4, YAW: 1.0, HEAVE: 1.0}, []),
+        ({SURGE: 1.0, YAW: 1.0, HEAVE: 6.0}, {SURGE: 1.0, YAW: 1.0, HEAVE: 6.0}, []),
+    ],
+)
+def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_others(
+    before: dict[Axis, float],
+    after: dict[Axis, float],
+    names: list[Variant],
+    reversed_model: Model,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The other one comes nearest, and the model that is told is without it."""
+
+    def trial(starts: Starts, score: float, errors: dict[Axis, float]) -> Trial:
+        return Trial(starts, reversed_model, cast("Objective", errors), cast("Minimum", None), score, score)
+
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.structure",
+        lambda errors, *_, **__: {axis: Misfit(error) for axis, error in errors.items()},
+    )
+    plain, dead = trial({}, 0.0, before), trial({DEAD: 0.0}, 100.0, after)
+    search = StructureSearch(plain, _search)
+    search.variants, search.now, search.tried[frozenset({DEAD})] = [], dead, dead
+    found = search.explained()
+    assert [one.variant for one in found.adopted] == names
+    assert found.nearest == ({} if names else {DEAD: 0.0})
+    assert found.trial is (dead if names else plain)
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])

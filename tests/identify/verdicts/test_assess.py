@@ -1,18 +1,28 @@
 """How fast, how soon and how far: the uncertainty of the answers."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE
-from rov_fmu.identify.assess import answers, answers_of_file
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify.assess import answers, answers_of_file, commands_of_answers
+from rov_fmu.identify.assess import tested_commands as of_tests
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.hypotheses import Model
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.result import half_width
+from rov_fmu.identify.result import Tested, half_width
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
+from tests.folders import HEAD, MASS, TURNS, folder_of, responses
+from tests.identify.conftest import FORCES
 from tests.vehicles import VIDEORAY, extended
 
 FULL = (1.0, 1.0)
@@ -121,3 +131,42 @@ def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
             assert value == pytest.approx(own)
             assert interval == pytest.approx(np.quantile(some, (0.025, 0.975)), abs=0.3 * np.std(some))
         assert exact.steady == (exact.steady[0], (exact.steady[0], exact.steady[0]))
+
+
+def test_a_command_is_tested_by_the_motion_along_its_axis_that_it_holds(fit: Fit) -> None:
+    """Logs of heave and yaw held 30 % ahead for 8 s and 20 % astern for 6 s; the thrust tables went to 80 %."""
+    found, z = of_tests(fit.objective, fit.best.z), fit.best.z
+    assert {*found} == {*fit.known.layout.bare_axes}
+    for axis in (HEAVE, YAW):
+        astern, ahead = found[axis]
+        assert 0.18 < astern <= 0.2
+        assert 0.28 < ahead <= 0.3
+
+    def commanded(change: Callable[[Array], Array]) -> dict[Axis, Tested]:
+        logs = [one.with_inputs(change(one.record.inputs.copy())) for one in fit.objective.logs]
+        return of_tests(Objective(fit.objective.table, logs, fit.objective.rows), z)
+
+    def with_a_peak(inputs: Array) -> Array:
+        inputs[5] = 1.0
+        return inputs
+
+    peaked, weaker = commanded(with_a_peak), commanded(lambda inputs: 0.5 * inputs)
+    for axis in (HEAVE, YAW):
+        assert peaked[axis][1] == pytest.approx(found[axis][1], abs=0.03), "the vehicle hardly moved in 0.1 s"
+        assert weaker[axis] == pytest.approx((0.1, 0.15)), "of what moved the vehicle faster, no command tells"
+
+
+def test_a_steady_table_tests_its_commands_and_thrust_tables_test_none(tmp_path: Path) -> None:
+    tables = responses(VIDEORAY, HEAVE)
+    tests = load_tests(folder_of(tmp_path, f"{HEAD}[known]\n{MASS}{TURNS}", {**FORCES, **tables}))
+    known, logs, rows = begin(tests)
+    objective = Model(known, logs, rows).objective()
+    assert of_tests(objective, objective.mean)[HEAVE] == (0.7, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("tested", "more"),
+    [((0.7, 0.57), [-0.7, 0.57]), ((0.0, 0.5), []), ((0.31, 0.97), []), ((0.04, 0.6), [0.6])],
+)
+def test_the_strongest_tested_commands_are_answered_unless_they_are_usual(tested: Tested, more: list[float]) -> None:
+    assert commands_of_answers(tested) == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0, *more]
