@@ -117,12 +117,6 @@ def _known(e: AxisResult, *of: str) -> dict[str, str]:
     return {"command": f"{answer.command:.0%}", "known": known}
 
 
-def _reach_of_tests(e: AxisResult) -> dict[str, str]:
-    """Return the commands between which the answers are tested."""
-    astern, ahead = e.tested
-    return {"low": f"{0.0 - astern:.0%}", "high": f"{ahead:.0%}"}
-
-
 RULES = (
     Rule(
         "logs with other motors",
@@ -208,16 +202,6 @@ RULES = (
         lambda e: _known(e, "rise", "stop"),
     ),
     Rule(
-        "the strongest tested command in the direction that is tested less",
-        lambda e: min(e.tested) if e.answers and not is_whole(e.tested) else nan,
-        None,
-        None,
-        "It holds for commands from {low} to {high}.",
-        _reach_of_tests,
-        is_least=True,
-        is_told=True,
-    ),
-    Rule(
         "held-out V_ss of tables, error (RMS)",
         _error_of_tables,
         0.2,
@@ -273,14 +257,18 @@ RULES = (
 
 
 def verdict(e: AxisResult) -> Verdict:
-    """Return the worst word of all rules, with a reason for each doubt."""
+    """Return the worst word of all rules, with a reason for each doubt, and for which commands it holds."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
         rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]
-    return Verdict(max((rule.word(value) for rule, value in values), key=WORDS.index), tuple(reasons))
+    word = max((rule.word(value) for rule, value in values), key=WORDS.index)
+    if word != WORDS[-1] and not is_whole(e.tested):
+        astern, ahead = e.tested
+        reasons.append(f"It holds for commands from {0.0 - astern:.0%} to {ahead:.0%}.")
+    return Verdict(word, tuple(reasons))
 
 
 def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> float:

@@ -120,7 +120,6 @@ MADE: dict[str, Any] = {
             for a, b in zip(results.answers(1.0, x), results.answers(1.0, 0.02), strict=True)
         ]
     },
-    "the strongest tested": lambda _: {},
     "held-out V_ss": lambda x: {"points": [point(x)]},
     "upper end": lambda x: {"inertia": x},
     "effects of unusual": lambda x: {"effects": [SLOW] * round(x)},
