@@ -55,7 +55,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
             "command_min": low,
             "command_max": high,
             "limits": vehicle.limits,
-            "tested": vehicle.tested,
+            "tested": vehicle.tested or None,
             "identified": _ranges(layout),
         },
         "body": {"coupling": True} if layout.coupled else {},
