@@ -21,7 +21,7 @@ from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
-from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, servos_of
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, chosen_frame, config_of, servos_of
 
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
@@ -50,7 +50,7 @@ def serve(path: Path, options: Options) -> None:
 
     Raises FileError, InputError about an option, WriteError about the log, and BuildError.
     """
-    setup = _setup(path, options)
+    setup, frame = _setup(path, options)
     with socket(AF_INET, SOCK_DGRAM) as server:
         try:
             server.bind((options.host, options.port))
@@ -62,6 +62,8 @@ def serve(path: Path, options: Options) -> None:
         address, port = server.getsockname()
         for line in _listed(setup.servos, setup.vehicle.layout):
             paragraph(console(), line)
+        if frame:
+            paragraph(console(), f"ArduSub must have {config_of(frame)}")
         if _rolls_alone(setup):
             print_message(f"rov-fmu: {_NO_ROLL}")
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
@@ -79,8 +81,8 @@ def serve(path: Path, options: Options) -> None:
             connection.serve(server, options.duration or inf)
 
 
-def _setup(path: Path, options: Options) -> Setup:
-    """Return the setup of a flight. Raises FileError, InputError, WriteError."""
+def _setup(path: Path, options: Options) -> tuple[Setup, str]:
+    """Return the setup of a flight, and the frame of its servos, if any. Raises FileError, InputError, WriteError."""
     if options.log and options.log.suffix.lower() not in (".csv", ".mcap"):
         raise InputError(f"--log {options.log}: the name must end with .csv or .mcap")
     if options.frame is not None and options.frame not in FRAMES:
@@ -98,12 +100,14 @@ def _setup(path: Path, options: Options) -> Setup:
     inputs = with_axes(vehicle.layout, {name: np.array(value) for name, value in given.inputs.items()})
     checked_values("inputs", inputs, vehicle.layout.inputs, many=False)
     checked_start(given.start, vehicle.layout, many=False)
-    servos = servos_of(vehicle.layout, options.frame, _table(options.servos, vehicle.layout))
+    chosen = vehicle.layout, options.frame, _table(options.servos, vehicle.layout)
+    servos = servos_of(*chosen)
     for name in inputs:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
-    return Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
+    setup = Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
+    return setup, chosen_frame(*chosen)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
@@ -136,7 +140,7 @@ def _rolls_alone(setup: Setup) -> bool:
 
 _NO_ROLL = (
     "this vehicle has no roll, so ArduSub's roll integrator winds up: its vertical thrusters push against each other "
-    "with up to 18 %. ATC_RAT_RLL_I 0 should prevent it, which has not been tried"
+    "with up to 18 %. ATC_RAT_RLL_I 0 prevents it"
 )
 
 
