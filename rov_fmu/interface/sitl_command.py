@@ -10,6 +10,7 @@ from socket import AF_INET, SOCK_DGRAM, socket
 import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
+from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import FAINT
@@ -23,6 +24,10 @@ from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, chosen_frame, config_of, servos_of
 
+_WITHOUT_POSITION = 45.0
+"""The time after which ArduSub knows its position, s."""
+_FAR = 0.1
+"""A rise that matters, m."""
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
 
@@ -66,6 +71,8 @@ def serve(path: Path, options: Options) -> None:
             paragraph(console(), f"ArduSub must have {config_of(frame)}")
         if _rolls_alone(setup):
             print_message(f"rov-fmu: {_NO_ROLL}")
+        if floats := _floats(setup):
+            print_message(f"rov-fmu: {floats}")
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
         def end() -> None:
@@ -142,6 +149,23 @@ _NO_ROLL = (
     "this vehicle has no roll, so ArduSub's roll integrator winds up: its vertical thrusters push against each other "
     "with up to 18 %. ATC_RAT_RLL_I 0 prevents it"
 )
+
+
+def _floats(setup: Setup) -> str:
+    """Return a sentence about a vehicle that rises without commands; an empty text if it does not."""
+    vehicle, layout = setup.vehicle, setup.vehicle.layout
+    if not layout.has(HEAVE):
+        return ""
+    stepper = Stepper(vehicle, setup.start, ["z"])
+    (start,), (end,) = stepper.recorded(), stepper.step([], _WITHOUT_POSITION)
+    weight = vehicle.alone(HEAVE, {**layout.usual_inputs, **setup.start}).C
+    weight *= vehicle.effective_inertia(layout.by_name[HEAVE.name])
+    if weight >= 0.0 or start - end < _FAR:
+        return ""
+    return (
+        f"this vehicle rises with {-weight:.2g} N: {start - end:.2g} m in the {_WITHOUT_POSITION:g} s before ArduSub "
+        "knows its position. Start deeper (--set z), or arm at once"
+    )
 
 
 def _summary(connection: Connection) -> str:

@@ -18,6 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rov_fmu
@@ -353,6 +354,27 @@ def test_the_frame_of_another_vehicle_is_noticed_in_flight() -> None:
         autopilot.fly(0.2)
         autopilot.close()
     assert hints == [NO_PULSES]
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "newtons"),
+    [("bluerov2", 0.0, 2.0), ("bluerov2", -5.5, 7.5), ("bluerov2", 5.0, 0.0), ("bluerov2_heavy", -4.0, 3.0)],
+)
+def test_how_far_a_vehicle_rises_before_ardusub_knows_its_position(
+    name: str, setting: float, newtons: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By SciPy: (m + m_a) w' = F - b_d w - a_d |w| w, with the numbers of the vehicle file."""
+    rov = load_vehicle(SHIPPED[name])
+    mass, linear, quadratic = rov["m_rov"] + rov["m_a_w"], rov["b_d_w"], rov["a_d_w"]
+    loads = {"F_0_w": 1.0, "W": 1.0, "B": -1.0}
+    force = setting + sum(sign * rov.coefficients.get(load, 0.0) for load, sign in loads.items())
+    fall = solve_ivp(
+        lambda _, y: (y[1], (force - linear * y[1] - quadratic * abs(y[1]) * y[1]) / mass), (0.0, 45.0), (0.0, 0.0)
+    )
+    assert main(["sitl", name, "--set", f"Z_ext={setting}", "--duration", "0.01", "--port", "0"]) == 0
+    said = re.findall(r"rises with (.*) N: (.*) m in the 45 s before", capsys.readouterr().err)
+    expected = [newtons, pytest.approx(-fall.y[0, -1], rel=0.05)]
+    assert [[*map(float, found)] for found in said] == ([expected] if newtons else [])
 
 
 def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: pytest.CaptureFixture[str]) -> None:
