@@ -330,7 +330,7 @@ HYPOTHESES = {
         _momentary,
         sentence=(
             "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
-            "({rate} per second). Fly in MANUAL, or log at 50 Hz"
+            "({rate} per second). Fly in MANUAL, or log at 50 Hz, which ArduSub's own log cannot"
         ),
         in_words=_of_lost,
         changes_thrust=False,
