@@ -273,7 +273,7 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
         file.truncate(LARGEST + 1_000_000)  # a sparse file, which takes no space on the disk
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"length": LENGTH})
-    assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"
+    assert str(error.value) == f"{path}: has 501,000,000 bytes; at most 500,000,000 are read"
 
 
 def test_a_line_of_numbers_before_the_header_is_refused_in_one_line(tmp_path: Path) -> None:

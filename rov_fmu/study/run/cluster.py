@@ -19,7 +19,7 @@ from distributed.comm.core import CommClosedError
 from distributed.utils import silence_logging_cmgr
 
 from rov_fmu.io.interrupts import ctrl_c_withheld, temporary_folder
-from rov_fmu.io.messages import FileError, StudyError, brief
+from rov_fmu.io.messages import FileError, StudyError, brief, reason_of
 from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.results.store import Store
@@ -84,7 +84,7 @@ def execute(
             client.register_plugin(Delivery(job, own_cluster=scheduler is None))
         except Exception as error:  # whatever a worker may raise
             needs = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
-            raise StudyError(f"{needs}: {brief(str(error))}") from error
+            raise StudyError(f"{needs}: {brief(reason_of(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
         try:
@@ -161,7 +161,7 @@ class _Runs:
         except _GONE:
             raise
         except Exception as error:  # the cluster raises various exceptions
-            raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
+            raise StudyError(f"the workers are lost: {brief(reason_of(error))}") from error
         self.store.write(first, end, part.runs, part.trajectories)
         self.spent.runs += end - first
         self.spent.failed += part.failed

@@ -17,6 +17,7 @@ from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrust
 from rov_fmu.tank.inspection.inspection import Inspection
 from rov_fmu.tank.readers.ardusub_frames import config_of, fitting_frames
 from rov_fmu.tank.readers.parsers import format_of
+from rov_fmu.vehicle.description import why_no_identifier
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -74,7 +75,7 @@ def draft(
         shipped=SHIPPED,
         base=likely.base,
         name=name,
-        identifier=word if word[:1].isalpha() else f"rov_{word}".rstrip("_"),
+        identifier=f"rov_{word}".rstrip("_") if why_no_identifier(word) else word,
         curves=tables.curves or ["all"],
         axes=AXES.values(),
         signals={row.name for one in inspections for row in one.channels},

@@ -24,7 +24,7 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text, read_header
-from rov_fmu.io.messages import FileError, brief, listed
+from rov_fmu.io.messages import FileError, brief, listed, reason_of
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import ZSTD, read_bag, read_mcap, unpack
@@ -212,8 +212,8 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
     except FileError:
         raise
     except Exception as error:
-        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, str(error))  # where it was unpacked
-        kind, reason = format_of(path), brief(told) or type(error).__name__
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, reason_of(error))  # where it was unpacked
+        kind, reason = format_of(path), brief(told)
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
