@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from math import nan
 from pathlib import Path
@@ -19,7 +20,7 @@ from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_l
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import kind_of_table
-from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
+from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table, one_of_several
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
@@ -103,14 +104,18 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         guess, columns = guessed([*own], own, axis, [described] if described else layouts)
         layout = described or guess
         known = columns_of_log(layout, axis)
-        is_known = KnownColumns(known_columns(known)).has
-        told = {*map(_quantity, renamed.values())}
-        guesses = {title: meant for title, meant in columns.items() if title in numbers and is_known(meant)}
-        columns = {title: meant for title, meant in guesses.items() if _quantity(meant) not in told} | renamed
+        name_of = partial(_known_name, KnownColumns(known_columns(known)))
+        told = {*map(name_of, own), ""}
+        columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
+        columns |= renamed
         names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
         is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
-        unread = {title: ranges[title] for title in titles if not (is_column(meant[title]) or title in flags)}
+        unread = {
+            title: ", ".join(filter(None, (ranges[title], one_of_several(title, numbers[title]))))
+            for title in titles
+            if not (is_column(meant[title]) or title in flags)
+        }
         count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
         if not has_time and (table := _of_unnamed_table(path, renamed, ranges)):
@@ -124,9 +129,11 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     return [_of_log(path, log, unread, columns) for log in logs]
 
 
-def _quantity(meant: str) -> str:
-    """Return what a header stands for, without its sign and its unit."""
-    return meant.removeprefix("-").partition(" [")[0]
+def _known_name(known: KnownColumns, header: str) -> str:
+    """Return the name of the column that has a header; empty without one."""
+    with suppress(ValueError):
+        return found.name if (found := known.find(header, others=True)) else ""
+    return ""
 
 
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
