@@ -32,9 +32,10 @@ function readRecording(text, name, vehicle) {
   if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
   if (headers.length < 2) throw new Unreadable("its first line is no header of columns");
   const pattern = new RegExp(`^(?:${rules.number})$`);
+  const hasCommas = separator !== "," || lines.some((line) => hasDecimalComma(line, rules));
   /** @param {string} cell */
   const number = (cell) => {
-    const plain = pointed(cell, separator);
+    const plain = hasCommas ? pointed(cell) : cell;
     return pattern.test(plain) ? Number(plain) : Number.NaN;
   };
   const columns = headers.map((header) => columnOf(header, name, vehicle));
@@ -263,14 +264,20 @@ function isRow(cells, value) {
 
 /** Returns the cells of a line, without empty ones at its end. @param {string} line @param {string} separator */
 function filledCells(line, separator) {
-  const cells = cellsOf(line, separator).map((cell) => pointed(cell, separator));
+  const cells = cellsOf(line, separator).map(pointed);
   while (cells[cells.length - 1] === "") cells.pop();
   return cells;
 }
 
-/** Returns a number with a decimal point, unless commas separate the cells. @param {string} cell @param {string} separator */
-function pointed(cell, separator) {
-  return separator === "," || !/^[-+.,\deE]+$/.test(cell) ? cell : cell.replace(",", ".");
+/** Returns a number with a decimal point. @param {string} cell */
+function pointed(cell) {
+  return /^[-+.,\deE]+$/.test(cell) ? cell.replace(",", ".") : cell;
+}
+
+/** Returns whether a line has a number in quotes whose comma separates no thousands. @param {string} line @param {Rules} rules */
+function hasDecimalComma(line, { quoted, thousands }) {
+  const numbers = [...line.matchAll(new RegExp(quoted, "g"))].map((match) => match[1]);
+  return numbers.some((number) => !new RegExp(`^(?:${thousands})$`).test(number));
 }
 
 /** @param {string} text @param {string} mark */

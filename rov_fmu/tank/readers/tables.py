@@ -26,7 +26,9 @@ from rov_fmu.io.csv_table import (
     NO_OUTPUT,
     NUMBER,
     PULSES,
+    QUOTED_NUMBER,
     SPAN,
+    THOUSANDS,
     VALUE,
     Columns,
     DataFileError,
@@ -78,6 +80,8 @@ def rules_of_page() -> dict[str, Any]:
     return {
         "number": NUMBER.pattern,
         "value": VALUE.pattern,
+        "quoted": QUOTED_NUMBER.pattern,
+        "thousands": THOUSANDS.pattern,
         "mostBefore": MOST_BEFORE,
         "times": TIMES,
         "fractions": FRACTION.units,
