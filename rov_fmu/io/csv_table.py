@@ -28,7 +28,7 @@ from rov_fmu.io.reading import read_bytes
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
-VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{4}}-[0-9]{{2}}-[0-9]{{2}}.*|[0-9]+:[0-9]{{2}}.*")
+VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{1,4}}([-/.])[0-9]{{1,2}}\\3[0-9]{{2,4}}.*|[0-9]+:[0-9]{{2}}.*")
 """A cell of a row: a number, a date or a time of day."""
 QUOTED_NUMBER = re.compile(r'" *([+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?) *"')
 """A number with a comma in quotes."""
@@ -80,7 +80,8 @@ class Column:
     """A column that a file may have, and the numbers that it may contain."""
 
     units: Mapping[str, float]
-    """The units that the file may use, and how many of each make one of the first unit."""
+    """The units that the file may use, and how many of each make one of the first unit. The empty unit
+    is that of a header without one."""
     optional: bool = False
     """True if a file may be without this column."""
     blanks: bool = False
@@ -251,7 +252,12 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
 
 def read_header(path: Path, open_stream: OpenStream | None = None) -> list[str]:
     """Return the cells of the header. Raises DataFileError."""
-    return next(iter(_CsvFile(path, open_stream)))[1]
+    return read_start(path, open_stream, 1)[0]
+
+
+def read_start(path: Path, open_stream: OpenStream | None, count: int) -> list[list[str]]:
+    """Return the cells of the header and of the first rows, at most `count` of all. Raises DataFileError."""
+    return [cells for _, cells in islice(_CsvFile(path, open_stream), count)]
 
 
 class Series(dict[str, "array[float]"]):
@@ -782,12 +788,13 @@ class KnownColumns:
         keys = self.keys.get(name, {})
         for key in keys:
             column = self._columns[key]
-            if unit := next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None):
+            unit = next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None)
+            if unit is not None:
                 convert, factor = _conversion(unit, numbers, column)
                 if title.startswith("-"):
                     convert, factor = partial(_opposite, convert), -factor
                 return FileColumn(key, column, unit, convert, factor, tuple(numbers))
-        if key := next((key for key in keys if _folded(key) == name), ""):
+        if key := next((key for key in keys if _folded(key) == name and "" not in self._columns[key].units), ""):
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(self._columns[key]))}")
         if others:
             return None
@@ -848,7 +855,7 @@ def _units(column: Column) -> list[str]:
 
 def _title(name: str, column: Column) -> str:
     """Return the header of a column in its first unit."""
-    return f"{name} [{next(iter(column.units))}]"
+    return f"{name} [{next(iter(column.units))}]".removesuffix(" []")
 
 
 FORCE_UNITS = {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}

@@ -370,6 +370,11 @@ def meanings(words: Iterable[str]) -> list[str]:
     return [_SAME.get(word) or next((_SAME[end] for end in _ENDS if word.endswith(end)), word) for word in words]
 
 
+def words_for(word: str) -> list[str]:
+    """Return the other words for a word of HEADERS."""
+    return _OTHER_WORDS[word].split()
+
+
 _SECONDS = ("s", "sec", "secs", "second", "seconds")
 _OTHER_UNITS = {
     "m": ("meter", "meters", "metre", "metres"),

@@ -307,7 +307,7 @@ def _velocity_by_unit(title: str) -> str:
 def one_of_several(title: str, numbers: Array) -> str:
     """Return words about a header that is not read, because others tell the same; empty for any other header."""
     name = _meant(title, numbers, ())
-    return f"another {name} [{_unit(title, name, numbers)}]" if name else ""
+    return f"another {name} [{_unit(title, name, numbers)}]" if name and len(numbers) else ""
 
 
 def may_be_velocity(title: str, *, is_rotation: bool) -> bool:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_header
+from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_start
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
@@ -27,6 +27,7 @@ from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
+from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, time_columns
 
 PARTS = 32
 """The number of parts of the time for which the course of a signal is told."""
@@ -91,7 +92,8 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
-        titles = read_header(path, open_stream)
+        start = read_start(path, open_stream, FIRST_ROWS)
+        titles = start[0]
         numbers, ranges = _numbers(path, titles, open_stream)
         if not any(map(len, numbers.values())):
             raise DataFileError(
@@ -100,6 +102,7 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
+        renamed = time_columns(start, renamed) | renamed
         own = {renamed.get(title, title): numbers[title] for title in titles}
         guess, columns = guessed([*own], own, axis, [described] if described else layouts)
         layout = described or guess
