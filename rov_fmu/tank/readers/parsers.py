@@ -213,10 +213,10 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
         raise
     except Exception as error:
         told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, str(error))  # where it was unpacked
-        kind, reason = format_of(path), brief(told) or type(error).__name__
+        kind, reason = format_of(path), f": {brief(told)}" if told else ""
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(
-            f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
+            f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read{reason}{hint}"
         ) from error
     finally:
         os.chdir(home)  # Windows does not remove a folder in which a process works

@@ -151,12 +151,15 @@ def _since(days: Array | None, clock: Array, period: float) -> Array:
     is_apart = ((later == 0.0) & (on < -0.5 * _DAY)) | ((later != 0.0) & (on >= 0.0) & (on < _MINUTE))
     if period == _DAY and not is_apart.any():
         return _DAY * days + clock
-    return _DAY * days[0] + _going_on(clock, period)
+    start: float = _DAY * days[0]
+    return start + _going_on(clock, period)
 
 
 def _going_on(clock: Array, period: float) -> Array:
     """Return the times of a clock that begins again after a period: each is the nearest to the one before it."""
-    goes_on: Array = clock if period == inf else np.unwrap(clock % period, period=period)
+    if period == inf:
+        return clock
+    goes_on: Array = np.unwrap(clock % period, period=period)
     return goes_on
 
 
