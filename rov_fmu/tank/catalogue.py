@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from math import nan, pi
 from typing import Any
+from unicodedata import combining, normalize
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.io.csv_table import Column
@@ -291,6 +292,8 @@ FLAGS = (
 THRUSTER = r"\b(thr|thrusters?|motors?|propellers?|pwm|esc)\b"
 COMMANDS = rf"{THRUSTER}|\b(servo|cmd|command|out|outputs?|u) \d+\b|^u \w+$"
 """A regular expression that occurs among the words of an unknown header of a CSV file that is a command."""
+_LINEAR, _ANGULAR = "(linear|velocity|vel|twist|dvl|speed)( .*)?", "(angular|gyro|rates?|rotation|omega)( .*)?"
+_ATTITUDE = "(orientation|orient|euler|rpy|attitude)( .*)?"
 HEADERS = (
     ("time", "time|t|timestamp"),
     ("command", "commands?|cmd|throttle|pwm|duty|setpoint|input|output"),
@@ -299,19 +302,110 @@ HEADERS = (
     ("time constant", "tau|constant|time"),
     ("", "|".join(sorted(NOT_MEASURED))),
     ("", "acceleration|accel|acc|covariance|valid|validity|invalid"),
-    ("roll velocity", "roll|gyrox|(angular|gyro|rates)( .*)? x"),
-    ("pitch velocity", "pitch|gyroy|(angular|gyro|rates)( .*)? y"),
-    ("yaw velocity", "yaw|turn|heading|gyroz|(angular|gyro|rates)( .*)? z"),
-    ("surge velocity", "surge|forward|ahead|v ?x|(linear|velocity|vel|twist|dvl)( .*)? x"),
-    ("sway velocity", "sway|side|sideways|lateral|v ?y|(linear|velocity|vel|twist|dvl)( .*)? y"),
-    ("heave velocity", "heave|vertical|v ?z|(linear|velocity|vel|twist|dvl)( .*)? z"),
-    ("", "rate|speed"),
+    ("roll velocity", f"roll|{_ANGULAR} x"),
+    ("pitch velocity", f"pitch|{_ANGULAR} y"),
+    ("yaw velocity", f"yaw|turn|heading|{_ANGULAR} z"),
+    ("surge velocity", f"surge|forward|ahead|v x|{_LINEAR} x"),
+    ("sway velocity", f"sway|side|sideways|lateral|v y|{_LINEAR} y"),
+    ("heave velocity", f"heave|vertical|v z|{_LINEAR} z"),
+    ("", "rate|speed|temperature|temp"),
     ("depth", "depth|(position|pos)( .*)? z"),
-    ("heading", "heading|yaw|compass|hdg|(orientation|orient|euler|rpy|attitude)( .*)? z"),
-    ("roll angle", "roll|(orientation|orient|euler|rpy|attitude)( .*)? x"),
-    ("pitch angle", "pitch|(orientation|orient|euler|rpy|attitude)( .*)? y"),
+    ("heading", f"heading|yaw|compass|hdg|{_ATTITUDE} z"),
+    ("roll angle", f"roll|{_ATTITUDE} x"),
+    ("pitch angle", f"pitch|{_ATTITUDE} y"),
+    ("", "internal|hull|housing|cells?|current|capacity|percent|remaining|power|energy|servos?|esc|motors?|thrusters?"),
+    ("pressure", "pressure|baro|barometer"),
     ("voltage", "voltage|battery"),
 )
 """The words of unknown headers of CSV files, as regular expressions, and the columns that they seem to mean. A velocity
-must have its unit, or be the last component of a vector; other quantities have the likely unit. What the empty name
-matches is none of the quantities after it."""
+must have its unit, or be the last component of a vector, and a pressure its unit; other quantities have the likely
+unit. What the empty name matches is none of the quantities after it."""
+_OTHER_WORDS = {
+    "time": "utc zeit uhrzeit zeitstempel temps heure tiempo hora ora tijd tid время 时间 時刻",
+    "date": "day datum fecha jour giorno dato dag дата 日期",
+    "depth": "tiefe profondeur profundidad profundidade profondita diepte djup dybde глубина 水深 深度",
+    "heading": "kurs cap rumbo rota prua koers azimuth azimut курс 航向 方位",
+    "compass": "kompass kompas compas brujula bussola boussole kompassi компас 罗盘",
+    "voltage": "spannung tension voltaje tensao tensione spanning spenning volts volt vbat напряжение 电压 電圧",
+    "battery": "batt bat batterie bateria batteria batterij batteri akku accu батарея 电池",
+    "speed": "geschwindigkeit vitesse velocidad velocidade velocita snelheid hastighet hastighed fart скорость 速度",
+    "pressure": "druck pression presion pressao pressione tryck trykk tryk paine press давление 压力",
+    "temperature": "temperatur temperatura",
+    "current": "strom courant corriente corrente stroom strom amps",
+    "percent": "pct prozent soc",
+    "gyro": "gyroscope gyr gyros gyroskop giroscopio gyroscoop drehrate",
+    "roll": "rollwinkel roulis",
+    "pitch": "nickwinkel tangage",
+    "yaw": "gierwinkel lacet",
+    "acceleration": "accelerometer beschleunigung",
+}
+_SAME = {other: word for word, others in _OTHER_WORDS.items() for other in others.split()}
+"""The words of HEADERS by other words for the same, of loggers and of other languages, without accents."""
+FALSE_FRIENDS = {"cap", "tension", "press", "rota", "fart", "temps", "hora", "ora", "tid", "utc"}
+"""Other words that also mean something else, so that they tell a quantity only together with one of its units."""
+_ENDS = [word for word in _SAME if len(word) >= 5 and word not in FALSE_FRIENDS]
+_JOINED = re.compile("(v|vel|pos|gyro|gyr|omega|rate|w|a|acc|accel)([xyz])|(roll|pitch|yaw)(rate|speed|vel)")
+"""Words that loggers write as one, such as `vx`, `gyroz` and `yawspeed`; the short ones have a longer word."""
+_LONG = {"w": "omega", "a": "acc"}
+
+
+def words_in(text: str) -> list[str]:
+    """Return the words and numbers of a header or a unit in small letters, without accents: `yawRate` has two."""
+    plain = normalize("NFKD", re.sub("[°º]", " deg ", text))
+    spaced = re.sub("([a-z])(?=[A-Z])", r"\1 ", "".join(letter for letter in plain if not combining(letter)))
+    words = re.findall(r"[^\W\d_]+|[0-9]+", spaced.casefold())
+    joined = ((word, _JOINED.fullmatch(word)) for word in words)
+    return [
+        part
+        for word, match in joined
+        for part in ((_LONG.get(one, one) for one in match.groups() if one) if match else [word])
+    ]
+
+
+def meanings(words: Iterable[str]) -> list[str]:
+    """Return the words of HEADERS for the words of a header, which may be of another language.
+
+    The last part of a compound counts, as in Batteriespannung.
+    """
+    return [_SAME.get(word) or next((_SAME[end] for end in _ENDS if word.endswith(end)), word) for word in words]
+
+
+def words_for(word: str) -> list[str]:
+    """Return the other words for a word of HEADERS."""
+    return _OTHER_WORDS[word].split()
+
+
+_SECONDS = ("s", "sec", "secs", "second", "seconds")
+_OTHER_UNITS = {
+    "m": ("meter", "meters", "metre", "metres"),
+    "ft": ("feet", "foot"),
+    "rad": ("rads", "radian", "radians"),
+    "deg": ("degs", "degree", "degrees"),
+    "kn": ("kt", "kts", "knot", "knots"),
+    "V": ("volt", "volts"),
+    "s": _SECONDS[1:],
+    "ms": ("msec", "millis", "milliseconds"),
+    "us": ("usec", "micros", "microseconds"),
+}
+"""Other names of units."""
+PLURALS = {"rads", "degs"}
+"""Units of angles, and, of the component of a vector, of rates."""
+
+
+@cache
+def unit_names(units: tuple[str, ...]) -> Mapping[str, str]:
+    """Return the units of a quantity by all their names, each as the words of it that are separated by blanks.
+
+    A speed in m/s is also `mps`, `ms`, `m_s`, `m per s`, and `m s-1`.
+    """
+    names: dict[str, str] = {}
+    for unit in units:
+        length, _, second = unit.partition("/")
+        spelled = [length, *_OTHER_UNITS.get(length, ())]
+        if second:
+            ends = [form for s in _SECONDS for form in (f"/{s}", f"p{s}", f" per {s}", f"/{s}-1")]
+            spelled = [f"{length}s", *(f"{name}{end}" for name in spelled for end in ends)]
+        for form in spelled:
+            for text in (form, form.casefold()):
+                names.setdefault(" ".join(words_in(text)), unit)
+    return names
