@@ -46,6 +46,8 @@ class Message:
     numbers: Mapping[str, float]
     parameter: str = ""
     """The name of the parameter that it tells."""
+    stamp: float = nan
+    """The time that its header states, s; NaN for a message of MAVLink, whose numbers may have it."""
 
 
 def read_telemetry(path: Path, named: Collection[str]) -> Content:
@@ -59,9 +61,9 @@ def _is_read(named: Collection[str], *names: str) -> bool:
 
 
 def read_messages(path: Path, messages: Iterable[Message | None], named: Collection[str]) -> Content:
-    """Return the content of a log of MAVLink messages; None stands for a damaged one.
+    """Return the content of a log of messages; None stands for a damaged one.
 
-    Messages have times since the vehicle was booted, or none.
+    Those of MAVLink have times since the vehicle was booted, or none.
     """
     rows: Messages = {}
     parameters: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
@@ -78,15 +80,17 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
         elif not _is_read(named, source.kind, source.topic) or numbers.get("port", 0.0) != 0.0:
             others[source.topic] += 1
         else:
-            stamp = numbers.get("time_boot_ms", numbers.get("TimeUS", nan) * 1e-3) * 1e-3
-            if isfinite(stamp):
-                boots[source.vehicle] = stamp - arrival
+            boot = numbers.get("time_boot_ms", numbers.get("TimeUS", nan) * 1e-3) * 1e-3
+            stamp = message.stamp if isfinite(message.stamp) else boot
+            if isfinite(boot):
+                boots[source.vehicle] = boot - arrival
             elif source.kind == "SERVO_OUTPUT_RAW":
                 stamp = numbers.get("time_usec", nan) * 1e-6
                 if isfinite(stamp) and source.vehicle in boots:
                     stamp += _WRAP * round((boots[source.vehicle] + arrival - stamp) / _WRAP)
             rows.setdefault(source, []).append((stamp, arrival, numbers))
-    content = content_of(path.name, dict(sorted(rows.items())), parameters, damaged)  # the first instance is the main
+    rows = dict(sorted(rows.items(), key=lambda row: row[0].part))  # the first instance is the main
+    content = content_of(path.name, rows, parameters, damaged)
     content.unread = {topic: f"{count} messages" for topic, count in others.items()}
     for piece in content.pieces:
         piece.topics = _of_primary_core([*_with_known_velocities(piece.topics, content)])

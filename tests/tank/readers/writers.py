@@ -18,7 +18,7 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.readers.bags import _RC_OUT
+from rov_fmu.tank.readers.bags import _DEFINITIONS
 
 RATES = np.array([0.1, -0.2, 0.3])
 """The velocities in roll, pitch and yaw that logs state beside the angles, rad/s."""
@@ -342,7 +342,8 @@ class Ros:
     def __init__(self, version: int) -> None:
         self.version = version
         self.store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
-        self.store.register(get_types_from_msg(_RC_OUT, "mavros_msgs/msg/RCOut"))
+        for kind, definition in _DEFINITIONS.items():
+            self.store.register(get_types_from_msg(definition, kind))
 
     def message(self, kind: str, **fields: Any) -> Any:
         """Make a message; fields that are not given are zero."""
