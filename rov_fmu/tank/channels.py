@@ -55,6 +55,8 @@ _COMPARED, _LEAST_COMPARED = 1.0, 8
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 """A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
+_LEAST_TURN = 0.1
+"""The turn within _COMPARED of a vehicle that surely turns, rad."""
 _EARTH_AXES, _BODY_AXES = ("to the north", "to the east", "down"), ("forward", "to starboard", "down")
 """The axes of the two frames."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
@@ -88,7 +90,7 @@ class Topic:
         """Return True if the messages are what an entry of the catalogue describes."""
         name, kind = self.source.topic, self.source.kind
         is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
-        return bool(is_meant) and {*message.fields} <= self.fields.keys()
+        return bool(is_meant) and {*message.fields} - {""} <= self.fields.keys()
 
     def where(self, kept: Flags) -> "Topic":
         """Return the topic with only some of its messages."""
@@ -123,6 +125,7 @@ def channels_of(
     the channels that rov.toml names, which are preferred to all others.
     """
     measurements = [*_measurements(topics, sender, others)]
+    measurements = [replace(one, unused=one.unused or _standstill(one, measurements)) for one in measurements]
     attitude = _attitude(measurements)
     channels = [*named]
     for measurement in measurements:
@@ -197,23 +200,37 @@ def _attitude_of(measurement: _Measurement) -> Attitude:
     """Return the attitude at the times at which a measurement knows it: at none if it is of something else."""
     gives, values, time = measurement.message.gives, measurement.values, measurement.topic.time
     known = np.isfinite(values).all(axis=1) & (gives in (EULER, QUATERNION))
-    if gives == QUATERNION:
-        known &= np.linalg.norm(values, axis=1) > 0.5
     if gives != QUATERNION or not known.any():
         return time[known], Rotation.from_euler("ZYX", np.reshape(values[known, ::-1], (-1, 3)))
-    earth, body = _frames(measurement)
+    earth, body = frames_of(measurement.message, measurement.topic.source)
     rotation = Rotation.from_quat(values[known], scalar_first=True).as_matrix()
     return time[known], Rotation.from_matrix(earth @ rotation @ body)
 
 
-def _frames(measurement: _Measurement) -> tuple[Array, Array]:
-    """Return the two matrices of `frames_of` for a message, whose frames the catalogue may know."""
-    return (np.eye(3), np.eye(3)) if measurement.message.frame else frames_of(measurement.topic.source)
+def _standstill(attitude: _Measurement, measurements: Sequence[_Measurement]) -> str:
+    """Return the reason against an attitude that never changes although the vehicle turns, by the rates of turn in the
+    same messages, or else in others; or an empty text. Some sensors send a constant where they measure none."""
+    known, _ = _attitude_of(attitude)
+    values = attitude.values[np.isfinite(attitude.values).all(axis=1)]
+    if len(known) < LEAST_SAMPLES or np.ptp(values, axis=0).any():
+        return ""
+    rates = [m for m in measurements if m.message.gives == RATES and not m.unused]
+    for one in sorted(rates, key=lambda m: m.topic is not attitude.topic)[:1]:
+        ends = first_in_each(one.topic.time, 1.0 / _COMPARED)
+        angles = np.cumsum(np.nan_to_num(one.values[1:]) * np.diff(one.topic.time)[:, None], axis=0)
+        turned = np.abs(np.diff(angles[ends[:-1]], axis=0)).max(initial=0.0)
+        if turned > _LEAST_TURN:
+            return (
+                f"it never changes, although {one.topic.source} tells turns of {np.degrees(turned):.3g} deg in a second"
+            )
+    return ""
 
 
-def frames_of(source: Source) -> tuple[Array, Array]:
+def frames_of(message: Message, source: Source) -> tuple[Array, Array]:
     """Return two matrices: from the earth frame of a source to north, east, down, and from its body frame to forward,
-    starboard, down."""
+    starboard, down. The catalogue may know the frames of a message."""
+    if message.frame:
+        return np.eye(3), np.eye(3)
     earth, body = source.frames
     earth_words, body_words = words_of(earth), words_of(body)
     is_frd = bool(body_words & {"ned", "frd"}) or ("ned" in earth_words and "flu" not in body_words)
@@ -244,7 +261,7 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     known, rotation = _attitude_of(quaternion)
     if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
         return ""
-    earth, body = _frames(velocity)
+    earth, body = frames_of(velocity.message, velocity.topic.source)
     ends = first_in_each(time, 1.0 / _COMPARED)
     moved = np.diff((position.values @ earth.T)[ends], axis=0)
     rates = {"the body": rotation.apply(velocity.values @ body.T), "the earth": velocity.values @ earth.T}
@@ -275,7 +292,7 @@ def _agreeing(
     is_compared = velocity.message.gives == VELOCITY and not velocity.unused and (is_of_earth or attitude)
     if not (position and is_compared):
         return velocity, ""
-    earth, body = _frames(velocity)
+    earth, body = frames_of(velocity.message, velocity.topic.source)
     to_own, names = (earth, _EARTH_AXES) if is_of_earth else (body, _BODY_AXES)
     values, time = velocity.values @ to_own.T, velocity.topic.time
     axes = None if is_of_earth or not attitude else _at(attitude, time).as_matrix()
@@ -301,10 +318,10 @@ def _at(attitude: Slerp, time: Array) -> Rotation:
 def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None) -> Iterator[Channel]:
     """Yield the channels of a measurement. `corrected` says by what its velocities are corrected."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
-    earth, body = _frames(measurement)
+    earth, body = frames_of(measurement.message, measurement.topic.source)
     unused = measurement.unused
     if gives == POSITION:
-        yield from _of_position(topic, values @ earth.T, unused)
+        yield from _of_position(topic, _turned(values, earth), unused)
     elif gives in (EULER, QUATERNION):
         time, rotation = _attitude_of(measurement)
         angles = rotation.as_euler("ZYX")[:, ::-1].T if len(time) else ()
@@ -312,9 +329,9 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None)
             yield Channel(QUANTITIES[axis.position], topic.source, time, column, unused=unused)
     elif gives in (VELOCITY, RATES):
         if not _is_of_earth(measurement):
-            values = values @ body.T
+            values = _turned(values, body)
         elif attitude:
-            values = _at(attitude, topic.time).inv().apply(values @ earth.T)
+            values = _at(attitude, topic.time).inv().apply(_turned(values, earth))
         else:
             frame = topic.source.frames[1] or "the earth"
             unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
@@ -324,6 +341,12 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None)
             yield Channel(quantity, topic.source, topic.time, column, unused=unused, corrected=corrected)
     else:
         yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused)
+
+
+def _turned(values: Array, axes: Array) -> Array:
+    """Return n x 3 numbers along other axes. A component that is unknown leaves those that do not follow from it."""
+    unknown = np.isnan(values) @ (axes != 0.0).T
+    return np.where(unknown, np.nan, np.nan_to_num(values) @ axes.T)
 
 
 def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel]:

@@ -209,10 +209,12 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     for message in WRENCHES:
         for topic in topics:
             if topic.has(message):
-                _, body = frames_of(topic.source)
-                values = np.column_stack([topic.fields[field] for field in message.fields]) @ body.T
+                _, body = frames_of(message, topic.source)
+                nothing = np.zeros(len(topic.time))
+                values = np.column_stack([topic.fields.get(field, nothing) for field in message.fields]) @ body.T
                 for force in forces:
-                    if force.axis.is_rotation == (message.gives != FORCE):
+                    is_told = message.fields[force.axis.place]
+                    if is_told and force.axis.is_rotation == (message.gives != FORCE):
                         series = topic.time, np.nan_to_num(values[:, force.axis.place])
                         found.setdefault(topic.source, {})[force.name] = series
     own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)

@@ -33,7 +33,9 @@ from rov_fmu.tank.readers.recordings import (
 )
 
 _LONGEST = 32
-"""Longer arrays in messages are covariances, images or clouds, and are not read."""
+"""Longer arrays in messages are images or clouds, and are not read."""
+_COVARIANCE = 6
+"""The number of rows and columns of the covariance of a pose or a twist, of which the variances are read."""
 _FIRST = 100
 """The number of messages of an unknown topic whose ranges are told."""
 _DEFINITIONS = {
@@ -139,14 +141,13 @@ def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown)
 
 def _decoder(stream: Stream) -> Decode | None:
     """Return what decodes the messages of a stream; None for an encoding or a definition that is not known."""
-    with suppress(Exception):  # a definition that is damaged
-        if stream.encoding == "json":
-            return json.loads
-        if stream.encoding == "protobuf":
-            return _of_protobuf(stream)
-        if stream.encoding in ("cdr", "ros1"):
-            return _of_ros(stream)
-    return None
+    makers = {"json": lambda _: json.loads, "protobuf": _of_protobuf, "cdr": _of_ros, "ros1": _of_ros}
+    try:
+        return makers[stream.encoding](stream) if stream.encoding in makers else None
+    except (MemoryError, ModuleNotFoundError):
+        raise
+    except Exception:  # a definition that is damaged
+        return None
 
 
 def _of_protobuf(stream: Stream) -> Decode | None:
@@ -230,9 +231,10 @@ def _numbers(place: str, value: Any) -> Iterator[tuple[str, float]]:
     if isinstance(value, bool | int | float | np.number):
         yield place, float(value)
     elif isinstance(value, np.ndarray | Sequence):
-        if len(value) <= _LONGEST and not isinstance(value, str | bytes):
-            for n, one in enumerate(value):
-                yield from _numbers(f"{place}[{n}]", one)
+        is_covariance = place.endswith("covariance") and len(value) == _COVARIANCE**2
+        if is_covariance or (len(value) <= _LONGEST and not isinstance(value, str | bytes)):
+            for n in range(0, len(value), _COVARIANCE + 1 if is_covariance else 1):
+                yield from _numbers(f"{place}[{n}]", value[n])
     else:
         for name, inner in _fields(value):
             if name not in ("header", "layout"):

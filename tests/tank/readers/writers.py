@@ -8,6 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.json_format import ParseDict
+from google.protobuf.message_factory import GetMessageClass
 from mcap.writer import Writer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Writer as Writer1
@@ -177,6 +181,48 @@ def blueos(folder: Path, dive: Dive) -> Path:
         kept = writer.register_channel("mavlink/1/1/PARAM_VALUE", "json", schema)
         for data in (json.dumps({"message": told}), "damaged", "[]"):
             writer.add_message(kept, stamp - 5 * 10**9, data.encode(), stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
+def _form_of(name: str, fields: Mapping[str, Any]) -> DescriptorProto:
+    """Return the definition of a structure of protobuf with such fields."""
+    form = DescriptorProto(name=name)
+    for number, (key, value) in enumerate(fields.items(), start=1):
+        field = form.field.add(name=key, number=number, label=FieldDescriptorProto.LABEL_OPTIONAL)
+        if isinstance(value, Mapping):
+            form.nested_type.append(_form_of(f"Of_{key}", value))
+            field.type, field.type_name = FieldDescriptorProto.TYPE_MESSAGE, f"Of_{key}"
+        else:
+            is_flag = isinstance(value, bool)
+            field.type = FieldDescriptorProto.TYPE_BOOL if is_flag else FieldDescriptorProto.TYPE_DOUBLE
+    return form
+
+
+def write_mcap(path: Path, encoding: str, messages: Iterable[tuple[str, str, float, Mapping[str, Any]]]) -> Path:
+    """Write an MCAP file without a profile: the topic, the type, the time since START, and the fields of each message.
+
+    An encoding beside `json` and `protobuf` is one that nobody knows.
+    """
+    with path.open("wb") as file:
+        writer, channels, kinds = Writer(file), {}, {}
+        writer.start(profile="", library="test")
+        for topic, kind, time, fields in messages:
+            if topic not in channels:
+                package, _, name = kind.rpartition(".")
+                form = FileDescriptorProto(name=f"{kind}.proto", package=package, syntax="proto3")
+                form.message_type.append(_form_of(name, fields))
+                pool = DescriptorPool()
+                pool.Add(form)
+                kinds[topic] = GetMessageClass(pool.FindMessageTypeByName(kind))
+                definition = FileDescriptorSet(file=[form]).SerializeToString()
+                language, data = {"protobuf": ("protobuf", definition)}.get(encoding, ("jsonschema", b"{}"))
+                schema = writer.register_schema(kind, language, data)
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            text = json.dumps(fields)
+            raw = ParseDict(fields, kinds[topic]()).SerializeToString() if encoding == "protobuf" else text.encode()
+            stamp = round((START + time) * 1e9)
+            writer.add_message(channels[topic], stamp, raw, stamp)
         writer.finish()  # type: ignore[no-untyped-call]
     return path
 
