@@ -144,6 +144,8 @@ class Output:
     topic: str = ""
     """A regular expression that must occur in the name of the topic. Its group is the number of the thruster, if each
     thruster has a topic of its own."""
+    spread: bool = False
+    """True if a sender spreads its outputs over several messages, whose fields have the numbers from 1 on."""
 
 
 def _each(form: str, places: Iterable[object] = "xyz") -> tuple[str, ...]:
@@ -294,8 +296,8 @@ VALIDITIES = (
 
 _ACTUATORS = r"(?i)thruster|motor|actuator|propeller|pwm|command|cmd"
 OUTPUTS = (
-    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us"),
-    Output("RCOU", r"C(\d+)", "us"),
+    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us", spread=True),
+    Output("RCO[U23]", r"C(\d+)", "us", spread=True),
     Output("actuator_motors", r"control\[(\d+)\]", "1"),
     Output("actuator_outputs", r"output\[(\d+)\]"),
     Output(r"mavros_msgs/.*RCOut", r"channels\[(\d+)\]", "us"),

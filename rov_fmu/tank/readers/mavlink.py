@@ -24,6 +24,8 @@ from rov_fmu.tank.readers.content import Content, Messages, content_of
 
 _WRAP = 2.0**32 * 1e-6
 """The time after which the clock of SERVO_OUTPUT_RAW restarts at 0, s."""
+_PER_PORT = 16
+"""The outputs that SERVO_OUTPUT_RAW has for each port."""
 _STATUS = {"EKF_STATUS_REPORT", "XKF4", "NKF4"}
 """The messages about the state of the filter."""
 _VELOCITY_KNOWN, _CONSTANT_POSITION = 2, 128
@@ -77,7 +79,7 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
         if message.parameter:
             value = numbers.get("param_value", numbers.get("Value", nan))
             parameters[message.parameter].append((arrival, value))
-        elif not _is_read(named, source.kind, source.topic) or numbers.get("port", 0.0) != 0.0:
+        elif not _is_read(named, source.kind, source.topic):
             others[source.topic] += 1
         else:
             boot = numbers.get("time_boot_ms", numbers.get("TimeUS", nan) * 1e-3) * 1e-3
@@ -88,6 +90,7 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
                 stamp = numbers.get("time_usec", nan) * 1e-6
                 if isfinite(stamp) and source.vehicle in boots:
                     stamp += _WRAP * round((boots[source.vehicle] + arrival - stamp) / _WRAP)
+            source, numbers = _of_port(source, numbers)
             rows.setdefault(source, []).append((stamp, arrival, numbers))
     rows = dict(sorted(rows.items(), key=lambda row: row[0].part))  # the first instance is the main
     content = content_of(path.name, rows, parameters, damaged)
@@ -95,6 +98,16 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
     for piece in content.pieces:
         piece.topics = _of_primary_core([*_with_known_velocities(piece.topics, content)])
     return content
+
+
+def _of_port(source: Source, numbers: Mapping[str, float]) -> tuple[Source, Mapping[str, float]]:
+    """Return outputs with their numbers among those of all ports, and a topic for each port but the first."""
+    port = int(numbers.get("port", 0.0)) if source.kind == "SERVO_OUTPUT_RAW" else 0
+    if not port:
+        return source, numbers
+    servos = {f"servo{n}_raw": f"servo{n + _PER_PORT * port}_raw" for n in range(1, _PER_PORT + 1)}
+    moved = {servos[name]: value for name, value in numbers.items() if name in servos}
+    return replace(source, topic=f"{source.topic}_{port}"), moved
 
 
 def _numbers(message: Any) -> Mapping[str, float]:

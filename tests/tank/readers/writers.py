@@ -235,6 +235,8 @@ FORMATS = {
     "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
     "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
     "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
+    "RCO2": (157, "QHHHH", "TimeUS,C15,C16,C17,C18"),
+    "RCO3": (158, "QHHHHHHHHHHHHHH", f"TimeUS,{','.join(f'C{n}' for n in range(19, 33))}"),
     "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
 }
 CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "I": "I", "e": "i", "N": "16s"}
