@@ -13,7 +13,7 @@ are applied:
 """
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -61,6 +61,13 @@ _EARTH_AXES, _BODY_AXES = ("to the north", "to the east", "down"), ("forward", "
 """The axes of the two frames."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
+
+
+_WATERS = 0.9, 1.1
+"""The range of specific gravities of water in which vehicles dive."""
+Gravity = Callable[[Array], Array]
+"""Returns the specific gravity of the water at some times, s, as the autopilot is told. Another one than that of water
+counts as that of fresh water, 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,12 +124,16 @@ class _Measurement:
 
 
 def channels_of(
-    topics: Sequence[Topic], sender: Source | None, others: Collection[str] = (), named: Sequence[Channel] = ()
+    topics: Sequence[Topic],
+    sender: Source | None,
+    others: Collection[str] = (),
+    named: Sequence[Channel] = (),
+    gravity: Gravity = np.ones_like,
 ) -> list[Channel]:
     """Return all channels of the topics, with the reason for each that is not used; preferred ones come first.
 
     `sender` is the source of the commands, and `others` are the names of other vehicles that have commands. `named` are
-    the channels that rov.toml names, which are preferred to all others.
+    the channels that rov.toml names, which are preferred to all others. `gravity` tells the water.
     """
     measurements = [*_measurements(topics, sender, others)]
     measurements = [replace(one, unused=one.unused or _standstill(one, measurements)) for one in measurements]
@@ -132,7 +143,7 @@ def channels_of(
         is_velocity = measurement.message.gives == VELOCITY
         reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
         one = replace(measurement, unused=reason)
-        channels += _channels(*_agreeing(one, measurements, attitude), attitude)
+        channels += _channels(*_agreeing(one, measurements, attitude), attitude, gravity)
     return with_one_source(channels)
 
 
@@ -315,7 +326,7 @@ def _at(attitude: Slerp, time: Array) -> Rotation:
 # ---- Channels --------------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None) -> Iterator[Channel]:
+def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
     """Yield the channels of a measurement. `corrected` says by what its velocities are corrected."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
     earth, body = frames_of(measurement.message, measurement.topic.source)
@@ -340,7 +351,7 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None)
             quantity = QUANTITIES[f"{axis.name} velocity"]
             yield Channel(quantity, topic.source, topic.time, column, unused=unused, corrected=corrected)
     else:
-        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused)
+        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused, gravity)
 
 
 def _turned(values: Array, axes: Array) -> Array:
@@ -358,12 +369,24 @@ def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel
         yield Channel(QUANTITIES["distance"], topic.source, topic.time, distance, unused=unused)
 
 
-def of_scalar(quantity: Quantity, source: Source, time: Array, values: Array, unused: str = "") -> Iterator[Channel]:
-    """Yield a channel, and the depth that a pressure implies in fresh water."""
+def of_scalar(
+    quantity: Quantity,
+    source: Source,
+    time: Array,
+    values: Array,
+    unused: str = "",
+    gravity: Gravity = np.ones_like,
+) -> Iterator[Channel]:
+    """Yield a channel, and the depth that a pressure implies in the water that `gravity` tells."""
     yield Channel(quantity, source, time, values, unused=unused)
     if quantity.name == "pressure":
-        depth, reason = (values - ATMOSPHERE) / PRESSURE_GRADIENT, unused or _reason_against_pressure(values)
-        yield Channel(QUANTITIES["depth"], source, time, depth, unused=reason, derived_from="pressure")
+        told, (low, high) = gravity(time), _WATERS
+        relative = np.where((told >= low) & (told <= high), told, 1.0)
+        depth, reason = (values - ATMOSPHERE) / PRESSURE_GRADIENT / relative, unused or _reason_against_pressure(values)
+        water = "fresh water (1000 kg/m3). In sea water the true depth is 2.5 % smaller"
+        if (relative != 1.0).any():
+            water = f"water of {1000.0 * relative[-1]:.4g} kg/m3, which the autopilot is told"
+        yield Channel(QUANTITIES["depth"], source, time, depth, unused=reason, derived_from=f"pressure, for {water}")
 
 
 def _reason_against_pressure(values: Array) -> str:

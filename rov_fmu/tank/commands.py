@@ -101,6 +101,14 @@ class Parameters:
         times, values = self.told[name]
         return held(times, values, time)
 
+    def specific_gravity(self, time: Array) -> Array:
+        """Return the specific gravity of the water that ArduSub was told at some times, or 1.
+
+        Its altitudes are computed for this water, and a logged pressure is not: `AP_Baro::update` has altitude =
+        (ground pressure - pressure) / 9800 Pa/m / BARO_SPEC_GRAV.
+        """
+        return self.at("BARO_SPEC_GRAV", time, 1.0)
+
     def last(self, name: str) -> float | None:
         """Return the last value, or None."""
         return float(self.told[name][1][-1]) if name in self.told else None

@@ -134,10 +134,7 @@ _DOUBTS = {
         "push ahead above its neutral pulse"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
-    "depth by pressure": (
-        "{files}: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water "
-        "the true depth is 2.5 % smaller"
-    ),
+    "depth by pressure": "{files}: the depth is computed from the {by}",
 }
 _FACTS = {
     "other files": "{files}: not read, because {reason}",
