@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding, sentences
@@ -24,7 +25,6 @@ from tests.tank.readers.writers import (
     attitude,
     dataflash,
     flash,
-    mavlink,
     packed,
     parameter,
     servos,
