@@ -10,12 +10,15 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from math import nan, pi
+from math import inf, nan, pi
 from typing import Any
 from unicodedata import combining, normalize
 
+import numpy as np
+
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.io.csv_table import Column
+from rov_fmu.tank.arrays import Array, Flags
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi, "°": 180.0 / pi}
@@ -111,6 +114,7 @@ class Message:
     kind: str
     """A regular expression for the whole type of the message."""
     fields: tuple[str, ...]
+    """The names of the fields; empty for a component that a message does not have."""
     gives: str
     """The name of a quantity, or a vector."""
     unit: str = ""
@@ -141,6 +145,8 @@ class Output:
     topic: str = ""
     """A regular expression that must occur in the name of the topic. Its group is the number of the thruster, if each
     thruster has a topic of its own."""
+    spread: bool = False
+    """True if a sender spreads its outputs over several messages, whose fields have the numbers from 1 on."""
 
 
 def _each(form: str, places: Iterable[object] = "xyz") -> tuple[str, ...]:
@@ -182,6 +188,8 @@ _POSE = r"geometry_msgs/.*Pose.*"
 _TWIST = r"geometry_msgs/.*Twist.*"
 _ODOMETRY = r"nav_msgs/.*Odometry"
 _IMU = r"sensor_msgs/.*Imu"
+_DVLS = (r"dvl_msgs/.*DVL", r"marine_acoustic_msgs/.*Dvl")
+"""The messages of DVLs, whose axes point forward, to starboard and down."""
 _NESTED = ("{0}.{0}.{1}.", "{0}.{1}.", "{1}.")
 """How the messages of ROS nest a part of a pose or a twist: with covariance, with a header, alone."""
 _PARTS = (
@@ -190,8 +198,11 @@ _PARTS = (
     ("twist", "linear", "xyz", VELOCITY, _TWIST),
     ("twist", "angular", "xyz", RATES, _TWIST),
 )
+_NUMBER = r"std_msgs/.*(Float|Int)\d+(Stamped)?"
 _ROS = (
-    Message(r"std_msgs/.*(Float|Int)\d+(Stamped)?", ("data",), "depth", topic=r"(?i)(?<![a-z])depth(?![a-z])"),
+    Message(_NUMBER, ("data",), "depth", topic=r"(?i)(?<![a-z])depth(?![a-z])"),
+    Message(_NUMBER, ("data",), "depth", sign=-1.0, topic=r"(?<![a-z])rel_alt(?![a-z])"),
+    Message(r"mavros_msgs/.*(VFR_HUD|VfrHud)", ("altitude",), "depth", sign=-1.0),
     *(
         Message(kind, _each(nested.format(whole, part) + "{}", letters), gives)
         for whole, part, letters, gives, alone in _PARTS
@@ -200,16 +211,94 @@ _ROS = (
     ),
     Message(_IMU, _each("orientation.{}", "wxyz"), QUATERNION),
     Message(_IMU, _each("angular_velocity.{}"), RATES),
+    Message(_NUMBER, ("data",), "heading", "deg", topic=r"(?<![a-z])compass_hdg(?![a-z])"),
+    *(Message(kind, _each("velocity.{}"), VELOCITY, frame=FRD) for kind in _DVLS),
     Message(r"sensor_msgs/.*FluidPressure", ("fluid_pressure",), "pressure"),
     Message(r"sensor_msgs/.*BatteryState", ("voltage",), "voltage"),
 )
-MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS)
+_BLUEYE = "blueye.protocol.{}Tel"
+_ESTIMATE = _BLUEYE.format("PositionEstimate")
+_OF_BLUEYE = (
+    Message(_BLUEYE.format("Depth"), ("depth.value",), "depth"),
+    Message(_BLUEYE.format("Attitude"), _each("attitude.{}", ("roll", "pitch", "yaw")), EULER, "deg", NED),
+    *(
+        Message(_ESTIMATE, (f"position_estimate.{axis}_rate",), f"{axis} velocity", frame=FRD)
+        for axis in ("surge", "sway", "yaw")
+    ),
+    Message(_ESTIMATE, ("position_estimate.heading",), "heading"),
+)
+MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS, *_OF_BLUEYE)
 """What the messages of all formats measure. Of two sources of a quantity, that of the earlier entry is preferred."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """A field of a kind of message that tells whether other fields of the same message are measurements."""
+
+    kind: str
+    """A regular expression for the whole type of the message."""
+    place: str
+    """The field that tells it."""
+    about: str
+    """A regular expression for the whole names of the fields that it is about."""
+    least: float = -inf
+    below: float = inf
+    """They are measurements while the number is at least the first and less than the second one."""
+    may_lack: bool = False
+    """True for a field that some senders do not fill: it tells nothing if it is 0 in all messages."""
+
+    def denies(self, told: Array) -> Flags:
+        """Return True where the numbers say that nothing was measured."""
+        if self.may_lack and not np.nan_to_num(told).any():
+            return np.zeros(len(told), bool)
+        return (told < self.least) | (told >= self.below)
+
+
+_HUGE_PLACE, _HUGE = 1e5, 1e3
+"""Variances of a position, m2, and of a velocity or an angle, from which on estimators mean that they know nothing."""
+_COVARIANCES = (
+    (f"{_ODOMETRY}|{_POSE}", "pose", "position", "xyz", 0, _HUGE_PLACE),
+    (f"{_ODOMETRY}|{_POSE}", "pose", "orientation", "__.", 21, _HUGE),
+    (f"{_ODOMETRY}|{_TWIST}", "twist", "linear", "xyz", 0, _HUGE),
+    (f"{_ODOMETRY}|{_TWIST}", "twist", "angular", "xyz", 21, _HUGE),
+)
+"""Type, whole, part, components, and the index of the variance of the first component, which are on the diagonal of a
+covariance of 6 x 6. Roll and pitch are not left out without the heading, which stands for a whole orientation."""
+VALIDITIES = (
+    # "set element 0 of the associated covariance matrix to -1" (sensor_msgs/Imu), which others do, too
+    *(
+        Validity(_IMU, f"{part}_covariance[0]", rf"{part}\..", least=0.0)
+        for part in ("orientation", "angular_velocity")
+    ),
+    *(
+        Validity(kind, f"{place}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
+        for kind, whole, part, *_ in _COVARIANCES
+        for place in (f"{whole}.", "")
+    ),
+    *(
+        Validity(kind, f"{place}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge)
+        for kind, whole, part, letters, first, huge in _COVARIANCES
+        for place in (f"{whole}.", "")
+        for n, letter in enumerate(letters)
+    ),
+    Validity(_DVLS[1], "velocity_mode", r"velocity\..", least=1.0, below=2.0),  # others are through the water
+    Validity(_DVLS[1], "num_good_beams", r"velocity\..", least=3.0, may_lack=True),
+    Validity(r"sensor_msgs/.*BatteryState", "present", "voltage", least=1.0, may_lack=True),
+    Validity("BARO", "Health", "Alt|Press", least=1.0),
+    Validity("BARO", "H", "Alt|Press", least=1.0),
+    Validity("vehicle_local_position", "xy_valid", "[xy]", least=1.0),
+    Validity("vehicle_local_position", "z_valid", "z", least=1.0),
+    Validity("vehicle_local_position", "v_xy_valid", "v[xy]", least=1.0),
+    Validity("vehicle_local_position", "v_z_valid", "vz", least=1.0),
+    Validity("battery_status", "connected", "voltage_v", least=1.0, may_lack=True),
+    Validity(_ESTIMATE, "position_estimate.is_valid", r"position_estimate\..*", least=1.0),
+)
+"""The marks of validity inside messages, beside flags that their names tell."""
 
 _ACTUATORS = r"(?i)thruster|motor|actuator|propeller|pwm|command|cmd"
 OUTPUTS = (
-    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us"),
-    Output("RCOU", r"C(\d+)", "us"),
+    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us", spread=True),
+    Output("RCO[U23]", r"C(\d+)", "us", spread=True),
     Output("actuator_motors", r"control\[(\d+)\]", "1"),
     Output("actuator_outputs", r"output\[(\d+)\]"),
     Output(r"mavros_msgs/.*RCOut", r"channels\[(\d+)\]", "us"),
@@ -220,8 +309,11 @@ OUTPUTS = (
 
 FORCE, TORQUE = "force", "torque"
 _WRENCH = r"geometry_msgs/.*Wrench(Stamped)?"
-WRENCHES = tuple(
-    Message(_WRENCH, _each(f"{nested}{part}.{{}}"), part) for nested in ("wrench.", "") for part in (FORCE, TORQUE)
+_CONTROL_FORCE = _BLUEYE.format("ControlForce")
+WRENCHES = (
+    *(Message(_WRENCH, _each(f"{nested}{part}.{{}}"), part) for nested in ("wrench.", "") for part in (FORCE, TORQUE)),
+    Message(_CONTROL_FORCE, _each("control_force.{}", ("surge", "sway", "heave")), FORCE, frame=FRD),
+    Message(_CONTROL_FORCE, ("", "", "control_force.yaw"), TORQUE, frame=FRD),
 )
 """The wrenches that drive a vehicle: forces in N and moments in N.m along the axes of the body."""
 

@@ -80,6 +80,10 @@ _WARNINGS = {
     "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
+    "cut": (
+        "{files}: the file ends amid its messages, as after a loss of power. The {read} s before that are read, and "
+        "what was recorded later is missing"
+    ),
     "several vehicles": (
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; `vehicle` in [logs] of rov.toml names another"
     ),
@@ -130,10 +134,7 @@ _DOUBTS = {
         "push ahead above its neutral pulse"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
-    "depth by pressure": (
-        "{files}: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water "
-        "the true depth is 2.5 % smaller"
-    ),
+    "depth by pressure": "{files}: the depth is computed from the {by}",
 }
 _FACTS = {
     "other files": "{files}: not read, because {reason}",

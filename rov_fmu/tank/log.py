@@ -65,7 +65,8 @@ class Channel:
     unused: str = ""
     """Why the channel is not used, such as `a setpoint`; empty for a channel that is used."""
     derived_from: str = ""
-    """The quantity that the sensor measures, such as `pressure`, if the values are computed from it."""
+    """The quantity that the sensor measures, with what is assumed, such as `pressure, for fresh water`, if the values
+    are computed from it."""
     corrected: str = ""
     """By what a velocity is corrected so that it agrees with the position, in words; empty for values as measured."""
 

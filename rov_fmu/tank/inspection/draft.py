@@ -42,7 +42,8 @@ def likely_vehicle(inspections: Sequence[Inspection], curves: Collection[str]) -
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
     most = max(inspections, key=lambda one: (len(one.commands), sum(row.low < row.high for row in one.commands)))
     ends = {row.name.removeprefix("thruster "): (row.low, row.high) for row in most.commands}
-    thrusters = likely_thrusters(ends, layouts.values()) if _is_bag(most.path) else [*ends]
+    is_named = not _is_bag(most.path) or not EXTERNAL.isdisjoint(ends)
+    thrusters = [*ends] if is_named else likely_thrusters(ends, layouts.values())
     frames = {one.log.frame for one in inspections if one.log and one.log.frame}
     possible = [layout for layout in layouts.values() if frames <= {*fitting_frames(layout)} or not frames]
     fits = fitting(thrusters, possible)

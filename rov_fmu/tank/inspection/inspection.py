@@ -13,6 +13,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_start
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
@@ -128,8 +129,13 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     else:
         names, _ = names_of(described, tables)
         axis = None
-    logs = map(checked, read_logs(path, layout, names, axis, is_part=True))
-    return [_of_log(path, log, unread, columns) for log in logs]
+    logs = read_logs(path, layout, names, axis, is_part=True)
+    if not (described or open_stream or any(log.commands for log in logs)):
+        of_wrench = read_logs(path, Layout.of_wrench(map(VehicleAxis, AXES.values())), names, is_part=True)
+        if any(log.commands for log in of_wrench):  # it need not have all components
+            kept = (tuple(one for one in log.findings if one.kind != "missing column") for log in of_wrench)
+            logs = [replace(log, findings=own) for log, own in zip(of_wrench, kept, strict=True)]
+    return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
 
 
 def _known_name(known: KnownColumns, header: str) -> str:

@@ -2,7 +2,8 @@
 
 A column or field whose name has the word `valid` is a flag: of the quantities that its other words mean (`dvl_valid` of
 the velocities, `depth_valid` of the depth), or, without other words, of all in the same message or row. The table
-[valid] of rov.toml names others.
+[valid] of rov.toml names others. VALIDITIES of the catalogue has the other marks of validity inside messages, such as a
+covariance of -1.
 
 A mark is known by what it is to the other numbers, and no list of marks is needed: it repeats exactly, and lies farther
 from all others than these lie from each other, so that a vehicle would have to jump there and back between two samples.
@@ -23,7 +24,16 @@ from numpy.typing import NDArray
 from rov_fmu.io.csv_table import Column, KnownColumns
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.tank.catalogue import FLAGS, MESSAGES, QUANTITIES, QUATERNION, VECTORS, Quantity, words_of
+from rov_fmu.tank.catalogue import (
+    FLAGS,
+    MESSAGES,
+    QUANTITIES,
+    QUATERNION,
+    VALIDITIES,
+    VECTORS,
+    Quantity,
+    words_of,
+)
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import Entry, LogColumn, Names, in_degrees, known_columns
@@ -44,6 +54,10 @@ _GAP_INTERVALS = 10.0
 """Between samples that are farther apart than this many usual intervals, a vehicle may move."""
 _VALID = {"valid", "validity", "invalid"}
 """The words that make a name that of a flag."""
+_OFF_NORM = 0.1
+"""A quaternion whose norm differs from 1 by more than this is no rotation."""
+_OF_PARTS = {"beam", "beams", "range", "ranges"}
+"""The words that make a flag that of a part of a measurement, without which the sensor may well have measured."""
 _TRUE, _FALSE = ("true", "t", "yes", "valid", "ok", "a"), ("false", "f", "no", "invalid", "v")
 
 
@@ -67,7 +81,7 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
     if name in valid:
         return {quantity.removeprefix("-"): not quantity.startswith("-") for quantity in valid[name]}
     words = words_of(re.split(r"[\[(]", place or name)[0])
-    if not words & _VALID:
+    if not words & _VALID or words & _OF_PARTS:
         return {}
     others = words - _VALID - {"is", "flag", "data", "measurement"}
     exact = {"velocity" if word in ("rate", "speed") else word for word in others}
@@ -120,6 +134,9 @@ def measured_only(
     kept = []
     for topic in topics:
         fields = dict(topic.fields)
+        for places, gone, what in _denied(topic):
+            for place in places:
+                fields[place] = without(fields[place], gone.copy(), "invalid", what, topic.full_name(place))
         for place, (quantities, convert) in _measured(topic, entries).items():
             column = topic.full_name(place)
             for flag in flags:
@@ -134,6 +151,18 @@ def measured_only(
         for (kind, what), counts in left.items()
     ]
     return kept, findings
+
+
+def _denied(topic: Topic) -> Iterator[tuple[Collection[str], Flags, str]]:
+    """Yield fields of a topic, where the same messages say that they are no measurements, and what says it."""
+    for validity in VALIDITIES:
+        if re.fullmatch(validity.kind, topic.source.kind) and validity.place in topic.fields:
+            places = [place for place in topic.fields if re.fullmatch(validity.about, place)]
+            yield places, validity.denies(topic.fields[validity.place]), topic.full_name(validity.place)
+    for message in MESSAGES:
+        if message.gives == QUATERNION and topic.has(message):
+            norm = np.linalg.norm([topic.fields[place] for place in message.fields], axis=0)
+            yield message.fields, np.abs(norm - 1.0) > _OFF_NORM, "the norm of the quaternion"
 
 
 def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, _Meaning]:
