@@ -621,7 +621,7 @@ def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
 
 def _structure(one: Structure) -> Finding | None:
     """Return the finding about a hypothesis that won; None where only its effect is told."""
-    if one.value > HYPOTHESES[one.kind].most:
+    if (kind := KINDS.get(one.kind)) and abs(one.value - (kind.null or 0.0)) < HYPOTHESES[one.kind].least:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
     odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
