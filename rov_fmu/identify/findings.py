@@ -529,7 +529,7 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
 def may_rock(folder: Folder, axis: Axis) -> bool:
     """Return True if only dives tell how fast an axis is, and none of them shows roll and pitch."""
     logs = [log for log in folder.logs if log.axis in (None, axis)]
-    are_level = (log.axis or (log.used("roll angle") and log.used("pitch angle")) for log in logs)
+    are_level = (log.axis or log.tilt for log in logs)
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 

@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from math import nan, pi
+from math import inf, nan, pi
 from typing import Any
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
@@ -47,6 +47,8 @@ class Quantity:
     """Other headers of its column. They are recognised only together with one of its units."""
     minimum: float = -1e7
     maximum: float = 1e7
+    least: float = -inf
+    """What is below is no measurement, but what a sensor shows that is not connected."""
     wraps: bool = False
     """True for an angle that sensors wrap at a full turn."""
 
@@ -80,7 +82,7 @@ def _quantities() -> Iterator[Quantity]:
         )
     yield Quantity("distance", LENGTHS)
     yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
-    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4)
+    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0)
 
 
 QUANTITIES = {quantity.name: quantity for quantity in _quantities()}

@@ -423,10 +423,9 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
 
 def _tilt(log: Log, layout: Layout) -> Array:
     """Return times, roll and pitch of a dive of a vehicle that has neither axis, 3 x k; k = 0 if unknown."""
-    roll, pitch = log.used("roll angle"), log.used("pitch angle")
-    if log.follows_axis or layout.has_attitude or roll is None or pitch is None:
+    if log.follows_axis or layout.has_attitude or not log.tilt:
         return np.zeros((3, 0))
-    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in (roll, pitch))
+    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in log.tilt)
     if min(len(times), len(time)) < LEAST_SAMPLES:
         return np.zeros((3, 0))
     return np.array([time, np.interp(time, times, rolls), pitches])
