@@ -10,6 +10,7 @@ from math import floor, inf, isfinite, log, log10
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
@@ -278,10 +279,24 @@ def next_tests(identification: Identification) -> list[str]:
     of_base = identification.axes_of_base
     groups = grouped(((one.reason, how_to_measure(one.axis, "<axis>")), one.axis) for one in of_base)
     others = [
-        f"{listed(axis.name for axis in axes)}: {reason}. {how_to_record(axes)}."
+        f"{listed(axis.name for axis in axes)}: {reason}. {LOG_OUTPUTS if reason == UNLOGGED else how_to_record(axes)}."
         for (reason, _), axes in groups.items()
     ]
     return [*_next_tests(identification), *others]
+
+
+UNLOGGED = "no log has the commands of its thrusters"
+"""Why nothing is learnt about an axis whose thrusters have no output in the logs, although its motion may be there."""
+LOG_OUTPUTS = "Log the outputs to all thrusters: MAVLink 1 has eight, and a .BIN file has more"
+
+
+def is_unlogged(axis: Axis, layout: Layout, logs: Sequence[Log]) -> bool:
+    """Return True if no log has commands of any thruster along an axis: it has no output of them, or no pulse."""
+    drivers = {thruster.name for thruster in layout.thrusters_along(axis)}
+    silent = any(f.kind == "thrusters without pulse" and f.axis == axis.name for log in logs for f in log.findings)
+    told = [most for log in logs if log.commands for name, most in log.commands.largest.items() if name in drivers]
+    follows = any(log.follows_axis for log in logs)
+    return bool(drivers) and not follows and not any(told) and (silent or not told)
 
 
 def how_to_record(axes: Sequence[Axis]) -> str:
