@@ -291,12 +291,20 @@ LOG_OUTPUTS = "Log the outputs to all thrusters: MAVLink 1 has eight, and a .BIN
 
 
 def is_unlogged(axis: Axis, layout: Layout, logs: Sequence[Log]) -> bool:
-    """Return True if no log has commands of any thruster along an axis: it has no output of them, or no pulse."""
+    """Return True if no log has commands of any thruster along an axis, and lacks columns or pulses of them."""
     drivers = {thruster.name for thruster in layout.thrusters_along(axis)}
-    silent = any(f.kind == "thrusters without pulse" and f.axis == axis.name for log in logs for f in log.findings)
-    told = [most for log in logs if log.commands for name, most in log.commands.largest.items() if name in drivers]
-    follows = any(log.follows_axis for log in logs)
-    return bool(drivers) and not follows and not any(told) and (silent or not told)
+    titles = {f"{form}{name}" for name in drivers for form in ("", "u_")}
+    told = (most for log in logs if log.commands for name, most in log.commands.largest.items() if name in drivers)
+    return (
+        not any(log.follows_axis for log in logs)
+        and not any(told)
+        and any(
+            (f.kind == "thrusters without pulse" and f.axis == axis.name)
+            or (f.kind == "missing column" and str(f.words["column"]).partition(" [")[0] in titles)
+            for log in logs
+            for f in log.findings
+        )
+    )
 
 
 def how_to_record(axes: Sequence[Axis]) -> str:
