@@ -425,7 +425,9 @@ def test_a_study_tells_that_no_worker_is_there(monkeypatch: pytest.MonkeyPatch) 
     ended, told = Event(), list[Progress]()
     threads = iter([{"a": 1}, {}, {}])
     client = SimpleNamespace(nthreads=lambda: next(threads), dashboard_link=None)
-    runs = _Runs(*cast("Any", (client, None, SimpleNamespace(runs=9), None, deque(), Spent(runs=4))), told.append)
+    nothing = cast("Any", None)
+    design = cast("Any", SimpleNamespace(runs=9))
+    runs = _Runs(cast("Any", client), nothing, design, nothing, deque(), Spent(runs=4), told.append)
     runs.done_before = 0
     runs._watch(ended)  # until the client has no answer
     assert told == [Progress(4, 9, 0, "", has_workers=False)] * 2

@@ -271,9 +271,8 @@ def seldom(one: SampledLog, number: int) -> SampledLog:
     """The log of a logger that writes only some of its rows."""
     told, inputs = one.record.told[::number], one.record.inputs[::number]
     since = np.append(told[0], told[:-1])
-    rows = {"told": told, "since": since, "inputs": inputs}
-    records = {"record": replace(one.record, **rows), "thinned": replace(one.thinned, **rows)}
-    return replace(one, interval=number * one.interval, **records)
+    record, thinned = (replace(own, told=told, since=since, inputs=inputs) for own in (one.record, one.thinned))
+    return replace(one, interval=number * one.interval, record=record, thinned=thinned)
 
 
 @pytest.mark.parametrize("number", [1, 4])

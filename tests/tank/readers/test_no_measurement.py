@@ -184,7 +184,7 @@ NOTHING: dict[str, tuple[str, Array, str]] = {
         f"a voltage of {mark}": ("voltage [V]", np.full(N, mark), "because no measurement is below 1 V")
         for mark in (0.0, -1.0, 0.02)
     },
-    "a voltage of noise": ("voltage [mV]", np.round(np.abs(NOISE)), "because no measurement is below 1 V"),
+    "a voltage of noise": ("voltage [mV]", np.abs(np.round(NOISE, 1)), "because no measurement is below 1 V"),
     "a voltage of 0 and 65.535": ("voltage [V]", np.where(BURSTS, 65.535, 0.0), "because all numbers are 65.535 V"),
     "a voltage of 65535 mV": ("voltage [mV]", np.full(N, 65535.0), "because all numbers are 65.535 V"),
     "a voltage of 32767 V": ("voltage [V]", np.full(N, 32767.0), "because all numbers are 32767 V"),
