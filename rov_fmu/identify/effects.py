@@ -6,10 +6,11 @@ from math import inf, pi
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
-from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
+from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
 from rov_fmu.identify.likelihood.posterior import around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
@@ -30,10 +31,20 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         numbers = [p.number(one.ends(n)) for one in posteriors]
         numbers = [(np.exp(one) if kind.is_ratio else one).tolist() for one in numbers]
         posterior, value, interval = posteriors[0], numbers[0][0], hull(*((low, high) for _, low, high in numbers))
-        name = kind.words + (f" {p.part}" if p.part else "")
+        name = kind.words + (f" {p.part}" if p.part else "") + _beside_base(file.table, p)
         beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
         evidence, least = posterior.evidence(n), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
+
+
+def _beside_base(table: Table, p: Parameter) -> str:
+    """Return what a ratio of astern to ahead is relative to, in words, where the base itself has one."""
+    part = {**table.layout.by_name, **table.layout.curves_by_name}.get(p.of)
+    if not (part and p.of_kind.is_ratio):
+        return ""
+    names = ((part.coefficient(key), part.coefficient(key.removesuffix(REVERSE))) for key in p.of_kind.keys)
+    differs = any(table.base.get(astern) != table.base.get(ahead) for astern, ahead in names)
+    return ", as a multiple of that of the base" if differs else ""
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:

@@ -51,6 +51,8 @@ class Quantity:
     """Other headers of its column. They are recognised only together with one of its units."""
     minimum: float = -1e7
     maximum: float = 1e7
+    least: float = -inf
+    """What is below is no measurement, but what a sensor shows that is not connected."""
     wraps: bool = False
     """True for an angle that sensors wrap at a full turn."""
 
@@ -84,7 +86,7 @@ def _quantities() -> Iterator[Quantity]:
         )
     yield Quantity("distance", LENGTHS)
     yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
-    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4)
+    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0)
 
 
 QUANTITIES = {quantity.name: quantity for quantity in _quantities()}

@@ -48,6 +48,8 @@ _WARNINGS = {
         "{files}: {count:#value} of {columns} left out, because {what} is far from all others: a mark that nothing was "
         "measured"
     ),
+    "only mark": "{files}: {columns} left out, because all numbers are {what}: a mark that nothing was measured",
+    "below any": "{files}: {count:#value} of {columns} left out, because no measurement is below {what}",
     "missing column": (
         "{files}: there is no column of {column}. Its command is taken as 0. Add the column if this is wrong"
     ),

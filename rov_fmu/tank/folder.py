@@ -92,7 +92,7 @@ class Folder:
     @property
     def voltages(self) -> list[Array]:
         """The samples of the voltage of each log that has one, V."""
-        return [c.samples[1] for log in self.logs if (c := log.used("voltage")) and c.count]
+        return [c.samples[1] for log in self.logs if (c := log.used("voltage"))]
 
     def counts(self, kind: str, subject: str, command: float) -> bool:
         """Return True if a command in a table is inside the window of rov.toml."""

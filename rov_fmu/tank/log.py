@@ -181,5 +181,11 @@ class Log:
     """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
 
     def used(self, name: str) -> Channel | None:
-        """Return the channel that is used for a quantity, by the quantity's name, or None."""
-        return next((c for c in self.channels if c.quantity.name == name and not c.unused), None)
+        """Return the channel that is used for a quantity, by the quantity's name, or None if nothing measures it."""
+        return next((c for c in self.channels if c.quantity.name == name and not c.unused and c.count), None)
+
+    @property
+    def tilt(self) -> tuple[Channel, Channel] | None:
+        """The roll and the pitch, if the log has both. Where neither ever changes, nothing measures them."""
+        roll, pitch = self.used("roll angle"), self.used("pitch angle")
+        return (roll, pitch) if roll and pitch and any(np.ptp(one.samples[1]) for one in (roll, pitch)) else None

@@ -84,10 +84,12 @@ def test_bounds_of_every_quantity(name: str, tmp_path: Path) -> None:
         (quantity.minimum, quantity.minimum * 1.001 - 1.0),
         (quantity.maximum, quantity.maximum * 1.001),
     ):
-        rows = [f"time [s],u_t [%],{beside},{name} [{quantity.unit}]", *(f"{n},{n},{n},{{0}}" for n in range(9))]
-        path.write_text("\n".join(rows).format(limit), encoding="utf-8")
+        rows = [f"time [s],u_t [%],{beside},{name} [{quantity.unit}]", *(f"{n},{n},{n},{{{n % 2}}}" for n in range(9))]
+        path.write_text("\n".join(rows).format(limit, limit), encoding="utf-8")
         assert len(read_logs(path, VIDEORAY.layout, Names())) == 1
-        path.write_text("\n".join(rows).format(beyond), encoding="utf-8")
+        if limit < quantity.least:  # what is below is no measurement
+            continue
+        path.write_text("\n".join(rows).format(beyond, (1.0 + 1e-8) * beyond), encoding="utf-8")
         with pytest.raises(DataFileError, match=r"column .* as in 9 rows: must be within"):
             read_logs(path, VIDEORAY.layout, Names())
 

@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
@@ -35,6 +36,8 @@ _AHEAD = 3
 _GONE = (CancelledError, CommClosedError)
 """Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+_WATCH = 2.0
+"""The seconds after which it is asked again whether workers are there."""
 _WAIT = 10.0
 """The seconds within which a scheduler or a worker must answer."""
 
@@ -50,6 +53,8 @@ class Progress:
     """The number of runs that failed in this call."""
     dashboard: str
     """The address of Dask's page about its workers, or an empty text."""
+    has_workers: bool = True
+    """False while no worker is there, so that nothing is done."""
 
 
 @dataclass
@@ -123,7 +128,8 @@ class _Runs:
         """Do all missing runs."""
         self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
         self._report()
-        coming = as_completed(loop=self.client.loop)
+        coming, ended = as_completed(loop=self.client.loop), Event()
+        Thread(target=self._watch, args=(ended,), daemon=True).start()
         try:
             self._submit_tasks(coming)
             for future in coming:
@@ -131,6 +137,7 @@ class _Runs:
                 del future  # otherwise its rows stay in memory
                 self._submit_tasks(coming)
         finally:
+            ended.set()
             with suppress(Exception):  # a client that is closed raises
                 self.client.cancel(list(self.futures), force=True)
 
@@ -169,9 +176,16 @@ class _Runs:
         self.seconds = max(part.seconds / (end - first), 1e-6)
         self._report()
 
-    def _report(self) -> None:
-        link = self.client.dashboard_link
-        self.on_progress(Progress(self.done_before + self.spent.runs, self.design.runs, self.spent.failed, link or ""))
+    def _watch(self, ended: Event) -> None:
+        """Report again and again while no worker is there, until the runs end."""
+        with suppress(Exception):  # a client that is closed, or has lost its scheduler, raises
+            while not ended.wait(_WATCH):
+                if not self.client.nthreads() and not ended.is_set():
+                    self._report(has_workers=False)
+
+    def _report(self, *, has_workers: bool = True) -> None:
+        done, link = self.done_before + self.spent.runs, self.client.dashboard_link or ""
+        self.on_progress(Progress(done, self.design.runs, self.spent.failed, link, has_workers))
 
 
 @contextmanager

@@ -9,7 +9,11 @@ A mark is known by what it is to the other numbers, and no list of marks is need
 from all others than these lie from each other, so that a vehicle would have to jump there and back between two samples.
 The numbers of a sensor that saturates, rests or wraps are near others. A velocity of 0 is never a mark.
 
-Both rules apply to the numbers as they stand in the log, before a vector is rotated into another frame.
+If all numbers are the same, no others tell whether it is a mark. It is one if it is beyond the bounds of the quantity,
+and so is the largest or least integer of a type if it is no motion. What the catalogue says is below any measurement,
+such as a voltage of 0, is none either.
+
+All rules apply to the numbers as they stand in the log, before a vector is rotated into another frame.
 """
 
 import re
@@ -50,6 +54,9 @@ _FAR_FROM_FEW = 100.0
 """A mark among few other values is farther from them than this many times their range and their size."""
 _TURN = 2.1 * pi
 """The largest range of an angle that wraps, rad."""
+_EXTREMES = [sign * 2.0**bits - shift for bits in (15, 16, 31, 32) for sign, shift in ((1.0, 1.0), (-1.0, 0.0))]
+_DECIMALS = 4
+"""The largest and the least numbers of integers, of which fewer digits than this may be behind the decimal point."""
 _GAP_INTERVALS = 10.0
 """Between samples that are farther apart than this many usual intervals, a vehicle may move."""
 _VALID = {"valid", "validity", "invalid"}
@@ -141,10 +148,15 @@ def measured_only(
             column = topic.full_name(place)
             for flag in flags:
                 fields[place] = without(fields[place], flag.denies(topic, quantities), "invalid", flag.name, column)
+            quantity = QUANTITIES[quantities[0]]
+            factor, unit = in_degrees(quantity.unit)
             in_si = convert(fields[place])
-            for mark in marks(topic.time, in_si, QUANTITIES[quantities[0]]):
-                factor, unit = in_degrees(QUANTITIES[quantities[0]].unit)
-                fields[place] = without(fields[place], in_si == mark, "mark", f"{factor * mark:.6g} {unit}", column)
+            least = f"{factor * quantity.least:g} {unit}"
+            fields[place] = without(fields[place], in_si < quantity.least, "below any", least, column)
+            in_si = np.where(in_si < quantity.least, np.nan, in_si)
+            found = dict.fromkeys(marks(topic.time, in_si, quantity), "mark")
+            for mark, kind in (found or dict.fromkeys(only_mark(in_si, quantity), "only mark")).items():
+                fields[place] = without(fields[place], in_si == mark, kind, f"{factor * mark:.6g} {unit}", column)
         kept.append(replace(topic, fields=fields))
     findings = [
         about(file, kind, what=what, columns=listed(counts), count=sum(counts.values()))
@@ -206,6 +218,18 @@ def marks(time: Array, values: Array, quantity: Quantity) -> list[float]:
         found += levels[marked].tolist()
         levels, counts = np.delete(levels, marked), np.delete(counts, marked)
     return found
+
+
+def only_mark(values: Array, quantity: Quantity) -> list[float]:
+    """Return the number of values in SI units that are all the same, if it marks that nothing was measured."""
+    levels, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(levels) != 1 or counts[0] < 2:
+        return []
+    level = float(levels[0])
+    is_beyond = not quantity.minimum <= level <= quantity.maximum
+    integers = level * 10.0 ** np.arange(_DECIMALS)
+    is_extreme = quantity.axis is None and bool(np.isclose(integers[:, None], _EXTREMES, rtol=1e-9, atol=0.0).any())
+    return [level] if is_beyond or is_extreme else []
 
 
 def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:

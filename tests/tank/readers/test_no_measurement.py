@@ -183,6 +183,51 @@ def test_a_mark_is_told_with_its_columns_and_its_value(tmp_path: Path) -> None:
     assert measured(log, "sway velocity") == pytest.approx(-SPEED[~BURSTS])
 
 
+NOTHING: dict[str, tuple[str, Array, str]] = {
+    **{
+        f"a voltage of {mark}": ("voltage [V]", np.full(N, mark), "because no measurement is below 1 V")
+        for mark in (0.0, -1.0, 0.02)
+    },
+    "a voltage of noise": ("voltage [mV]", np.abs(np.round(NOISE, 1)), "because no measurement is below 1 V"),
+    "a voltage of 0 and 65.535": ("voltage [V]", np.where(BURSTS, 65.535, 0.0), "because all numbers are 65.535 V"),
+    "a voltage of 65535 mV": ("voltage [mV]", np.full(N, 65535.0), "because all numbers are 65.535 V"),
+    "a voltage of 32767 V": ("voltage [V]", np.full(N, 32767.0), "because all numbers are 32767 V"),
+    "a velocity of 65535": ("surge velocity [m/s]", np.full(N, 65535.0), "because all numbers are 65535 m/s"),
+    "a turn rate of -32768": ("yaw velocity [deg/s]", np.full(N, -6e4), "because all numbers are -60000 deg/s"),
+    "a pressure of -1": ("pressure [hPa]", np.full(N, -1.0), "because all numbers are -100 Pa"),
+    "no number": ("voltage [V]", np.full(N, np.nan), ""),
+}
+"""Columns that hold nothing but their mark of no measurement, with what is told."""
+
+
+@pytest.mark.parametrize("name", NOTHING)
+def test_a_column_of_nothing_but_a_mark_measures_nothing(name: str, tmp_path: Path) -> None:
+    title, values, words = NOTHING[name]
+    log = read(table(tmp_path / "dive.csv", f"time [s],u_5 [1],depth [m],{title}", TIME, STEPS, DEPTH, values))
+    assert not log.used(title.partition(" [")[0])
+    assert measured(log, "depth") == pytest.approx(DEPTH)
+    assert words in " ".join(told(log))
+    assert bool(told(log)) == bool(words)
+
+
+@pytest.mark.parametrize(
+    ("title", "value"), [("voltage [V]", 14.8), ("heave velocity [m/s]", 0.0), ("heading [deg]", 0)]
+)
+def test_a_number_that_never_changes_may_be_measured(title: str, value: float, tmp_path: Path) -> None:
+    log = read(
+        table(tmp_path / "dive.csv", f"time [s],u_5 [1],depth [m],{title}", TIME, STEPS, DEPTH, 0 * TIME + value)
+    )
+    assert log.used(title.partition(" [")[0])
+    assert not told(log)
+
+
+@pytest.mark.parametrize("rock", [0.0, 1.0])
+def test_roll_and_pitch_that_never_change_are_not_measured(rock: float, tmp_path: Path) -> None:
+    titles = "time [s],u_5 [1],depth [m],roll angle [deg],pitch angle [deg]"
+    log = read(table(tmp_path / "dive.csv", titles, TIME, STEPS, DEPTH, 0.0 * TIME, rock * NOISE))
+    assert bool(log.tilt) == bool(rock)
+
+
 def test_a_mark_may_be_beyond_the_bounds_of_a_quantity_and_other_numbers_may_not(tmp_path: Path) -> None:
     path, titles = tmp_path / "dive.csv", "time [s],u_5 [1],depth [m],surge velocity [m/s]"
     log = read(table(path, titles, TIME, STEPS, DEPTH, np.where(BURSTS, -9999.0, SPEED)))
