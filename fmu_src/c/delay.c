@@ -89,8 +89,8 @@ static void delay_receive(delay_line *line, double at[], double t)
     }
 }
 
-/* Compute the states after h > 0 seconds from time t. Return the number of pieces, 0 when more than MOST_PIECES would
- * be needed, or -1 when too many changes are waiting. If the states are usable, delay_commit must follow. */
+/* Compute the states after h > 0 seconds from time t. Return the number of pieces, 0 when too many would be needed,
+ * or -1 when too many changes are waiting. If the states are usable, delay_commit must follow. */
 static int delayed_step(const double at[], const model_numbers *n, const delay_line *line, double t, double h,
                         double next[N_STATES], double *heading)
 {
@@ -113,10 +113,10 @@ static int delayed_step(const double at[], const model_numbers *n, const delay_l
             memcpy(now + FIRST_DELAYED, arrived < kept ? line->commands[arrived] : at, sizeof line->commands[0]);
         }
         const int more = motion_step(now, n, until - passed, next, heading);
-        if (more == 0) {
+        pieces += more;
+        if (more == 0 || pieces > MOST_PIECES) {
             return 0;
         }
-        pieces += more;
         passed = until;
         memcpy(now + FIRST_STATE, next, N_STATES * sizeof now[0]);
     }

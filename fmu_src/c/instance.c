@@ -626,8 +626,8 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
     *cuts += pieces - 1;
     if (pieces == 0 || *cuts >= MOST_PIECES) {
         f->now.mode = FAILED;
-        FAIL(f, "the motion over %g s from t = %g takes more than MOST_PIECES = %d pieces; take shorter steps. The state from "
-             "before is kept.", h, t, (int)MOST_PIECES);
+        FAIL(f, "the motion over %g s from t = %g takes too many pieces: it is too fast, or the step is too long. The state "
+             "from before is kept.", h, t);
     }
     if (!all_finite(next, N_STATES)) {
         f->now.mode = FAILED;

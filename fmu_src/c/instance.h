@@ -1,8 +1,8 @@
 /* An instance of the FMU, its log, and the checks at the beginning of every FMI function, for all versions of FMI.
  *
  * A call that is refused changes nothing. It is refused when it is illegal in the mode, or when an argument or a value is
- * wrong. A step that cannot be computed puts the instance into error mode: its result overflows, or it takes more than
- * MOST_PIECES pieces. The instance then keeps the state from before the step, or from the last intermediate update. */
+ * wrong. A step that cannot be computed puts the instance into error mode: its result overflows, or it takes too many
+ * pieces. The instance then keeps the state from before the step, or from the last intermediate update. */
 #include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>

@@ -6,6 +6,12 @@
 
 #include <math.h>
 
+/* Such options drop the checks for NaN and infinity, and the rounding errors that the step keeps. */
+#if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__) || defined __ASSOCIATIVE_MATH__ || \
+    defined __RECIPROCAL_MATH__ || defined _M_FP_FAST
+#error "compile without -ffast-math, -Ofast and /fp:fast: -O2, or with icx -fp-model=precise"
+#endif
+
 #ifndef LANES
 #define LANES 1
 typedef double real;

@@ -13,8 +13,11 @@
  */
 
 #ifndef MOST_PIECES
-#define MOST_PIECES 1000000 /* of a step. A vehicle that swings without linear drag never settles, and each swing takes a few pieces. */
+#define MOST_PIECES 100000 /* of a step. A vehicle that swings without linear drag never settles, and each swing takes a few pieces. */
 #endif
+/* Of these, a step may take so many at once, and the others as time passes: evenly over the step, or over a second. With absurd
+ * loads and velocities, time hardly passes, and the step is refused soon. */
+#define MOST_AT_ONCE 1000
 
 typedef struct {
     model_held q;
@@ -406,7 +409,7 @@ static bool motion_coasts(motion *m)
 }
 
 /* Compute the states after h > 0 seconds with the inputs held. They are finite unless a result overflows. Return the
- * number of pieces, or 0 when more than MOST_PIECES would be needed. */
+ * number of pieces, or 0 when too many would be needed. */
 static int motion_step(const double at[], const model_numbers *n, double h, double next[N_STATES], double *heading)
 {
     double change[N_SERIES];
@@ -414,7 +417,11 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
     motion m;
     series s;
     motion_start(&m, at, n, h, *heading);
-    while (++pieces <= MOST_PIECES && m.unit > 0.0) {
+    const double per_second = MOST_PIECES / fmax(h, 1.0);
+    while (m.unit > 0.0) {
+        if (++pieces > MOST_AT_ONCE + per_second * m.done) {
+            return 0;
+        }
         motion_measure(&m);
         motion_begin(&m, motion_unit(&m), &s);
         double reach = 1.0;
@@ -462,7 +469,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         return pieces;
     }
     model_finish(m.state, &m.q, m.y, m.displacement, next);
-    return pieces <= MOST_PIECES ? pieces : 0;
+    return pieces;
 }
 
 #if HAS_DEAD_TIME

@@ -80,6 +80,7 @@ typedef struct {
     const int *sensor;           /* of each sample */
     const int *kind, *place;     /* of each sensor: STATE, OVER_GROUND or ANGLE, and the variable or the number of the axis */
     const double *since, *told;  /* of each row of inputs: the change happens after `since`, and is told at `told` */
+    const int *anew;             /* of each row: 0 if it goes on with the change of the row before, which decides about its time */
     const double *start, *error; /* the states at the first sample, and their standard deviations; N_X numbers each */
     const int *active;           /* for each state, whether it has a covariance; N_X numbers */
     ptrdiff_t tilts;             /* the times at which the roll and pitch of a vehicle that has neither state are known, or 0 */
@@ -867,7 +868,7 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         for (ptrdiff_t j = row + 1; j < f->log->rows && ANY(begins(f, j) < end); j++) {
             const real growth = spread(f, j, end) - spread(f, j, begin);
             const mask begins_anew = begins(f, j) < end && reset < (double)j;
-            if (ANY(begins_anew)) {
+            if (f->log->anew[j] != 0 && ANY(begins_anew)) {
                 reset = begins_anew ? (double)j : reset;
                 d.newest = begins_anew ? (double)(1 + piece % TOGETHER) : d.newest;
                 d.count = 2 + piece % TOGETHER;
@@ -898,7 +899,7 @@ static void pass_rows(filter *f, double time)
         f->row++;
     }
     for (ptrdiff_t j = f->row > 0 ? f->row : 1; j < log->rows && ANY(begins(f, j) < time); j++) {
-        f->reset = begins(f, j) < time ? fmax(f->reset, (double)j) : f->reset;
+        f->reset = begins(f, j) < time && f->log->anew[j] != 0 ? fmax(f->reset, (double)j) : f->reset;
     }
 }
 
@@ -995,7 +996,7 @@ static int pieces_over(const filter *f, double from, double to)
         }
     }
     for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
-        if (ends(f, j) > from - MARGIN) {
+        if (ends(f, j) > from - MARGIN && f->log->anew[j] != 0) {
             fastest = fmax(fastest, 1.0 / f->log->changing);
         }
     }

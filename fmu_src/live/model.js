@@ -21,12 +21,18 @@
  * @typedef {{name: string, also: string[], kind: string, gains: Record<string, number>, shares: Record<string, number>}} CommandColumn
  */
 /**
- * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the patterns of a number and of a cell of a row; the
- * number of lines among which the header is; the units of times and commands, and how many of each make 1 s or full command; the pulses;
+ * The rules by which times of day are read, from rov_fmu/tank/readers/times_of_day.py: the pattern of one, and of what is between it and a
+ * date; the forms of dates; the number of first rows that tell which columns are these; and the words in their headers.
+ * @typedef {{pattern: string, between: string, days: string[], firstRows: number, titles: string[], dates: string[]}} ClockRules
+ */
+/**
+ * The rules by which tables are read, from rov_fmu/tank/readers/tables.py: the patterns of a number, of a cell of a row, of a number
+ * with a comma in quotes, and of one whose comma may separate thousands; the number of lines among which the header is; the units of times and commands, and how many of each make 1 s or full command; the pulses;
  * the units of forces; other names of headers; units of commands with the largest number that shows a slip and what is wrong then; the
  * largest share of rows out of order; the time after which a command begins late, s; what shows that a clock began anew; the samples that a
  * preferred quantity has at least; and the pressures, in Pa, by which a barometer inside the hull and another unit are recognised.
- * @typedef {{number: string, value: string, mostBefore: number, times: Record<string, number>, fractions: Record<string, number>,
+ * @typedef {{number: string, value: string, quoted: string, thousands: string, mostBefore: number,
+ *   times: Record<string, number>, clock: ClockRules, fractions: Record<string, number>,
  *   pulses: {units: string[], neutral: number, span: number, none: number[]}, forces: string[],
  *   renamed: Record<string, string>,
  *   slips: [string[], number, string][], mostUnordered: number, late: number, leastAfter: number, again: number, leastSamples: number,

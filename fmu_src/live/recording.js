@@ -32,22 +32,24 @@ function readRecording(text, name, vehicle) {
   if (lines.length > MOST_ROWS) throw new Unreadable(`it has more than ${MOST_ROWS} rows`);
   if (headers.length < 2) throw new Unreadable("its first line is no header of columns");
   const pattern = new RegExp(`^(?:${rules.number})$`);
+  const hasCommas = separator !== "," || lines.some((line) => hasDecimalComma(line, rules));
   /** @param {string} cell */
   const number = (cell) => {
-    const plain = pointed(cell, separator);
+    const plain = hasCommas ? pointed(cell) : cell;
     return pattern.test(plain) ? Number(plain) : Number.NaN;
   };
-  const columns = headers.map((header) => columnOf(header, name, vehicle));
-  const time = columns.findIndex((column) => column?.isTime);
-  if (time < 0) throw new Unreadable(`it has no column “time [s]”; ${RENAMING}`);
-  const commanding = columns.flatMap((column, place) => (column?.command ? [{ place, ...column.command }] : []));
-  if (commanding.length === 0) {
-    throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
-  }
   const below = lines
     .slice(begin + 1)
     .map((line) => cellsOf(line, separator))
     .filter((cells) => cells.slice(headers.length).every((cell) => cell === ""));
+  const columns = headers.map((header) => columnOf(header, name, vehicle));
+  const { time, date } = timeColumns(headers, below, columns, rules.clock);
+  if (time < 0) throw new Unreadable(`it has no column “time [s]”; ${RENAMING}`);
+  columns[time] ??= { ...NO_COLUMN, unit: "s", isTime: true, convert: (x) => x };
+  const commanding = columns.flatMap((column, place) => (column?.command ? [{ place, ...column.command }] : []));
+  if (commanding.length === 0) {
+    throw new Unreadable(`it has no column of a command, such as “${vehicle.commands[0]} [%]”; ${RENAMING}`);
+  }
   for (const [units, most, mistake] of rules.slips) {
     const own = commanding.filter(({ place }) => units.map(folded).includes(columns[place]?.unit ?? ""));
     const largest = below.reduce((sum, cells) => {
@@ -56,11 +58,15 @@ function readRecording(text, name, vehicle) {
     }, 0);
     if (largest > 0 && largest <= most) throw new Unreadable(mistake);
   }
-  const usable = below
-    .map((cells) =>
-      columns.map((column, n) => (column ? inUnits(column, number(cells[n] ?? ""), cells[n]) : Number.NaN)),
-    )
-    .filter((row) => Number.isFinite(row[time]));
+  const read = below.map((cells) =>
+    columns.map((column, n) => (column ? inUnits(column, number(cells[n] ?? ""), cells[n]) : Number.NaN)),
+  );
+  const isOfDay = below.filter((cells, n) => cells[time] && !Number.isFinite(read[n][time])).length > below.length / 2;
+  if (isOfDay)
+    timesOfDay(below, time, date, rules.clock).forEach((one, n) => {
+      read[n][time] = one;
+    });
+  const usable = read.filter((row) => Number.isFinite(row[time]));
   const timed = usable.filter((row) => commanding.some(({ place }) => Number.isFinite(row[place])));
   if (timed.length < 2) throw new Unreadable("no two of its rows have a time and a command");
   const places = columns.flatMap((column, n) => (column && n !== time ? [n] : []));
@@ -263,14 +269,20 @@ function isRow(cells, value) {
 
 /** Returns the cells of a line, without empty ones at its end. @param {string} line @param {string} separator */
 function filledCells(line, separator) {
-  const cells = cellsOf(line, separator).map((cell) => pointed(cell, separator));
+  const cells = cellsOf(line, separator).map(pointed);
   while (cells[cells.length - 1] === "") cells.pop();
   return cells;
 }
 
-/** Returns a number with a decimal point, unless commas separate the cells. @param {string} cell @param {string} separator */
-function pointed(cell, separator) {
-  return separator === "," || !/^[-+.,\deE]+$/.test(cell) ? cell : cell.replace(",", ".");
+/** Returns a number with a decimal point. @param {string} cell */
+function pointed(cell) {
+  return /^[-+.,\deE]+$/.test(cell) ? cell.replace(",", ".") : cell;
+}
+
+/** Returns whether a line has a number in quotes whose comma separates no thousands. @param {string} line @param {Rules} rules */
+function hasDecimalComma(line, { quoted, thousands }) {
+  const numbers = [...line.matchAll(new RegExp(quoted, "g"))].map((match) => match[1]);
+  return numbers.some((number) => !new RegExp(`^(?:${thousands})$`).test(number));
 }
 
 /** @param {string} text @param {string} mark */
@@ -294,6 +306,165 @@ function cellsOf(line, separator) {
  * @param {string} cell */
 function inUnits(column, number, cell) {
   return Number.isNaN(number) && column.isTime ? seconds(cell ?? "") : column.convert(number);
+}
+
+/** @param {ClockRules} rules */
+function clockPattern({ pattern }) {
+  return new RegExp(pattern, "i");
+}
+
+/** Returns a text without a time of day: the date, or nothing. @param {string} text @param {ClockRules} rules */
+function dateIn(text, rules) {
+  const rest = text.replace(new RegExp(rules.pattern, "gi"), " ").trim().replace(/\s+/g, " ");
+  return rest.replace(new RegExp(rules.between, "g"), "");
+}
+
+/** Returns the places of the time and of the date of times of day, or -1. It must equal `time_columns` of
+ * rov_fmu/tank/readers/times_of_day.py. @param {string[]} headers @param {string[][]} rows @param {(Column | null)[]} columns
+ * @param {ClockRules} rules */
+function timeColumns(headers, rows, columns, rules) {
+  const cells = headers.map((_, n) => rows.slice(0, rules.firstRows - 1).find((row) => row[n])?.[n] ?? "");
+  const words = headers.map(wordsIn);
+  /** @param {number} n @param {string[]} known */
+  const has = (n, known) =>
+    words[n].some((word) => known.some((one) => word === one || (one.length > 4 && word.endsWith(one))));
+  const places = headers.map((_, n) => n);
+  const times = places.filter((n) => clockPattern(rules).test(cells[n]) && has(n, rules.titles));
+  const told = columns.findIndex((column) => column?.isTime);
+  const time =
+    told >= 0
+      ? told
+      : (times.find((n) => words[n].length === 1 && /^(time|zeit)$/.test(words[n][0])) ?? times[0] ?? -1);
+  const dates = places.filter((n) => n !== time && has(n, rules.dates));
+  const named = dates.find((n) => headers[n].trim().toLowerCase() === "date");
+  return {
+    time,
+    date: named ?? dates.find((n) => rules.days.some((form) => dayOf(dateIn(cells[n], rules), form) !== null)) ?? -1,
+  };
+}
+
+/** Returns the words of a header in small letters, without accents. @param {string} header */
+function wordsIn(header) {
+  const plain = header
+    .normalize("NFKD")
+    .replace(/\p{M}/gu, "")
+    .replace(/([a-z])(?=[A-Z])/g, "$1 ");
+  return plain.toLowerCase().match(/\p{L}+|\d+/gu) ?? [];
+}
+
+const MONTHS = "january february march april may june july august september october november december".split(" ");
+const DATE_PARTS = /** @type {Record<string, string>} */ ({
+  Y: "(?<Y>\\d{4})",
+  y: "(?<y>\\d\\d)",
+  m: "(?<m>\\d\\d?)",
+  d: "(?<d>\\d\\d?)",
+});
+
+/** Returns the number of days since 1970 of a date, or null for one in another form. @param {string} text @param {string} form */
+function dayOf(text, form) {
+  const pattern = form.replace(/[.]/g, "\\.").replace(/%(.)/g, (_, part) => DATE_PARTS[part] ?? "(?<b>[a-z]+)");
+  const found = new RegExp(`^${pattern}$`, "i").exec(text)?.groups;
+  if (!found) return null;
+  const word = found.b?.toLowerCase();
+  const month = word ? MONTHS.findIndex((one) => one === word || one.slice(0, 3) === word) : Number(found.m) - 1;
+  const year = Number(found.Y ?? found.y) + (found.Y ? 0 : Number(found.y) > 68 ? 1900 : 2000);
+  const date = new Date(Date.UTC(year, month, Number(found.d)));
+  return date.getUTCMonth() === month && date.getUTCDate() === Number(found.d) ? date.getTime() / 864e5 : null;
+}
+
+/** Returns the days since 1970 of dates, NaN for other texts, or null without any. It must equal `_days` of
+ * rov_fmu/tank/readers/times_of_day.py. @param {string[]} texts @param {ClockRules} rules */
+function daysOf(texts, rules) {
+  const distinct = [...new Set(texts.filter((text) => text))];
+  const read = rules.days.map((form) => {
+    const days = new Map(distinct.map((text) => [text, dayOf(text, form)]));
+    const known = [...days.values()].filter((day) => day !== null);
+    return { days, count: known.length, span: Math.max(...known) - Math.min(...known) };
+  });
+  const most = Math.max(...read.map(({ count }) => count));
+  if (most === 0) return null;
+  const possible = read.filter(({ count }) => count === most);
+  const span = Math.min(...possible.map((one) => one.span));
+  const [first, ...others] = possible
+    .filter((one) => one.span === span)
+    .map(({ days }) => texts.map((text) => days.get(text) ?? Number.NaN));
+  const start = first.find(Number.isFinite) ?? 0;
+  const row = first.indexOf(start);
+  if (others.some((days) => days.some((day, n) => day - days[row] !== first[n] - start && Number.isFinite(day)))) {
+    throw new Unreadable("its dates may begin with the day or with the month");
+  }
+  return others.some((days) => days[row] !== start) ? first.map((day) => day - start) : first;
+}
+
+/** Returns the times of rows with times of day, s, or NaN. It must equal `times_of_day` of rov_fmu/tank/readers/times_of_day.py, which
+ * says why. @param {string[][]} rows @param {number} time @param {number} date @param {ClockRules} rules */
+function timesOfDay(rows, time, date, rules) {
+  const texts = rows.map((cells) => cells[time] ?? "");
+  const inside = texts.map((text) => dateIn(text, rules));
+  const own = daysOf(
+    inside.map((text, n) => (clockPattern(rules).test(texts[n]) ? text : "")),
+    rules,
+  );
+  const days =
+    own ??
+    daysOf(
+      rows.map((cells) => dateIn(cells[date] ?? "", rules)),
+      rules,
+    );
+  const parts = texts.flatMap((text, row) => {
+    const found = clockPattern(rules).exec(text);
+    if (!found || (days ? !Number.isFinite(days[row]) : false) || (!own && inside[row])) return [];
+    const others = found[2].slice(1).split(":").map(Number);
+    const decimals = found[3] ? Number(`0.${found[3].slice(1)}`) : 0;
+    const after = (others.length > 1 ? 60 * others[0] + others[1] : others[0]) + decimals;
+    return [
+      {
+        row,
+        first: Number(found[1]),
+        after,
+        isLong: others.length > 1,
+        hasDecimals: !!found[3],
+        half: found[4]?.toLowerCase(),
+      },
+    ];
+  });
+  const short = parts.filter(({ isLong }) => !isLong);
+  const hasHalf = parts.some(({ half }) => half);
+  const isMinutes =
+    short.length > 0 && (parts.some((one) => one.isLong || one.hasDecimals) || short.some(({ first }) => first >= 24));
+  if (short.length > 0 && !isMinutes && !hasHalf && !days) {
+    throw new Unreadable("its times may be hours and minutes, or minutes and seconds");
+  }
+  const clock = parts.map(({ first, after, isLong, half }) => {
+    const unit = !isLong && isMinutes ? 60 : 3600;
+    return unit * (half ? (first % 12) + (half === "p" ? 12 : 0) : first) + (isLong ? 1 : unit / 60) * after;
+  });
+  const firsts = parts.map(({ first }) => first);
+  const most = Math.max(...firsts);
+  const isOf12 =
+    !hasHalf &&
+    Math.min(...firsts) >= 1 &&
+    most <= 12 &&
+    firsts.some((one, n) => n && one === 1 && firsts[n - 1] === 12);
+  const isHour = isMinutes && short.length === parts.length;
+  const period = isHour ? (most < 60 ? 3600 : Infinity) : isOf12 ? 43200 : most < 24 ? 86400 : Infinity;
+  let turns = 0;
+  const goesOn = clock.map((one, n) => {
+    if (period === Infinity) return one;
+    if (n) turns -= Math.round(((one % period) - (clock[n - 1] % period)) / period);
+    return (one % period) + period * turns;
+  });
+  const dayOfRow = parts.map(({ row }) => days?.[row] ?? 0);
+  const isApart = clock.some((one, n) => {
+    const [later, on] = n ? [dayOfRow[n] - dayOfRow[n - 1], one - clock[n - 1]] : [0, 0];
+    return later === 0 ? on < -43200 : on >= 0 && on < 60;
+  });
+  const isDated = days && period === 86400 && !isApart;
+  const times = rows.map(() => Number.NaN);
+  for (const [n, { row }] of parts.entries()) {
+    times[row] = isDated ? 86400 * dayOfRow[n] + clock[n] : 86400 * (dayOfRow[0] ?? 0) + goesOn[n];
+  }
+  return times;
 }
 
 /** Returns the time since 1970 of a text by ISO 8601, s, or NaN; UTC if it names no offset. @param {string} text */
@@ -337,6 +508,8 @@ function restarts(times, rules) {
  * @typedef {{unit: string, isTime: boolean, command: CommandColumn | null, quantity: Quantity | null, axis: number, rank: number,
  *   convert: (x: number) => number}} Column */
 
+const NO_COLUMN = { unit: "", isTime: false, command: null, quantity: null, axis: -1, rank: 0 };
+
 /** Returns the kind of a column by its header, or null for a column that is not used.
  * @param {string} header @param {string} file @param {Vehicle} vehicle @returns {Column | null} */
 function columnOf(header, file, vehicle) {
@@ -348,7 +521,7 @@ function columnOf(header, file, vehicle) {
   const parts = /^(.*?)\s*\[(.*)\]$/.exec(plain);
   if (!parts) return null;
   const [title, unit] = [parts[1].trim().toLowerCase().replace(/\s+/g, " "), folded(parts[2].trim())];
-  const none = { unit, isTime: false, command: null, quantity: null, axis: -1, rank: 0 };
+  const none = { ...NO_COLUMN, unit };
   if (title === "time") {
     const convert = converter(header, vehicle.csv.times, unit, false);
     return convert && { ...none, isTime: true, convert };

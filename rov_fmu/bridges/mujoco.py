@@ -148,7 +148,10 @@ def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, obj
 def _notes(vehicle: Vehicle) -> list[str]:
     """Return what is different in MuJoCo, without full stops."""
     layout = vehicle.layout
-    notes = ["Steps of `implicit` or `Euler` are taken; `RK4` is not", "The water has no surface"]
+    notes = [
+        "Steps of `Euler`, `implicit` or `implicitfast` are taken; with `RK4`, those of `Euler`",
+        "The water has no surface",
+    ]
     if lacking := [name for name in AXES if name not in layout.by_name]:
         notes.append(
             f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "

@@ -29,6 +29,8 @@ from rov_fmu.equation.python.step import DelayLine
 _FLIP = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """The signs of the components in MuJoCo's frames, relative to those in the equation's."""
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_IMPLICIT = int(mujoco.mjtIntegrator.mjINT_IMPLICIT), int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
+"""The integrators that treat gyroscopic forces as implicit."""
 _HEAVY = 1e6
 """The mass along, or the inertia about, an axis that the vehicle lacks, relative to that of the rigid body."""
 _REST = 0.1
@@ -195,10 +197,15 @@ class Rov:
         self._entries = model.M_rowadr[dof + self._lower[0]] + self._lower[1]
         self._rigid = _rigid_mass(model, self.body)
         self._turning = self._rigid[:, 3:]
+        # implicitfast treats gyroscopic forces as implicit if the free joint moves the whole tree of bodies
+        self._implicit = _IMPLICIT if model.tree_dofnum[model.dof_treeid[dof]] == len(_FLIP) else _IMPLICIT[:1]
         self.reset()
 
     def reset(self) -> None:
-        """Stop the thrusters and forget the commands that wait for the dead time, as `step` does if time went back."""
+        """Stop the thrusters and forget the commands that wait for the dead time.
+
+        `step` does this when the time is not that at the end of the last step, as after a reset of MuJoCo.
+        """
         self.water.reset()
         self._time, self._outside = self.data.time, np.zeros(6)
         self._weighed: dict[str, float] = {}
@@ -221,9 +228,8 @@ class Rov:
     def add_mass(self) -> None:
         """Add to MuJoCo's inertia matrix what the mass matrix of the vehicle has beyond that of the rigid body."""
         data = self.data
-        if data.time < self._time:
+        if data.time != self._time:
             self.reset()
-        self._time = data.time
         if self._weighed != self.coefficients:
             self._weighed = dict(self.coefficients)
             self._mass = np.outer(_FLIP, _FLIP) * self.water.mass()
@@ -245,30 +251,42 @@ class Rov:
         outside = (_FLIP * self._outside).tolist()
         mean = self.water.accelerate(held, state, outside, data.time, self.model.opt.timestep)
         self._accelerated = _FLIP * np.array(mean)
-        # qfrc_bias, which MuJoCo subtracts, has the same of the rigid body: m omega x (omega x r_G) and omega x I omega
-        turning = self._turning @ velocity[3:]
         data.qfrc_passive[self._dofs] += self._turn.T @ (
-            self._mass @ (self._turn @ self._accelerated) + np.array(_crossed(velocity[3:].tolist(), turning.tolist()))
+            self._mass @ (self._turn @ self._accelerated) + self._subtracted(velocity[3:])
         )
+
+    def _subtracted(self, rates: Any) -> Any:
+        """Return the rigid body's part of what MuJoCo subtracts: m omega x (omega x r_G) and omega x I omega.
+
+        Integrators that treat it as implicit subtract its value at the end of the step, linearised about the start.
+        """
+        turning = self._turning @ rates
+        subtracted = _crossed(rates, turning)
+        if self.model.opt.integrator in self._implicit:
+            change = self.model.opt.timestep * (self._accelerated + self._outside)[3:]
+            subtracted += _crossed(change, turning) + _crossed(rates, self._turning @ change)
+        return subtracted
 
     def move(self) -> None:
         """Move the body with its mean velocity during the step, where MuJoCo took the last one."""
         data, h = self.data, self.model.opt.timestep
         if data.time <= self._time:  # MuJoCo has reset a simulation that became unstable
+            self.reset()
             return
+        self._time = data.time
         pose, velocity = self._start
         mean = 0.5 * (velocity + data.qvel[self._dofs])
         pose[:3] += h * mean[:3]
         mujoco.mju_quatIntegrate(pose[3:], mean[3:], h)
         data.qpos[self._pose] = pose
-        self._outside = data.qacc[self._dofs] - self._accelerated
+        self._outside = (data.qvel[self._dofs] - velocity) / h - self._accelerated
 
 
 def step(*rovs: Rov) -> None:
     """Move the simulation of some vehicles, which share a model and its data, by one time step.
 
-    This is MuJoCo's own step (`mj_step1`, `mj_step2`) by its integrator Euler or implicit. Raises ValueError when more
-    commands wait for the dead time than a vehicle can keep.
+    This is MuJoCo's own step (`mj_step1`, `mj_step2`) by its integrator Euler, implicit or implicitfast. Raises
+    ValueError when more commands wait for the dead time than a vehicle can keep.
     """
     model, data = rovs[0].model, rovs[0].data
     mujoco.mj_step1(model, data)
@@ -309,11 +327,11 @@ def _rigid_mass(model: Any, body: int) -> Any:
     return np.block([[mass * np.eye(3), -mass * cross], [mass * cross, about_centre - mass * cross @ cross]])
 
 
-def _crossed(omega: list[float], other: list[float]) -> list[float]:
+def _crossed(omega: Any, other: Any) -> Any:
     """Return the cross products of the rates with two vectors, one after the other."""
-    p, q, r = omega
-    a, b, c, d, e, f = other
-    return [q * c - r * b, r * a - p * c, p * b - q * a, q * f - r * e, r * d - p * f, p * e - q * d]
+    p, q, r = omega.tolist()
+    a, b, c, d, e, f = other.tolist()
+    return np.array([q * c - r * b, r * a - p * c, p * b - q * a, q * f - r * e, r * d - p * f, p * e - q * d])
 
 
 # ---- The exported folder ---------------------------------------------------------------------------------------------

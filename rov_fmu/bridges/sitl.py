@@ -2,6 +2,7 @@
 
 import os
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -39,7 +40,7 @@ _OTHERS = (
     f"followed when the old one has been silent for {_SILENCE:g} s"
 )
 _LATE = 1.0
-"""The time of the simulation after which it is said that the servos do not fit, s."""
+"""The time of the simulation for which servos must not fit before it is said, s."""
 MOST_LOGS = 20
 """The largest number of logs of one run."""
 MOST_ROWS = 1_000_000
@@ -141,36 +142,47 @@ class Log:
 
 
 class Outputs:
-    """Which servos have pulses: those that the vehicle needs, and those that follow them and move."""
+    """Which servos have pulses: those that the vehicle needs, and those that follow them and move.
+
+    ArduSub sends 1500 µs to servos 1 to 8 while it starts, for 1.8 s. Then those without a function have no pulse, and
+    others have their own pulse at rest.
+    """
 
     def __init__(self, servos: Servos, motors: int) -> None:
         """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones."""
         self._drives = {number: name for name, (number, _) in servos.items()}
         self._last = max([*self._drives, motors])
-        self._silent = {*self._drives}
-        self._moving: set[int] = set()
-        self._first: dict[int, int] = {}
-        """The first pulse of each servo after those of the vehicle, µs."""
-        self._time = self._moving_time = 0.0
-        """The times since a servo of the vehicle had a pulse, and since another one moved, s."""
+        self._silences = dict.fromkeys(self._drives, 0.0)
+        """For each servo of the vehicle, the time since its last pulse during which another servo had one, s."""
+        self._pulses: dict[int, int] = {}
+        """The last pulse of each servo after those of the vehicle, µs."""
+        self._changes: Counter[int] = Counter()
+        """How often these pulses have changed."""
+        self._moving_time = 0.0
+        """The time since one of these servos moved, s."""
 
     def add(self, h: float, pulses: tuple[int, ...]) -> None:
         """Add a step of h seconds."""
-        self._silent -= {number for number in self._silent if pulses[number - 1] not in NO_OUTPUT}
-        for number in range(self._last + 1, len(pulses) + 1):
-            pulse = pulses[number - 1]
-            if pulse not in NO_OUTPUT and self._first.setdefault(number, pulse) != pulse:
-                self._moving.add(number)
-        self._time += h if len(self._silent) < len(self._drives) else 0.0
-        self._moving_time += h if self._moving else 0.0
+        if all(pulse in NO_OUTPUT for pulse in pulses):
+            return
+        for number, silence in self._silences.items():
+            self._silences[number] = silence + h if pulses[number - 1] in NO_OUTPUT else 0.0
+        for number, pulse in enumerate(pulses[self._last :], self._last + 1):
+            if pulse not in NO_OUTPUT:
+                self._changes[number] += pulse != self._pulses.get(number, pulse)
+                self._pulses[number] = pulse
+        self._moving_time += h if any(map(self._moves, self._changes)) else 0.0
+
+    def _moves(self, number: int) -> bool:
+        """Return whether a servo moves. The first change may be the one at the end of ArduSub's start."""
+        return self._changes[number] > 1
 
     def doubts(self, *, at_end: bool = False) -> Iterator[tuple[str, ...]]:
         """Yield words and what they need, if the autopilot drives fewer or more servos than the vehicle has."""
-        if self._silent and (at_end or self._time >= _LATE):
-            silent = sorted(self._silent)
+        least = 0.0 if at_end else _LATE
+        if silent := sorted(number for number, silence in self._silences.items() if silence > least):
             yield "no pulses come to {} ({})", _numbered(silent), listed(self._drives[number] for number in silent)
-        is_told = at_end or self._moving_time >= _LATE
-        if is_told and (extra := [*takewhile(self._moving.__contains__, count(self._last + 1))]):
+        if self._moving_time > least and (extra := [*takewhile(self._moves, count(self._last + 1))]):
             yield "the pulses of {} change, but no thruster of the vehicle follows them", _numbered(extra)
 
 

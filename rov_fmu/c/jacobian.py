@@ -14,7 +14,7 @@ from math import inf
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.c.simulation import Array, simulate
+from rov_fmu.c.simulation import Array, reasons, simulate
 from rov_fmu.io.messages import InputError, did_you_mean, listed
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -107,9 +107,7 @@ def step_jacobian(
         better = own < error[some]  # which NaN is not
         slopes[:, some[better]], error[some[better]] = sixth[:, better], own[better]
     if not np.isfinite(error).all():
-        raise ValueError(
-            "the derivatives of the step cannot be computed: it overflows, or never settles and needs to be shorter"
-        )
+        raise ValueError(f"the derivatives of the step cannot be computed: {reasons(layout, h)}")
     ends = np.cumsum([len(layout.state), len(layout.inputs)])
     return StepJacobian(dict(zip(layout.state, present[:, 0].tolist(), strict=True)), *np.split(slopes, ends, axis=1))
 

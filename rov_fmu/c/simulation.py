@@ -140,7 +140,7 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 def reasons(layout: Layout, h: float) -> str:
     """Return why the motion in a step of h seconds may be one that cannot be computed."""
     waiting = f"; at most {MOST_WAITING} changes of commands can wait for the dead time" if layout.delayed else ""
-    return f"it overflows, or never settles and needs shorter steps than {h:g} s{waiting}"
+    return f"it overflows, is too fast, or never settles and needs shorter steps than {h:g} s{waiting}"
 
 
 def on_cores(

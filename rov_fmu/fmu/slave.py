@@ -154,7 +154,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             return False
         if not all(map(isfinite, after.values())):
             self.log(
-                f"the motion overflows within {step_size!r} s, or needs more than {step.MOST_SUBSTEPS} substeps.",
+                f"the motion overflows within {step_size!r} s, or takes too many substeps: it is too fast or long.",
                 Fmi2Status.error,
             )
             return False

@@ -6,10 +6,11 @@ from math import inf, nan, pi
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
 from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OFFSET, WIDTH
-from rov_fmu.identify.likelihood.parameters import Parameter, with_same_lag
+from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
 from rov_fmu.identify.likelihood.posterior import around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
@@ -30,10 +31,8 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         if not p.is_effect:
             continue
         value, interval = _number(fit, n)
-        posterior, name = (
-            fit.posterior if n in file.absent else file,
-            p.of_kind.words + (f" {p.part}" if p.part else ""),
-        )
+        posterior = fit.posterior if n in file.absent else file
+        name = p.of_kind.words + (f" {p.part}" if p.part else "") + _beside_base(file.table, p)
         is_usual = p.log is not None or p.of_kind.is_of_structure
         beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / p.deviation
         evidence, least = odds.get((p.kind, p.of), posterior.evidence(n)), _shortest(fit, p)
@@ -47,6 +46,16 @@ def _number(fit: Fit, n: int) -> Estimate:
     numbers = [p.number(np.clip(one.ends(n), p.low, p.high)) for one in posteriors]
     numbers = [(np.exp(one) if p.of_kind.is_ratio else one).tolist() for one in numbers]
     return numbers[0][0], hull(*((low, high) for _, low, high in numbers))
+
+
+def _beside_base(table: Table, p: Parameter) -> str:
+    """Return what a ratio of astern to ahead is relative to, in words, where the base itself has one."""
+    part = {**table.layout.by_name, **table.layout.curves_by_name}.get(p.of)
+    if not (part and p.of_kind.is_ratio):
+        return ""
+    names = ((part.coefficient(key), part.coefficient(key.removesuffix(REVERSE))) for key in p.of_kind.keys)
+    differs = any(table.base.get(astern) != table.base.get(ahead) for astern, ahead in names)
+    return ", as a multiple of that of the base" if differs else ""
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:

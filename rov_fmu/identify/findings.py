@@ -10,6 +10,7 @@ from math import floor, inf, isfinite, isnan, log, log10
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
@@ -290,10 +291,32 @@ def next_tests(identification: Identification) -> list[str]:
     of_base = identification.axes_of_base
     groups = grouped(((one.reason, how_to_measure(one.axis, "<axis>")), one.axis) for one in of_base)
     others = [
-        f"{listed(axis.name for axis in axes)}: {reason}. {how_to_record(axes)}."
+        f"{listed(axis.name for axis in axes)}: {reason}. {LOG_OUTPUTS if reason == UNLOGGED else how_to_record(axes)}."
         for (reason, _), axes in groups.items()
     ]
     return [*_next_tests(identification), *others]
+
+
+UNLOGGED = "no log has the commands of its thrusters"
+"""Why nothing is learnt about an axis whose thrusters have no output in the logs, although its motion may be there."""
+LOG_OUTPUTS = "Log the outputs to all thrusters: MAVLink 1 has eight, and a .BIN file has more"
+
+
+def is_unlogged(axis: Axis, layout: Layout, logs: Sequence[Log]) -> bool:
+    """Return True if no log has commands of any thruster along an axis, and lacks columns or pulses of them."""
+    drivers = {thruster.name for thruster in layout.thrusters_along(axis)}
+    titles = {f"{form}{name}" for name in drivers for form in ("", "u_")}
+    told = (most for log in logs if log.commands for name, most in log.commands.largest.items() if name in drivers)
+    return (
+        not any(log.follows_axis for log in logs)
+        and not any(told)
+        and any(
+            (f.kind == "thrusters without pulse" and f.axis == axis.name)
+            or (f.kind == "missing column" and str(f.words["column"]).partition(" [")[0] in titles)
+            for log in logs
+            for f in log.findings
+        )
+    )
 
 
 def how_to_record(axes: Sequence[Axis]) -> str:
@@ -546,7 +569,7 @@ def _on_forces(identification: Identification) -> Iterator[Finding]:
 def may_rock(folder: Folder, axis: Axis) -> bool:
     """Return True if only dives tell how fast an axis is, and none of them shows roll and pitch."""
     logs = [log for log in folder.logs if log.axis in (None, axis)]
-    are_level = (log.axis or (log.used("roll angle") and log.used("pitch angle")) for log in logs)
+    are_level = (log.axis or log.tilt for log in logs)
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 
@@ -645,7 +668,7 @@ def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
 
 def _structure(one: Structure) -> Finding | None:
     """Return the finding about a hypothesis that won; None where only its effect is told."""
-    if one.value > HYPOTHESES[one.kind].most:
+    if (kind := KINDS.get(one.kind)) and abs(one.value - (kind.null or 0.0)) < HYPOTHESES[one.kind].least:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
     words = {"of": one.of, "value": value, **dict(one.words)}

@@ -180,6 +180,13 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, mix=kept, thrusters=thrusters, curves=curves_left)
 
 
+def thrusters_along_no_other(layout: Layout, axes: Collection[Axis], kept: Collection[Axis]) -> list[str]:
+    """Return the names of the thrusters that drive some axes, and none of those that a vehicle keeps."""
+    driving = {thruster.name for axis in kept for thruster in layout.thrusters_along(axis)}
+    along = dict.fromkeys(thruster.name for axis in axes for thruster in layout.thrusters_along(axis))
+    return [] if layout.has_wrench else [name for name in along if name not in driving]
+
+
 def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
     """Return the vehicle, also with the axes about which nothing is known but on whose motion those shown depend.
 
@@ -205,7 +212,7 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
 
 def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:
     """Yield a finding for each part that is described or tested but not in the layout."""
-    for name in description.axes:
+    for name in dict.fromkeys([*description.axes, *description.logged.by_name]):
         if name not in layout.by_name:
             drag = ", ".join(AXES[name].coefficient(key) for key in ("a_d", "b_d"))
             yield Finding("axis left out", axis=name, words={"drag": drag})

@@ -13,8 +13,8 @@ from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of
-from rov_fmu.identify.findings import beyond_thrusters, may_rock, told
-from rov_fmu.identify.given import Tests
+from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
+from rov_fmu.identify.given import Tests, thrusters_along_no_other
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
 from rov_fmu.identify.likelihood.filter import DivergedError
@@ -189,9 +189,11 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
         if axis.name in tests.axes:
             told = "no test changes it"
         elif axis in shown:
-            told = "nothing in the logs drives it"
+            is_lost = is_unlogged(axis, description.layout, tests.folder.logs)
+            told = UNLOGGED if is_lost else "nothing in the logs drives it"
         source = ROV_FILE if is_of_file else description.base_name
-        yield AxisOfBase(axis, "" if axis in lacking else source, told)
+        lost = thrusters_along_no_other(description.layout, [axis], vehicle.layout.bare_axes) if axis in lacking else ()
+        yield AxisOfBase(axis, "" if axis in lacking else source, told, tuple(lost))
 
 
 def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:

@@ -10,6 +10,7 @@ from typing import Literal
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.kinds import SLOW, Process
+from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
@@ -344,13 +345,21 @@ class AxisOfBase:
     """The base, or rov.toml; empty where nothing is known about the axis, so that the vehicle lacks it."""
     reason: str
     """Such as `nothing in the logs shows it`."""
+    thrusters: tuple[str, ...] = ()
+    """The thrusters that the vehicle lacks with it, because they drive no other axis."""
 
     @property
     def verdict(self) -> Verdict:
         """The word, with where its coefficients are from."""
         if not self.source:
-            return Verdict("not identified", (f"{self.reason}, so the vehicle has no {self.axis.name}",))
+            return Verdict("not identified", (f"{self.reason}, so {without((self.axis,), self.thrusters)}",))
         return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+
+
+def without(axes: Iterable[Axis], thrusters: Sequence[str]) -> str:
+    """Return what a vehicle lacks, such as `the vehicle has no surge, no sway and no thruster 6`."""
+    words = [f"thruster{'s' if thrusters[1:] else ''} {listed(thrusters)}"] if thrusters else []
+    return f"the vehicle has {listed(f'no {one}' for one in [*(axis.name for axis in axes), *words])}"
 
 
 def is_extrapolated(command: float, tested: Tested) -> bool:

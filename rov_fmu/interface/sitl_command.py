@@ -10,6 +10,7 @@ from socket import AF_INET, SOCK_DGRAM, socket
 import numpy as np
 
 from rov_fmu.bridges.sitl import Connection, Setup
+from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import FAINT
@@ -21,8 +22,12 @@ from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
-from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, servos_of
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, chosen_frame, config_of, servos_of
 
+_WITHOUT_POSITION = 45.0
+"""The time after which ArduSub knows its position, s."""
+_FAR = 0.1
+"""A rise that matters, m."""
 _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
 
@@ -50,7 +55,7 @@ def serve(path: Path, options: Options) -> None:
 
     Raises FileError, InputError about an option, WriteError about the log, and BuildError.
     """
-    setup = _setup(path, options)
+    setup, frame = _setup(path, options)
     with socket(AF_INET, SOCK_DGRAM) as server:
         try:
             server.bind((options.host, options.port))
@@ -62,8 +67,12 @@ def serve(path: Path, options: Options) -> None:
         address, port = server.getsockname()
         for line in _listed(setup.servos, setup.vehicle.layout):
             paragraph(console(), line)
+        if frame:
+            paragraph(console(), f"ArduSub must have {config_of(frame)}")
         if _rolls_alone(setup):
             print_message(f"rov-fmu: {_NO_ROLL}")
+        if floats := _floats(setup):
+            print_message(f"rov-fmu: {floats}")
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")
 
         def end() -> None:
@@ -79,8 +88,8 @@ def serve(path: Path, options: Options) -> None:
             connection.serve(server, options.duration or inf)
 
 
-def _setup(path: Path, options: Options) -> Setup:
-    """Return the setup of a flight. Raises FileError, InputError, WriteError."""
+def _setup(path: Path, options: Options) -> tuple[Setup, str]:
+    """Return the setup of a flight, and the frame of its servos, if any. Raises FileError, InputError, WriteError."""
     if options.log and options.log.suffix.lower() not in (".csv", ".mcap"):
         raise InputError(f"--log {options.log}: the name must end with .csv or .mcap")
     if options.frame is not None and options.frame not in FRAMES:
@@ -98,12 +107,14 @@ def _setup(path: Path, options: Options) -> Setup:
     inputs = with_axes(vehicle.layout, {name: np.array(value) for name, value in given.inputs.items()})
     checked_values("inputs", inputs, vehicle.layout.inputs, many=False)
     checked_start(given.start, vehicle.layout, many=False)
-    servos = servos_of(vehicle.layout, options.frame, _table(options.servos, vehicle.layout))
+    chosen = vehicle.layout, options.frame, _table(options.servos, vehicle.layout)
+    servos = servos_of(*chosen)
     for name in inputs:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
-    return Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
+    setup = Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
+    return setup, chosen_frame(*chosen)
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:
@@ -136,8 +147,25 @@ def _rolls_alone(setup: Setup) -> bool:
 
 _NO_ROLL = (
     "this vehicle has no roll, so ArduSub's roll integrator winds up: its vertical thrusters push against each other "
-    "with up to 18 %. ATC_RAT_RLL_I 0 should prevent it, which has not been tried"
+    "with up to 18 %. ATC_RAT_RLL_I 0 prevents it"
 )
+
+
+def _floats(setup: Setup) -> str:
+    """Return a sentence about a vehicle that rises without commands; an empty text if it does not."""
+    vehicle, layout = setup.vehicle, setup.vehicle.layout
+    if not layout.has(HEAVE):
+        return ""
+    stepper = Stepper(vehicle, setup.start, ["z"])
+    (start,), (end,) = stepper.recorded(), stepper.step([], _WITHOUT_POSITION)
+    weight = vehicle.alone(HEAVE, {**layout.usual_inputs, **setup.start}).C
+    weight *= vehicle.effective_inertia(layout.by_name[HEAVE.name])
+    if weight >= 0.0 or start - end < _FAR:
+        return ""
+    return (
+        f"this vehicle rises with {-weight:.2g} N: {start - end:.2g} m in the {_WITHOUT_POSITION:g} s before ArduSub "
+        "knows its position. Start deeper (--set z), or arm at once"
+    )
 
 
 def _summary(connection: Connection) -> str:

@@ -20,6 +20,7 @@ from time import monotonic
 from typing import IO, Any, Literal
 
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
+from rov_fmu.io.messages import reason_of
 
 _POLL = 0.1
 """The longest single wait for an answer, s. It is short, because Windows delivers Ctrl-C only between waits."""
@@ -266,10 +267,10 @@ def _exceeded(error: BaseException | None, limits: Limits) -> str | None:
     return None
 
 
-def _portable(error: Exception | None) -> Exception | None:
+def _portable(error: Exception) -> Exception:
     """Return an exception that can be sent: itself, or one with its text where pickle fails, as for many libraries."""
     try:
         pickle.loads(pickle.dumps(error))
         return error
     except Exception:
-        return RuntimeError(f"{type(error).__name__}: {error}")
+        return RuntimeError(reason_of(error))

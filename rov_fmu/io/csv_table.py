@@ -28,8 +28,12 @@ from rov_fmu.io.reading import read_bytes
 
 NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]{1,3})?")
 """A number as a cell has it, with a decimal point."""
-VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{4}}-[0-9]{{2}}-[0-9]{{2}}.*|[0-9]+:[0-9]{{2}}.*")
+VALUE = re.compile(rf"(?:{NUMBER.pattern})|[0-9]{{1,4}}([-/.])[0-9]{{1,2}}\\3[0-9]{{2,4}}.*|[0-9]+:[0-9]{{2}}.*")
 """A cell of a row: a number, a date or a time of day."""
+QUOTED_NUMBER = re.compile(r'" *([+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?) *"')
+"""A number with a comma in quotes."""
+THOUSANDS = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+"""A number whose comma may separate thousands."""
 _HEADER = re.compile(r"(?P<name>[^\[\]]+)\[(?P<unit>[^\[\]]+)\]")
 _SEPARATORS, _COMMENT = ",;\t", "#"
 _GIVEN_SEPARATOR = re.compile(rf'"?sep=([{_SEPARATORS}])"?', re.IGNORECASE)
@@ -76,7 +80,8 @@ class Column:
     """A column that a file may have, and the numbers that it may contain."""
 
     units: Mapping[str, float]
-    """The units that the file may use, and how many of each make one of the first unit."""
+    """The units that the file may use, and how many of each make one of the first unit. The empty unit
+    is that of a header without one."""
     optional: bool = False
     """True if a file may be without this column."""
     blanks: bool = False
@@ -247,7 +252,12 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
 
 def read_header(path: Path, open_stream: OpenStream | None = None) -> list[str]:
     """Return the cells of the header. Raises DataFileError."""
-    return next(iter(_CsvFile(path, open_stream)))[1]
+    return read_start(path, open_stream, 1)[0]
+
+
+def read_start(path: Path, open_stream: OpenStream | None, count: int) -> list[list[str]]:
+    """Return the cells of the header and of the first rows, at most `count` of all. Raises DataFileError."""
+    return [cells for _, cells in islice(_CsvFile(path, open_stream), count)]
 
 
 class Series(dict[str, "array[float]"]):
@@ -419,20 +429,22 @@ def _cells(line: str, separator: str) -> list[str]:
     """Return the cells of a line, without empty ones at its end."""
     cells = []
     with suppress(csv.Error):  # the line is no CSV, and reading it will say so
-        cells = [_with_point(cell, separator) for cell in next(csv.reader([line], delimiter=separator), [])]
+        cells = [_with_point(cell.strip()) for cell in next(csv.reader([line], delimiter=separator), [])]
     while cells and not cells[-1]:
         cells.pop()
     return cells
 
 
-def _with_point(text: str, separator: str) -> str:
-    """Return a cell without blanks around it, and with a decimal point instead of a comma in a number, unless commas
-    separate the cells."""
-    text = text.strip()
-    if separator == "," or "," not in text:
-        return text
+def _with_point(text: str) -> str:
+    """Return a cell with a decimal point instead of a comma in a number."""
     with_point = text.replace(",", ".", 1)
-    return with_point if NUMBER.fullmatch(with_point) else text
+    return with_point if with_point != text and NUMBER.fullmatch(with_point) else text
+
+
+def _has_decimal_commas(lines: Iterable[str]) -> bool:
+    """Return True if a number in quotes between commas has a comma that separates no thousands, as in "0,35"."""
+    quoted = (number for line in lines if '"' in line for number in QUOTED_NUMBER.findall(line))
+    return any(not THOUSANDS.fullmatch(number) for number in quoted)
 
 
 def _is_row(cells: Iterable[str]) -> bool:
@@ -472,6 +484,7 @@ class _CsvFile:
         self.path = path
         self._open = open_stream or open_text(Path(path))
         self._dialect = _dialect(self._open())
+        self._has_decimal_commas = self._dialect.separator != "," or _has_decimal_commas(self._open())
         self._places: dict[int, list[int | None]] = {}
         """The place of each column of the header in rows with so many cells, if they have more than the header."""
         self.left_out = 0
@@ -508,7 +521,7 @@ class _CsvFile:
         is_header = True
         try:
             for row in reader:
-                cells = [_with_point(cell, separator) for cell in row]
+                cells = [_with_point(cell.strip()) if self._has_decimal_commas else cell.strip() for cell in row]
                 if any(cells):
                     if is_header and self._dialect.has_rows:
                         cells[0] = cells[0].lstrip(_COMMENT).strip() or cells[0]
@@ -561,7 +574,7 @@ class _CsvFile:
     def too_many(self, torn: _TornRows) -> str:
         """Return the line about rows with more cells than the header has."""
         commas = self._dialect.separator == "," and all(NUMBER.fullmatch(cell) for cell in torn.cells)
-        hint = " (are these decimal commas? They need ; between the columns)" if commas else ""
+        hint = " (are these decimal commas? They need ; between the columns, or quotes)" if commas else ""
         if torn.count > 1:
             hint += (
                 f", and {torn.count} rows have more cells than the header, which has {torn.most}. Complete the header"
@@ -665,8 +678,8 @@ def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> flo
 def _why_no_number(text: str) -> str:
     """Return what a cell must be that is not a number."""
     hint = ""
-    if "," in text and NUMBER.fullmatch(text.replace(",", ".", 1)):
-        hint = " with a decimal point, unless ; separates the columns"
+    if THOUSANDS.fullmatch(text):
+        hint = " without a comma, which may separate decimals or thousands here"
     elif ";" in text or "\t" in text:
         hint = "; what separates the cells must be the same as in the header"
     elif not any(map(str.isdigit, text)):
@@ -775,12 +788,13 @@ class KnownColumns:
         keys = self.keys.get(name, {})
         for key in keys:
             column = self._columns[key]
-            if unit := next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None):
+            unit = next((unit for unit in _units(column) if unit.casefold() == word.casefold()), None)
+            if unit is not None:
                 convert, factor = _conversion(unit, numbers, column)
                 if title.startswith("-"):
                     convert, factor = partial(_opposite, convert), -factor
                 return FileColumn(key, column, unit, convert, factor, tuple(numbers))
-        if key := next((key for key in keys if _folded(key) == name), ""):
+        if key := next((key for key in keys if _folded(key) == name and "" not in self._columns[key].units), ""):
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(self._columns[key]))}")
         if others:
             return None
@@ -841,7 +855,7 @@ def _units(column: Column) -> list[str]:
 
 def _title(name: str, column: Column) -> str:
     """Return the header of a column in its first unit."""
-    return f"{name} [{next(iter(column.units))}]"
+    return f"{name} [{next(iter(column.units))}]".removesuffix(" []")
 
 
 FORCE_UNITS = {"N": 1.0, "kgf": 1.0 / 9.80665, "lbf": 1.0 / 4.4482216152605}

@@ -130,6 +130,26 @@ def brief(text: str, most: int = 80) -> str:
     return clean if len(clean) <= most else f"{clean[: most - 3]}..."
 
 
+def reason_of(error: BaseException) -> str:
+    """Return the text of an exception that a library raised.
+
+    If it has no text, these are words for its kind, because the name of a class tells a user nothing.
+    """
+    text = str(error).strip()
+    if isinstance(error, KeyError) and text:
+        return f"{text} is missing"
+    known = (words for kind, words in _WITHOUT_TEXT.items() if isinstance(error, kind))
+    return text or next(known, "no reason is known")
+
+
+_WITHOUT_TEXT: dict[type[BaseException], str] = {
+    MemoryError: "the memory is not enough",
+    EOFError: "it ends too early",
+    TimeoutError: "it takes too long",
+    NotImplementedError: "it has a part of an unknown kind",
+}
+
+
 def listed(words: Iterable[str], before_last: str = "and") -> str:
     """Return words as in a sentence: a, b and c."""
     *some, last = [*words] or [""]

@@ -20,8 +20,22 @@ MODELS = _TOP / "models"
 """The folder of the vehicles that ship; each has a folder of its own."""
 PREBUILT = _TOP / "prebuilt"
 """The folder of what a wheel has compiled for these vehicles. A checkout has no such folder."""
-DEVICE = re.compile("CON|PRN|AUX|NUL|(COM|LPT)[0-9]", re.IGNORECASE)
+_DEVICE = re.compile(r"(CON|PRN|AUX|NUL|CONIN\$|CONOUT\$|(COM|LPT)[0-9¹²³]) *(\..*)?", re.IGNORECASE)
 """Names of devices in Windows. No file can have such a name there, whatever its extension."""
+_INVISIBLE = "\u034f\u115f\u1160\u17b4\u17b5\u180b-\u180f\u2800\u3164\ufe00-\ufe0f\uffa0\U000e0100-\U000e01ef"
+"""The characters that Python takes as printable, and that have no width or no ink."""
+_PART = re.compile(rf"(?!\.\.?$)[^<>:\"/\\|?*{_INVISIBLE}]*[^<>:\"/\\|?*{_INVISIBLE} .]")
+_MOST_BYTES = 255
+"""The longest part of a path in UTF-8."""
+
+
+def is_portable(part: str) -> bool:
+    """Return True if a part of a path names the same file or folder on every system, and shows what it is.
+
+    Controls, marks that turn the direction of writing, and characters without a width would let it look like another.
+    """
+    is_short = len(part.encode(errors="replace")) <= _MOST_BYTES
+    return is_short and part.isprintable() and bool(_PART.fullmatch(part)) and not _DEVICE.fullmatch(part)
 
 
 def inside(folder: Path, name: str) -> Path:

@@ -38,7 +38,7 @@ def open_file(path: Path, kind: type[FileError] = FileError) -> Iterator[IO[byte
         with open(path, "rb", opener=_without_waiting) as file:
             yield file
     except FileNotFoundError as error:
-        raise kind(f"{path}: {NO_FILE}") from error
+        raise kind(f"{path}: {'is a link to a file that is not there' if path.is_symlink() else NO_FILE}") from error
     except (OSError, ValueError) as error:
         if isinstance(error, ValueError) and "null byte" not in str(error):  # a name from a file may have a NUL
             raise
@@ -62,11 +62,16 @@ def read_bytes(path: Path, kind: type[FileError] = FileError, *, most: int = _MO
     with open_file(path, kind) as file:
         size = os.fstat(file.fileno()).st_size
         if size > most:
-            raise kind(f"{path}: is too large, with {size / 1e6:.0f} MB: at most {most / 1e6:.0f} MB are read")
+            raise kind(f"{path}: {too_large(size, most)}")
         content = file.read(size + 1)
         if len(content) > size:
             raise kind(f"{path}: cannot be read: it has more bytes than its size, {size}")
         return content
+
+
+def too_large(size: int, most: int) -> str:
+    """Return why a file is not read that has more bytes than `most`."""
+    return f"has {size:,} bytes; at most {most:,} are read"
 
 
 def read_text(path: Path, kind: type[FileError] = FileError, *, most: int = _MOST_BYTES) -> str:

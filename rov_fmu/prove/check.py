@@ -11,7 +11,7 @@ from rov_fmu.fmu.archive import META_DATA, directory, local_header
 from rov_fmu.fmu.meta_data import ARCHIVE, BEFORE, FILES, GENERATOR, INPUTS, own_hash
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.messages import FileError, ProofError, brief, shown
-from rov_fmu.io.reading import hash_of, open_file, root_of_xml
+from rov_fmu.io.reading import hash_of, open_file, root_of_xml, too_large
 from rov_fmu.prove.signature import check_signature
 from rov_fmu.prove.unpacking import check_order, opened_archive
 
@@ -67,7 +67,7 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
     """Return what the meta-data say. Raises FileError."""
     where = f"{fmu}: {META_DATA}"
     if (size := archive.getinfo(META_DATA).file_size) > _MOST_BYTES:
-        raise FileError(f"{where}: has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
+        raise FileError(f"{where}: {too_large(size, _MOST_BYTES)}")
     try:
         root = root_of_xml(archive.read(META_DATA))
     except (etree.XMLSyntaxError, zipfile.BadZipFile) as error:

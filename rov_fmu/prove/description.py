@@ -11,8 +11,8 @@ from typing import Any
 from lxml import etree
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, Limits
-from rov_fmu.io.messages import FileError, brief, shown
-from rov_fmu.io.reading import root_of_xml
+from rov_fmu.io.messages import FileError, brief, reason_of, shown
+from rov_fmu.io.reading import root_of_xml, too_large
 
 TIME_LIMIT = 60.0
 """The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
@@ -48,7 +48,7 @@ def read_description(fmu: Path, folder: Path) -> Any:
         with closing(ChildProcess(Functions, limits=limits)) as child:
             return child.call("call", described, str(folder))
     except Exception as error:  # what FMPy raises, of which pickle may make another kind
-        reason = f"FMPy {error}" if isinstance(error, ChildError) else brief(str(error), 240)
+        reason = f"FMPy {error}" if isinstance(error, ChildError) else brief(reason_of(error), 240)
         raise FileError(f"{fmu}: {_DESCRIPTION}: {reason}") from error
 
 
@@ -75,7 +75,7 @@ def _root(folder: str) -> Any:
     for name in (_DESCRIPTION, "sources/buildDescription.xml"):
         path = Path(folder, name)
         if path.is_file() and (size := path.stat().st_size) > _MOST_BYTES:
-            raise ValueError(f"{name} has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
+            raise ValueError(f"{name} {too_large(size, _MOST_BYTES)}")
     path = Path(folder, _DESCRIPTION)
     if not path.is_file():
         raise ValueError("there is no such file in the FMU")

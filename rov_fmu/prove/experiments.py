@@ -14,7 +14,7 @@ from lxml import etree
 from rov_fmu.fmu.archive import MANIFEST
 from rov_fmu.io.csv_table import Series, finite, read_series
 from rov_fmu.io.messages import FileError, shown
-from rov_fmu.io.reading import root_of_xml
+from rov_fmu.io.reading import root_of_xml, too_large
 
 DEFAULT_TOLERANCE = 1e-3
 """The tolerance if neither the experiment nor the FMU has one."""
@@ -86,7 +86,7 @@ class _Member:
         if not path.is_file():
             raise self.error("there is no such file in the FMU")
         if (size := path.stat().st_size) > _MOST_BYTES:
-            raise self.error(f"has {size / 1e6:.3g} MB; at most {_MOST_BYTES / 1e6:g} MB are read")
+            raise self.error(too_large(size, _MOST_BYTES))
         try:
             return path.read_bytes().decode("utf-8-sig")
         except UnicodeDecodeError as error:

@@ -13,7 +13,7 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
-from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, silent
+from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, reason_of, silent
 from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.experiments import Experiment
 from rov_fmu.prove.runs import Runs, forget_message, keep_message, last_message
@@ -117,7 +117,8 @@ class _Experiments(Runs):
         try:
             result = self._result(experiment, interface, names)
         except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-            what = str(error).replace(self._folder + os.sep, "").rstrip(".")  # the cause follows the library's path
+            # The cause follows the library's path.
+            what = reason_of(error).replace(self._folder + os.sep, "").rstrip(".")
             return [_failed(experiment, brief(what + last_message(), 240))]
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         findings = []

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import brief, reason_of
 
 Array = npt.NDArray[np.float64]
 WARNING = 1
@@ -180,7 +180,7 @@ class Runs:
             yield fmu
         except Exception as error:  # FMPy raises that itself
             message = last_message() if isinstance(error, FMICallException) else ""
-            raise RunError(brief(f"{str(error).replace(self._folder, '').rstrip('.')}{message}", 240)) from error
+            raise RunError(brief(f"{reason_of(error).replace(self._folder, '').rstrip('.')}{message}", 240)) from error
         finally:
             if fmu is not None and fmu.component is not None:
                 if initialized:

@@ -13,12 +13,13 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import combinations
 from pathlib import Path
 from typing import IO
 from unicodedata import normalize
 
-from rov_fmu.io.messages import FileError, ProofError, brief, shown
-from rov_fmu.io.paths import DEVICE
+from rov_fmu.io.messages import FileError, ProofError, brief, reason_of, shown
+from rov_fmu.io.paths import is_portable
 from rov_fmu.io.reading import open_file
 
 _MOST_UNPACKED = 2_000_000_000
@@ -31,10 +32,21 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """The compression that FMI allows. Python takes memory without limit for other methods."""
 _ENCRYPTED, _SIZES_BEHIND, _UTF_8 = 1, 8, 0x800
 """The flags of a file that is encrypted, of one whose sizes follow its content, and of one whose name is in UTF-8."""
-_PART = re.compile(r"(?!\.\.?$)[^\x00-\x1f<>:\"\\|?*]*[^\x00-\x1f<>:\"\\|?* .]")
-"""What may stand between the slashes of a path, so that it is the same path on every system."""
-_LARGE = b"\1\0\x10\0"
-"""How the extra field with the sizes of a large file begins."""
+_LARGE = 0x0001
+"""The extra field with the sizes of a large file, and with its place."""
+_FORMS = {
+    _LARGE: b"(.{8}){1,3}",
+    0x000A: b".{4}\1\0\x18\0.{24}",  # times of NTFS
+    0x5455: b".(.{4}){0,3}",  # times
+    0x5855: b".{8}(.{4})?",  # times and the owner, in the old form of Info-ZIP
+    0x7855: b"(.{4})?",  # the owner, likewise
+    0x7875: b"\1(\2.{2}|\4.{4}|\x08.{8}){2}",  # the owner
+    0xCAFE: b"",  # the mark of an archive of Java
+    0xD935: b".{2}\0*",  # what aligns the content
+}
+"""The forms of the extra fields that are allowed (APPNOTE 4.5 and 4.6, and the list of Info-ZIP). To the readers that
+know them, others give a file another name, or make it a link or an encrypted one."""
+_HAS_MORE = "has an extra field that is damaged, or that could give the file another name or size, or make it a link"
 _END = "<4s4H2LH"
 """The form of the end of an archive: disks, counts, the size and the place of the directory (APPNOTE 4.3.16)."""
 _PIECE = 2**14
@@ -75,7 +87,7 @@ def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
         raise
     except Exception as error:  # zipfile raises many kinds on damaged or encrypted archives
         is_outside = isinstance(error, OSError) and error.errno == errno.EINVAL
-        reason = "its directory names a place outside of it" if is_outside else brief(str(error))
+        reason = "its directory names a place outside of it" if is_outside else brief(reason_of(error))
         raise FileError(f"{fmu}: is not an FMU, or is damaged: {reason}") from error
 
 
@@ -87,13 +99,17 @@ def refusal(zipped: zipfile.ZipFile) -> str:
     folders = {folder for place in places for folder in _folders(place)}
     for member, place in zip(members, places, strict=True):
         name = member.orig_filename
-        is_portable = all(map(_is_portable, name.removesuffix("/").split("/")))
+        is_valid = all(map(is_portable, name.removesuffix("/").split("/")))
+        is_read_alike = name.isascii() or member.flag_bits & _UTF_8
+        fields = _fields(member.extra)
         is_special = stat.S_IFMT(member.external_attr >> 16) not in (0, stat.S_IFREG, stat.S_IFDIR)
         for is_wrong, reason in (
-            (not is_portable, "must be a relative path with forward slashes, whose parts are names on every system"),
+            (not is_valid, "must be a relative path with forward slashes, whose parts are names on every system"),
+            (not is_read_alike, "must be ASCII, or marked as UTF-8: readers take it as different names"),
             (is_special, "is a link or a special file; an FMU must have files and folders only"),
             (member.compress_type not in _METHODS, "must be stored or deflated, the compression that FMI allows"),
             (member.flag_bits & _ENCRYPTED, "is encrypted"),
+            (fields is None or _has_other_numbers(member, fields), _HAS_MORE),
             (names[name] > 1, f"is {names[name]} times in the archive"),
             (times[place] > 1, "is the path of another member, too, on systems that ignore case"),
             (place in folders and not member.is_dir(), "is a file, and a folder of other files"),
@@ -103,18 +119,34 @@ def refusal(zipped: zipfile.ZipFile) -> str:
     total = sum(member.file_size for member in members)
     packed = zipped.start_dir
     if total > _MOST_UNPACKED:
-        return f"would take {total / 1e9:.3g} GB unpacked; at most {_MOST_UNPACKED / 1e9:g} GB are allowed"
+        return f"would take {total:,} bytes unpacked; at most {_MOST_UNPACKED:,} are allowed"
     if total > max(_SMALL, _MOST_RATIO * packed):
         return (
-            f"would take {total / 1e6:.3g} MB unpacked, {total / packed:.0f} times the size of the archive; "
-            f"above {_SMALL / 1e6:g} MB at most {_MOST_RATIO} times are allowed"
+            f"would take {total:,} bytes unpacked, and has {packed:,}; "
+            f"above {_SMALL:,} at most {_MOST_RATIO} times those of the archive are allowed"
         )
     return ""
 
 
-def _is_portable(part: str) -> bool:
-    """Return True if a part of a path names the same file or folder on every system."""
-    return bool(_PART.fullmatch(part)) and not DEVICE.fullmatch(part.partition(".")[0].rstrip())
+def _fields(extra: bytes) -> dict[int, bytes] | None:
+    """Return the extra fields of a file; None if one is not of an allowed kind and form, or is there twice."""
+    found = dict[int, bytes]()
+    while extra:
+        kind, size = struct.unpack("<2H", extra[:4].ljust(4, b"\0"))
+        content, extra = extra[4 : 4 + size], extra[4 + size :]
+        form = _FORMS.get(kind)
+        if form is None or kind in found or len(content) < size or not re.fullmatch(form, content, re.DOTALL):
+            return None
+        found[kind] = content
+    return found
+
+
+def _has_other_numbers(entry: zipfile.ZipInfo, fields: dict[int, bytes]) -> bool:
+    """Return True if the directory has sizes or a place of a file in 8 bytes that are not those of the file."""
+    if _LARGE not in fields:
+        return False
+    numbers = entry.file_size, entry.compress_size, entry.header_offset
+    return all(fields[_LARGE] != struct.pack(f"<{n}Q", *some) for n in (1, 2, 3) for some in combinations(numbers, n))
 
 
 def _place(name: str) -> str:
@@ -143,7 +175,7 @@ def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
             raise FileError(f"{where}: must begin at byte {place} of the archive, and not at {entry.header_offset}")
         if entry.is_dir() and entry.file_size:
             raise FileError(f"{where}: is a folder, and must have no content")
-        place = _end_of(file, entry)
+        place = _end_of(file, entry, where)
         if not place:
             raise FileError(f"{where}: its header and its content must be as the directory of the archive says")
         size += 46 + len(_encoded(entry)) + len(entry.extra) + len(entry.comment)
@@ -163,11 +195,11 @@ def _encoded(entry: zipfile.ZipInfo) -> bytes:
     return entry.orig_filename.encode("utf-8" if entry.flag_bits & _UTF_8 else "cp437")
 
 
-def _end_of(file: IO[bytes], entry: zipfile.ZipInfo) -> int:
+def _end_of(file: IO[bytes], entry: zipfile.ZipInfo, where: str) -> int:
     """Return where a file ends in an archive; 0 if its header or its content is not as the directory says.
 
     A writer that did not know the sizes before the content gives them behind it, with 4 or 8 bytes each, and with or
-    without a signature (APPNOTE 4.3.9).
+    without a signature (APPNOTE 4.3.9). Raises FileError about an extra field.
     """
     file.seek(entry.header_offset)
     sign, _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4s5H3L2H", file.read(30))
@@ -177,9 +209,14 @@ def _end_of(file: IO[bytes], entry: zipfile.ZipInfo) -> int:
         return 0
     if file.read(name) != _encoded(entry):
         return 0
-    more = file.read(extra)
-    if numbers[1:] == [2**32 - 1] * 2 and more.startswith(_LARGE):
-        numbers[1:] = reversed(struct.unpack("<2Q", more[len(_LARGE) :][:16]))
+    fields = _fields(file.read(extra))
+    if fields is None:
+        raise FileError(f"{where}: {_HAS_MORE}")
+    if large := fields.get(_LARGE):
+        sizes = [*struct.unpack(f"<{len(large) // 8}Q", large)][::-1]
+        if numbers[1:] not in ([2**32 - 1] * 2, sizes):
+            return 0
+        numbers[1:] = sizes
     if not _is_whole(file, entry):
         return 0
     end, expected = file.tell(), (entry.CRC, entry.compress_size, entry.file_size)

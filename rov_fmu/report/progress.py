@@ -160,6 +160,10 @@ class StudyProgress(Protocol):
     def dashboard(self) -> str:
         """The address of Dask's page about its workers, or nothing."""
 
+    @property
+    def has_workers(self) -> bool:
+        """False while no worker is there."""
+
 
 class StudyParts:
     """The parts of a study: the start of the workers, and the runs."""
@@ -177,10 +181,11 @@ class StudyParts:
             self._began, self._done_before = perf_counter(), now.done
             if now.dashboard and self._parts.is_shown:
                 self._parts.print(f"what the workers do: {now.dashboard}")
-        if now.done == self._done_before:
+        if now.done == self._done_before and now.has_workers:
             return
         rate = (now.done - self._done_before) / max(perf_counter() - self._began, 1e-3)
-        words = f"{per_second(rate)}{f', {now.failed:,} failed' if now.failed else ''}"
+        speed = per_second(rate) if now.has_workers else "no worker is there"
+        words = f"{speed}{f', {now.failed:,} failed' if now.failed else ''}"
         share = (now.done - self._done_before) / (now.total - self._done_before)
         self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs")
 

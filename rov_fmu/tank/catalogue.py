@@ -10,11 +10,15 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
-from math import nan, pi
+from math import inf, nan, pi
 from typing import Any
+from unicodedata import combining, normalize
+
+import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.io.csv_table import Column
+from rov_fmu.tank.arrays import Array, Flags
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}
 ANGLES = {"rad": 1.0, "deg": 180.0 / pi, "°": 180.0 / pi}
@@ -47,6 +51,8 @@ class Quantity:
     """Other headers of its column. They are recognised only together with one of its units."""
     minimum: float = -1e7
     maximum: float = 1e7
+    least: float = -inf
+    """What is below is no measurement, but what a sensor shows that is not connected."""
     wraps: bool = False
     """True for an angle that sensors wrap at a full turn."""
 
@@ -80,7 +86,7 @@ def _quantities() -> Iterator[Quantity]:
         )
     yield Quantity("distance", LENGTHS)
     yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
-    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4)
+    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0)
 
 
 QUANTITIES = {quantity.name: quantity for quantity in _quantities()}
@@ -110,6 +116,7 @@ class Message:
     kind: str
     """A regular expression for the whole type of the message."""
     fields: tuple[str, ...]
+    """The names of the fields; empty for a component that a message does not have."""
     gives: str
     """The name of a quantity, or a vector."""
     unit: str = ""
@@ -140,6 +147,8 @@ class Output:
     topic: str = ""
     """A regular expression that must occur in the name of the topic. Its group is the number of the thruster, if each
     thruster has a topic of its own."""
+    spread: bool = False
+    """True if a sender spreads its outputs over several messages, whose fields have the numbers from 1 on."""
 
 
 def _each(form: str, places: Iterable[object] = "xyz") -> tuple[str, ...]:
@@ -181,6 +190,8 @@ _POSE = r"geometry_msgs/.*Pose.*"
 _TWIST = r"geometry_msgs/.*Twist.*"
 _ODOMETRY = r"nav_msgs/.*Odometry"
 _IMU = r"sensor_msgs/.*Imu"
+_DVLS = (r"dvl_msgs/.*DVL", r"marine_acoustic_msgs/.*Dvl")
+"""The messages of DVLs, whose axes point forward, to starboard and down."""
 _NESTED = ("{0}.{0}.{1}.", "{0}.{1}.", "{1}.")
 """How the messages of ROS nest a part of a pose or a twist: with covariance, with a header, alone."""
 _PARTS = (
@@ -189,8 +200,11 @@ _PARTS = (
     ("twist", "linear", "xyz", VELOCITY, _TWIST),
     ("twist", "angular", "xyz", RATES, _TWIST),
 )
+_NUMBER = r"std_msgs/.*(Float|Int)\d+(Stamped)?"
 _ROS = (
-    Message(r"std_msgs/.*(Float|Int)\d+(Stamped)?", ("data",), "depth", topic=r"(?i)(?<![a-z])depth(?![a-z])"),
+    Message(_NUMBER, ("data",), "depth", topic=r"(?i)(?<![a-z])depth(?![a-z])"),
+    Message(_NUMBER, ("data",), "depth", sign=-1.0, topic=r"(?<![a-z])rel_alt(?![a-z])"),
+    Message(r"mavros_msgs/.*(VFR_HUD|VfrHud)", ("altitude",), "depth", sign=-1.0),
     *(
         Message(kind, _each(nested.format(whole, part) + "{}", letters), gives)
         for whole, part, letters, gives, alone in _PARTS
@@ -199,16 +213,94 @@ _ROS = (
     ),
     Message(_IMU, _each("orientation.{}", "wxyz"), QUATERNION),
     Message(_IMU, _each("angular_velocity.{}"), RATES),
+    Message(_NUMBER, ("data",), "heading", "deg", topic=r"(?<![a-z])compass_hdg(?![a-z])"),
+    *(Message(kind, _each("velocity.{}"), VELOCITY, frame=FRD) for kind in _DVLS),
     Message(r"sensor_msgs/.*FluidPressure", ("fluid_pressure",), "pressure"),
     Message(r"sensor_msgs/.*BatteryState", ("voltage",), "voltage"),
 )
-MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS)
+_BLUEYE = "blueye.protocol.{}Tel"
+_ESTIMATE = _BLUEYE.format("PositionEstimate")
+_OF_BLUEYE = (
+    Message(_BLUEYE.format("Depth"), ("depth.value",), "depth"),
+    Message(_BLUEYE.format("Attitude"), _each("attitude.{}", ("roll", "pitch", "yaw")), EULER, "deg", NED),
+    *(
+        Message(_ESTIMATE, (f"position_estimate.{axis}_rate",), f"{axis} velocity", frame=FRD)
+        for axis in ("surge", "sway", "yaw")
+    ),
+    Message(_ESTIMATE, ("position_estimate.heading",), "heading"),
+)
+MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS, *_OF_BLUEYE)
 """What the messages of all formats measure. Of two sources of a quantity, that of the earlier entry is preferred."""
+
+
+@dataclass(frozen=True)
+class Validity:
+    """A field of a kind of message that tells whether other fields of the same message are measurements."""
+
+    kind: str
+    """A regular expression for the whole type of the message."""
+    place: str
+    """The field that tells it."""
+    about: str
+    """A regular expression for the whole names of the fields that it is about."""
+    least: float = -inf
+    below: float = inf
+    """They are measurements while the number is at least the first and less than the second one."""
+    may_lack: bool = False
+    """True for a field that some senders do not fill: it tells nothing if it is 0 in all messages."""
+
+    def denies(self, told: Array) -> Flags:
+        """Return True where the numbers say that nothing was measured."""
+        if self.may_lack and not np.nan_to_num(told).any():
+            return np.zeros(len(told), bool)
+        return (told < self.least) | (told >= self.below)
+
+
+_HUGE_PLACE, _HUGE = 1e5, 1e3
+"""Variances of a position, m2, and of a velocity or an angle, from which on estimators mean that they know nothing."""
+_COVARIANCES = (
+    (f"{_ODOMETRY}|{_POSE}", "pose", "position", "xyz", 0, _HUGE_PLACE),
+    (f"{_ODOMETRY}|{_POSE}", "pose", "orientation", "__.", 21, _HUGE),
+    (f"{_ODOMETRY}|{_TWIST}", "twist", "linear", "xyz", 0, _HUGE),
+    (f"{_ODOMETRY}|{_TWIST}", "twist", "angular", "xyz", 21, _HUGE),
+)
+"""Type, whole, part, components, and the index of the variance of the first component, which are on the diagonal of a
+covariance of 6 x 6. Roll and pitch are not left out without the heading, which stands for a whole orientation."""
+VALIDITIES = (
+    # "set element 0 of the associated covariance matrix to -1" (sensor_msgs/Imu), which others do, too
+    *(
+        Validity(_IMU, f"{part}_covariance[0]", rf"{part}\..", least=0.0)
+        for part in ("orientation", "angular_velocity")
+    ),
+    *(
+        Validity(kind, f"{place}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
+        for kind, whole, part, *_ in _COVARIANCES
+        for place in (f"{whole}.", "")
+    ),
+    *(
+        Validity(kind, f"{place}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge)
+        for kind, whole, part, letters, first, huge in _COVARIANCES
+        for place in (f"{whole}.", "")
+        for n, letter in enumerate(letters)
+    ),
+    Validity(_DVLS[1], "velocity_mode", r"velocity\..", least=1.0, below=2.0),  # others are through the water
+    Validity(_DVLS[1], "num_good_beams", r"velocity\..", least=3.0, may_lack=True),
+    Validity(r"sensor_msgs/.*BatteryState", "present", "voltage", least=1.0, may_lack=True),
+    Validity("BARO", "Health", "Alt|Press", least=1.0),
+    Validity("BARO", "H", "Alt|Press", least=1.0),
+    Validity("vehicle_local_position", "xy_valid", "[xy]", least=1.0),
+    Validity("vehicle_local_position", "z_valid", "z", least=1.0),
+    Validity("vehicle_local_position", "v_xy_valid", "v[xy]", least=1.0),
+    Validity("vehicle_local_position", "v_z_valid", "vz", least=1.0),
+    Validity("battery_status", "connected", "voltage_v", least=1.0, may_lack=True),
+    Validity(_ESTIMATE, "position_estimate.is_valid", r"position_estimate\..*", least=1.0),
+)
+"""The marks of validity inside messages, beside flags that their names tell."""
 
 _ACTUATORS = r"(?i)thruster|motor|actuator|propeller|pwm|command|cmd"
 OUTPUTS = (
-    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us"),
-    Output("RCOU", r"C(\d+)", "us"),
+    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us", spread=True),
+    Output("RCO[U23]", r"C(\d+)", "us", spread=True),
     Output("actuator_motors", r"control\[(\d+)\]", "1"),
     Output("actuator_outputs", r"output\[(\d+)\]"),
     Output(r"mavros_msgs/.*RCOut", r"channels\[(\d+)\]", "us"),
@@ -219,8 +311,11 @@ OUTPUTS = (
 
 FORCE, TORQUE = "force", "torque"
 _WRENCH = r"geometry_msgs/.*Wrench(Stamped)?"
-WRENCHES = tuple(
-    Message(_WRENCH, _each(f"{nested}{part}.{{}}"), part) for nested in ("wrench.", "") for part in (FORCE, TORQUE)
+_CONTROL_FORCE = _BLUEYE.format("ControlForce")
+WRENCHES = (
+    *(Message(_WRENCH, _each(f"{nested}{part}.{{}}"), part) for nested in ("wrench.", "") for part in (FORCE, TORQUE)),
+    Message(_CONTROL_FORCE, _each("control_force.{}", ("surge", "sway", "heave")), FORCE, frame=FRD),
+    Message(_CONTROL_FORCE, ("", "", "control_force.yaw"), TORQUE, frame=FRD),
 )
 """The wrenches that drive a vehicle: forces in N and moments in N.m along the axes of the body."""
 
@@ -291,6 +386,8 @@ FLAGS = (
 THRUSTER = r"\b(thr|thrusters?|motors?|propellers?|pwm|esc)\b"
 COMMANDS = rf"{THRUSTER}|\b(servo|cmd|command|out|outputs?|u) \d+\b|^u \w+$"
 """A regular expression that occurs among the words of an unknown header of a CSV file that is a command."""
+_LINEAR, _ANGULAR = "(linear|velocity|vel|twist|dvl|speed)( .*)?", "(angular|gyro|rates?|rotation|omega)( .*)?"
+_ATTITUDE = "(orientation|orient|euler|rpy|attitude)( .*)?"
 HEADERS = (
     ("time", "time|t|timestamp"),
     ("command", "commands?|cmd|throttle|pwm|duty|setpoint|input|output"),
@@ -299,19 +396,110 @@ HEADERS = (
     ("time constant", "tau|constant|time"),
     ("", "|".join(sorted(NOT_MEASURED))),
     ("", "acceleration|accel|acc|covariance|valid|validity|invalid"),
-    ("roll velocity", "roll|gyrox|(angular|gyro|rates)( .*)? x"),
-    ("pitch velocity", "pitch|gyroy|(angular|gyro|rates)( .*)? y"),
-    ("yaw velocity", "yaw|turn|heading|gyroz|(angular|gyro|rates)( .*)? z"),
-    ("surge velocity", "surge|forward|ahead|v ?x|(linear|velocity|vel|twist|dvl)( .*)? x"),
-    ("sway velocity", "sway|side|sideways|lateral|v ?y|(linear|velocity|vel|twist|dvl)( .*)? y"),
-    ("heave velocity", "heave|vertical|v ?z|(linear|velocity|vel|twist|dvl)( .*)? z"),
-    ("", "rate|speed"),
+    ("roll velocity", f"roll|{_ANGULAR} x"),
+    ("pitch velocity", f"pitch|{_ANGULAR} y"),
+    ("yaw velocity", f"yaw|turn|heading|{_ANGULAR} z"),
+    ("surge velocity", f"surge|forward|ahead|v x|{_LINEAR} x"),
+    ("sway velocity", f"sway|side|sideways|lateral|v y|{_LINEAR} y"),
+    ("heave velocity", f"heave|vertical|v z|{_LINEAR} z"),
+    ("", "rate|speed|temperature|temp"),
     ("depth", "depth|(position|pos)( .*)? z"),
-    ("heading", "heading|yaw|compass|hdg|(orientation|orient|euler|rpy|attitude)( .*)? z"),
-    ("roll angle", "roll|(orientation|orient|euler|rpy|attitude)( .*)? x"),
-    ("pitch angle", "pitch|(orientation|orient|euler|rpy|attitude)( .*)? y"),
+    ("heading", f"heading|yaw|compass|hdg|{_ATTITUDE} z"),
+    ("roll angle", f"roll|{_ATTITUDE} x"),
+    ("pitch angle", f"pitch|{_ATTITUDE} y"),
+    ("", "internal|hull|housing|cells?|current|capacity|percent|remaining|power|energy|servos?|esc|motors?|thrusters?"),
+    ("pressure", "pressure|baro|barometer"),
     ("voltage", "voltage|battery"),
 )
 """The words of unknown headers of CSV files, as regular expressions, and the columns that they seem to mean. A velocity
-must have its unit, or be the last component of a vector; other quantities have the likely unit. What the empty name
-matches is none of the quantities after it."""
+must have its unit, or be the last component of a vector, and a pressure its unit; other quantities have the likely
+unit. What the empty name matches is none of the quantities after it."""
+_OTHER_WORDS = {
+    "time": "utc zeit uhrzeit zeitstempel temps heure tiempo hora ora tijd tid время 时间 時刻",
+    "date": "day datum fecha jour giorno dato dag дата 日期",
+    "depth": "tiefe profondeur profundidad profundidade profondita diepte djup dybde глубина 水深 深度",
+    "heading": "kurs cap rumbo rota prua koers azimuth azimut курс 航向 方位",
+    "compass": "kompass kompas compas brujula bussola boussole kompassi компас 罗盘",
+    "voltage": "spannung tension voltaje tensao tensione spanning spenning volts volt vbat напряжение 电压 電圧",
+    "battery": "batt bat batterie bateria batteria batterij batteri akku accu батарея 电池",
+    "speed": "geschwindigkeit vitesse velocidad velocidade velocita snelheid hastighet hastighed fart скорость 速度",
+    "pressure": "druck pression presion pressao pressione tryck trykk tryk paine press давление 压力",
+    "temperature": "temperatur temperatura",
+    "current": "strom courant corriente corrente stroom strom amps",
+    "percent": "pct prozent soc",
+    "gyro": "gyroscope gyr gyros gyroskop giroscopio gyroscoop drehrate",
+    "roll": "rollwinkel roulis",
+    "pitch": "nickwinkel tangage",
+    "yaw": "gierwinkel lacet",
+    "acceleration": "accelerometer beschleunigung",
+}
+_SAME = {other: word for word, others in _OTHER_WORDS.items() for other in others.split()}
+"""The words of HEADERS by other words for the same, of loggers and of other languages, without accents."""
+FALSE_FRIENDS = {"cap", "tension", "press", "rota", "fart", "temps", "hora", "ora", "tid", "utc"}
+"""Other words that also mean something else, so that they tell a quantity only together with one of its units."""
+_ENDS = [word for word in _SAME if len(word) >= 5 and word not in FALSE_FRIENDS]
+_JOINED = re.compile("(v|vel|pos|gyro|gyr|omega|rate|w|a|acc|accel)([xyz])|(roll|pitch|yaw)(rate|speed|vel)")
+"""Words that loggers write as one, such as `vx`, `gyroz` and `yawspeed`; the short ones have a longer word."""
+_LONG = {"w": "omega", "a": "acc"}
+
+
+def words_in(text: str) -> list[str]:
+    """Return the words and numbers of a header or a unit in small letters, without accents: `yawRate` has two."""
+    plain = normalize("NFKD", re.sub("[°º]", " deg ", text))
+    spaced = re.sub("([a-z])(?=[A-Z])", r"\1 ", "".join(letter for letter in plain if not combining(letter)))
+    words = re.findall(r"[^\W\d_]+|[0-9]+", spaced.casefold())
+    joined = ((word, _JOINED.fullmatch(word)) for word in words)
+    return [
+        part
+        for word, match in joined
+        for part in ((_LONG.get(one, one) for one in match.groups() if one) if match else [word])
+    ]
+
+
+def meanings(words: Iterable[str]) -> list[str]:
+    """Return the words of HEADERS for the words of a header, which may be of another language.
+
+    The last part of a compound counts, as in Batteriespannung.
+    """
+    return [_SAME.get(word) or next((_SAME[end] for end in _ENDS if word.endswith(end)), word) for word in words]
+
+
+def words_for(word: str) -> list[str]:
+    """Return the other words for a word of HEADERS."""
+    return _OTHER_WORDS[word].split()
+
+
+_SECONDS = ("s", "sec", "secs", "second", "seconds")
+_OTHER_UNITS = {
+    "m": ("meter", "meters", "metre", "metres"),
+    "ft": ("feet", "foot"),
+    "rad": ("rads", "radian", "radians"),
+    "deg": ("degs", "degree", "degrees"),
+    "kn": ("kt", "kts", "knot", "knots"),
+    "V": ("volt", "volts"),
+    "s": _SECONDS[1:],
+    "ms": ("msec", "millis", "milliseconds"),
+    "us": ("usec", "micros", "microseconds"),
+}
+"""Other names of units."""
+PLURALS = {"rads", "degs"}
+"""Units of angles, and, of the component of a vector, of rates."""
+
+
+@cache
+def unit_names(units: tuple[str, ...]) -> Mapping[str, str]:
+    """Return the units of a quantity by all their names, each as the words of it that are separated by blanks.
+
+    A speed in m/s is also `mps`, `ms`, `m_s`, `m per s`, and `m s-1`.
+    """
+    names: dict[str, str] = {}
+    for unit in units:
+        length, _, second = unit.partition("/")
+        spelled = [length, *_OTHER_UNITS.get(length, ())]
+        if second:
+            ends = [form for s in _SECONDS for form in (f"/{s}", f"p{s}", f" per {s}", f"/{s}-1")]
+            spelled = [f"{length}s", *(f"{name}{end}" for name in spelled for end in ends)]
+        for form in spelled:
+            for text in (form, form.casefold()):
+                names.setdefault(" ".join(words_in(text)), unit)
+    return names

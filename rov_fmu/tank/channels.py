@@ -13,7 +13,7 @@ are applied:
 """
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -55,10 +55,19 @@ _COMPARED, _LEAST_COMPARED = 1.0, 8
 _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 """A velocity contradicts the positions if the root mean square of the difference is more than the first share of the
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
+_LEAST_TURN = 0.1
+"""The turn within _COMPARED of a vehicle that surely turns, rad."""
 _EARTH_AXES, _BODY_AXES = ("to the north", "to the east", "down"), ("forward", "to starboard", "down")
 """The axes of the two frames."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
+
+
+_WATERS = 0.9, 1.1
+"""The range of specific gravities of water in which vehicles dive."""
+Gravity = Callable[[Array], Array]
+"""Returns the specific gravity of the water at some times, s, as the autopilot is told. Another one than that of water
+counts as that of fresh water, 1."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +97,7 @@ class Topic:
         """Return True if the messages are what an entry of the catalogue describes."""
         name, kind = self.source.topic, self.source.kind
         is_meant = re.fullmatch(message.kind, kind) and re.search(message.topic, name)
-        return bool(is_meant) and {*message.fields} <= self.fields.keys()
+        return bool(is_meant) and {*message.fields} - {""} <= self.fields.keys()
 
     def where(self, kept: Flags) -> "Topic":
         """Return the topic with only some of its messages."""
@@ -115,21 +124,26 @@ class _Measurement:
 
 
 def channels_of(
-    topics: Sequence[Topic], sender: Source | None, others: Collection[str] = (), named: Sequence[Channel] = ()
+    topics: Sequence[Topic],
+    sender: Source | None,
+    others: Collection[str] = (),
+    named: Sequence[Channel] = (),
+    gravity: Gravity = np.ones_like,
 ) -> list[Channel]:
     """Return all channels of the topics, with the reason for each that is not used; preferred ones come first.
 
     `sender` is the source of the commands, and `others` are the names of other vehicles that have commands. `named` are
-    the channels that rov.toml names, which are preferred to all others.
+    the channels that rov.toml names, which are preferred to all others. `gravity` tells the water.
     """
     measurements = [*_measurements(topics, sender, others)]
+    measurements = [replace(one, unused=one.unused or _standstill(one, measurements)) for one in measurements]
     attitude = _attitude(measurements)
     channels = [*named]
     for measurement in measurements:
         is_velocity = measurement.message.gives == VELOCITY
         reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
         one = replace(measurement, unused=reason)
-        channels += _channels(*_agreeing(one, measurements, attitude), attitude)
+        channels += _channels(*_agreeing(one, measurements, attitude), attitude, gravity)
     return with_one_source(channels)
 
 
@@ -197,23 +211,37 @@ def _attitude_of(measurement: _Measurement) -> Attitude:
     """Return the attitude at the times at which a measurement knows it: at none if it is of something else."""
     gives, values, time = measurement.message.gives, measurement.values, measurement.topic.time
     known = np.isfinite(values).all(axis=1) & (gives in (EULER, QUATERNION))
-    if gives == QUATERNION:
-        known &= np.linalg.norm(values, axis=1) > 0.5
     if gives != QUATERNION or not known.any():
         return time[known], Rotation.from_euler("ZYX", np.reshape(values[known, ::-1], (-1, 3)))
-    earth, body = _frames(measurement)
+    earth, body = frames_of(measurement.message, measurement.topic.source)
     rotation = Rotation.from_quat(values[known], scalar_first=True).as_matrix()
     return time[known], Rotation.from_matrix(earth @ rotation @ body)
 
 
-def _frames(measurement: _Measurement) -> tuple[Array, Array]:
-    """Return the two matrices of `frames_of` for a message, whose frames the catalogue may know."""
-    return (np.eye(3), np.eye(3)) if measurement.message.frame else frames_of(measurement.topic.source)
+def _standstill(attitude: _Measurement, measurements: Sequence[_Measurement]) -> str:
+    """Return the reason against an attitude that never changes although the vehicle turns, by the rates of turn in the
+    same messages, or else in others; or an empty text. Some sensors send a constant where they measure none."""
+    known, _ = _attitude_of(attitude)
+    values = attitude.values[np.isfinite(attitude.values).all(axis=1)]
+    if len(known) < LEAST_SAMPLES or np.ptp(values, axis=0).any():
+        return ""
+    rates = [m for m in measurements if m.message.gives == RATES and not m.unused]
+    for one in sorted(rates, key=lambda m: m.topic is not attitude.topic)[:1]:
+        ends = first_in_each(one.topic.time, 1.0 / _COMPARED)
+        angles = np.cumsum(np.nan_to_num(one.values[1:]) * np.diff(one.topic.time)[:, None], axis=0)
+        turned = np.abs(np.diff(angles[ends[:-1]], axis=0)).max(initial=0.0)
+        if turned > _LEAST_TURN:
+            return (
+                f"it never changes, although {one.topic.source} tells turns of {np.degrees(turned):.3g} deg in a second"
+            )
+    return ""
 
 
-def frames_of(source: Source) -> tuple[Array, Array]:
+def frames_of(message: Message, source: Source) -> tuple[Array, Array]:
     """Return two matrices: from the earth frame of a source to north, east, down, and from its body frame to forward,
-    starboard, down."""
+    starboard, down. The catalogue may know the frames of a message."""
+    if message.frame:
+        return np.eye(3), np.eye(3)
     earth, body = source.frames
     earth_words, body_words = words_of(earth), words_of(body)
     is_frd = bool(body_words & {"ned", "frd"}) or ("ned" in earth_words and "flu" not in body_words)
@@ -244,7 +272,7 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     known, rotation = _attitude_of(quaternion)
     if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
         return ""
-    earth, body = _frames(velocity)
+    earth, body = frames_of(velocity.message, velocity.topic.source)
     ends = first_in_each(time, 1.0 / _COMPARED)
     moved = np.diff((position.values @ earth.T)[ends], axis=0)
     rates = {"the body": rotation.apply(velocity.values @ body.T), "the earth": velocity.values @ earth.T}
@@ -275,7 +303,7 @@ def _agreeing(
     is_compared = velocity.message.gives == VELOCITY and not velocity.unused and (is_of_earth or attitude)
     if not (position and is_compared):
         return velocity, ""
-    earth, body = _frames(velocity)
+    earth, body = frames_of(velocity.message, velocity.topic.source)
     to_own, names = (earth, _EARTH_AXES) if is_of_earth else (body, _BODY_AXES)
     values, time = velocity.values @ to_own.T, velocity.topic.time
     axes = None if is_of_earth or not attitude else _at(attitude, time).as_matrix()
@@ -298,13 +326,13 @@ def _at(attitude: Slerp, time: Array) -> Rotation:
 # ---- Channels --------------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None) -> Iterator[Channel]:
+def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
     """Yield the channels of a measurement. `corrected` says by what its velocities are corrected."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
-    earth, body = _frames(measurement)
+    earth, body = frames_of(measurement.message, measurement.topic.source)
     unused = measurement.unused
     if gives == POSITION:
-        yield from _of_position(topic, values @ earth.T, unused)
+        yield from _of_position(topic, _turned(values, earth), unused)
     elif gives in (EULER, QUATERNION):
         time, rotation = _attitude_of(measurement)
         angles = rotation.as_euler("ZYX")[:, ::-1].T if len(time) else ()
@@ -312,9 +340,9 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None)
             yield Channel(QUANTITIES[axis.position], topic.source, time, column, unused=unused)
     elif gives in (VELOCITY, RATES):
         if not _is_of_earth(measurement):
-            values = values @ body.T
+            values = _turned(values, body)
         elif attitude:
-            values = _at(attitude, topic.time).inv().apply(values @ earth.T)
+            values = _at(attitude, topic.time).inv().apply(_turned(values, earth))
         else:
             frame = topic.source.frames[1] or "the earth"
             unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
@@ -323,7 +351,13 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None)
             quantity = QUANTITIES[f"{axis.name} velocity"]
             yield Channel(quantity, topic.source, topic.time, column, unused=unused, corrected=corrected)
     else:
-        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused)
+        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused, gravity)
+
+
+def _turned(values: Array, axes: Array) -> Array:
+    """Return n x 3 numbers along other axes. A component that is unknown leaves those that do not follow from it."""
+    unknown = np.isnan(values) @ (axes != 0.0).T
+    return np.where(unknown, np.nan, np.nan_to_num(values) @ axes.T)
 
 
 def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel]:
@@ -338,12 +372,24 @@ def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel
             yield Channel(QUANTITIES[name], topic.source, topic.time, values, unused=unused)
 
 
-def of_scalar(quantity: Quantity, source: Source, time: Array, values: Array, unused: str = "") -> Iterator[Channel]:
-    """Yield a channel, and the depth that a pressure implies in fresh water."""
+def of_scalar(
+    quantity: Quantity,
+    source: Source,
+    time: Array,
+    values: Array,
+    unused: str = "",
+    gravity: Gravity = np.ones_like,
+) -> Iterator[Channel]:
+    """Yield a channel, and the depth that a pressure implies in the water that `gravity` tells."""
     yield Channel(quantity, source, time, values, unused=unused)
     if quantity.name == "pressure":
-        depth, reason = (values - ATMOSPHERE) / PRESSURE_GRADIENT, unused or _reason_against_pressure(values)
-        yield Channel(QUANTITIES["depth"], source, time, depth, unused=reason, derived_from="pressure")
+        told, (low, high) = gravity(time), _WATERS
+        relative = np.where((told >= low) & (told <= high), told, 1.0)
+        depth, reason = (values - ATMOSPHERE) / PRESSURE_GRADIENT / relative, unused or _reason_against_pressure(values)
+        water = "fresh water (1000 kg/m3). In sea water the true depth is 2.5 % smaller"
+        if (relative != 1.0).any():
+            water = f"water of {1000.0 * relative[-1]:.4g} kg/m3, which the autopilot is told"
+        yield Channel(QUANTITIES["depth"], source, time, depth, unused=reason, derived_from=f"pressure, for {water}")
 
 
 def _reason_against_pressure(values: Array) -> str:

@@ -51,6 +51,8 @@ COMMAND = "command"
 FRACTION = Column({"%": 100.0, "1": 1.0}, minimum=-1.0, maximum=1.0)
 HELD_COMMAND = replace(FRACTION, least=1e-4, conversions=COMMANDS)
 TIME = Column(TIMES, minimum=-1e10, maximum=1e10, parse=seconds)  # some loggers count from 1970
+DATE = Column({"": 1.0}, optional=True, blanks=True)
+"""The dates of times of day, as texts. Their header has no unit."""
 
 
 def logged_command(keys: LogKeys = NO_KEYS) -> Column:
@@ -167,7 +169,7 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         # `read_log` checks the bounds after the marks of no measurement are left out.
         column = replace(quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None)
         columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
-    return columns
+    return {**columns, "date": LogColumn(DATE)}
 
 
 def _force_column(axis: Axis) -> Column:
@@ -209,7 +211,7 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
     of_logs = columns_of_log(layout or Layout((), (), ()), None, tables.logs)
     known = known_columns(of_logs)
     of_csv = {**known, COMMAND: logged_command(tables.logs), **_OF_TABLES}
-    del known["time"]
+    del known["time"], known["date"]
     entries, mistakes = {}, []
     for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", known, tables.topics)):
         columns = KnownColumns(allowed)

@@ -15,7 +15,7 @@ servo x to a motor only if MOT_PWM_TYPE is 8 (PWMRange) or 9 (PWMAngle), and use
 
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, TypeVar
@@ -44,6 +44,8 @@ _OFTEN = 0.5
 """An output of which no parameter tells what it drives is a motor's if it changes so often, relative to the others."""
 _ARDUPILOT_MOTORS = (*range(33, 41), *range(82, 86))
 """The functions of outputs of ArduPilot that drive the motors 1, 2, ... 12."""
+_PER_MODULE = 16
+"""The most outputs of an instance of PX4's outputs."""
 _PX4_MOTOR = 100
 """The function of output x of PX4 that drives motor n is n more than this."""
 _REST, _SHARE, _SELDOM, _BRIEF = 100.0, 0.1, 0.01, 0.1
@@ -98,6 +100,14 @@ class Parameters:
         self.used.add(name)
         times, values = self.told[name]
         return held(times, values, time)
+
+    def specific_gravity(self, time: Array) -> Array:
+        """Return the specific gravity of the water that ArduSub was told at some times, or 1.
+
+        Its altitudes are computed for this water, and a logged pressure is not: `AP_Baro::update` has altitude =
+        (ground pressure - pressure) / 9800 Pa/m / BARO_SPEC_GRAV.
+        """
+        return self.at("BARO_SPEC_GRAV", time, 1.0)
 
     def last(self, name: str) -> float | None:
         """Return the last value, or None."""
@@ -181,8 +191,10 @@ def commands_of(
         return Commanded()
     vehicle = max(own, key=lambda outputs: outputs.messages).source.vehicle
     own = [outputs for outputs in own if outputs.source.vehicle == vehicle]
-    best = _best(own, len(thrusters), parameters)
-    functions = _functions(parameters)
+    modules = _motor_modules(parameters)
+    own = [*own, *_joined(own, modules)]
+    best = _best(own, len(thrusters), modules)
+    functions = _functions(parameters, modules)
     numbers = _motors(best, len(thrusters), functions)
     names = thrusters or [str(n) for n in range(1, len(numbers) + 1)]
     if missing := [name for name, n in zip(names, numbers, strict=True) if n and n not in best.series]:
@@ -209,10 +221,12 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
     for message in WRENCHES:
         for topic in topics:
             if topic.has(message):
-                _, body = frames_of(topic.source)
-                values = np.column_stack([topic.fields[field] for field in message.fields]) @ body.T
+                _, body = frames_of(message, topic.source)
+                nothing = np.zeros(len(topic.time))
+                values = np.column_stack([topic.fields.get(field, nothing) for field in message.fields]) @ body.T
                 for force in forces:
-                    if force.axis.is_rotation == (message.gives != FORCE):
+                    is_told = message.fields[force.axis.place]
+                    if is_told and force.axis.is_rotation == (message.gives != FORCE):
                         series = topic.time, np.nan_to_num(values[:, force.axis.place])
                         found.setdefault(topic.source, {})[force.name] = series
     own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)
@@ -258,10 +272,10 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
     """Yield all outputs that may be those of the thrusters, in the order of the catalogue's preference.
 
     The number of an output is that of its field, or that of the topic where each thruster has its own, and the names of
-    these topics differ only in it.
+    these topics differ only in it. Outputs that are spread over several messages have the times of the first one.
     """
     for rule in OUTPUTS:
-        found: dict[tuple[str, str] | Topic, dict[int, tuple[Topic, Array]]] = {}
+        found: dict[tuple[str, ...] | Topic, dict[int, tuple[Topic, Array]]] = {}
         for topic in topics:
             name, kind = topic.source.topic, topic.source.kind
             match = re.search(rule.topic, name)
@@ -270,13 +284,25 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
             for place, values in topic.fields.items():
                 if of_field := re.fullmatch(rule.field, place):
                     is_numbered = bool(match.groups())
-                    alike = (name[: match.start(1)], name[match.end(1) :]) if is_numbered else topic
+                    sender = (topic.source.vehicle, topic.source.part) if rule.spread else topic
+                    alike = (name[: match.start(1)], name[match.end(1) :]) if is_numbered else sender
                     number = int((match if is_numbered else of_field)[1])
                     found.setdefault(alike, {})[number] = topic, values
         for by_number in found.values():
-            ordered = [by_number[n] for n in sorted(by_number)]
-            series = {n: (topic.time, values) for n, (topic, values) in enumerate(ordered, start=1)}
-            yield _Outputs(rule, ordered[0][0].source, series, {topic.source.topic for topic, _ in ordered})
+            numbers = sorted(by_number)
+            first, _ = by_number[numbers[0]]
+            places = numbers if rule.spread else range(1, len(numbers) + 1)
+            series = {n: (by_number[k][0].time, by_number[k][1]) for n, k in zip(places, numbers, strict=True)}
+            if rule.spread:
+                series = {n: _at_times_of(first.time, *own) for n, own in series.items()}
+            yield _Outputs(rule, first.source, series, {topic.source.topic for topic, _ in by_number.values()})
+
+
+def _at_times_of(rows: Array, time: Array, values: Array) -> Series:
+    """Return an output that another message has in the rows of a message: the latest value until half an interval
+    after each row."""
+    later = 0.5 * float(np.median(np.diff(rows))) if len(rows) > 1 else np.inf
+    return rows, values if time is rows else held(time, values, rows + later)
 
 
 def _named(
@@ -290,15 +316,15 @@ def _named(
     return found
 
 
-def _best(candidates: Sequence[_Outputs], thrusters: int, parameters: Parameters) -> _Outputs:
+def _best(candidates: Sequence[_Outputs], thrusters: int, modules: Mapping[str, int]) -> _Outputs:
     """Return the outputs of one vehicle that drive the motors: those that fit best, and change most."""
     same = [outputs for outputs in candidates if outputs.rule is candidates[0].rule]
-    module = _motor_module(parameters)
-    return max(same, key=lambda o: (o.source.part == module, len(o.used) == thrusters, _activity(o.series)))
+    wanted = _instances(modules)
+    return max(same, key=lambda o: (o.source.part == wanted, len(o.used) == thrusters, _activity(o.series)))
 
 
-def _motor_module(parameters: Parameters) -> str:
-    """Return the instance of PX4's outputs that drives the motors, by the functions of the outputs, or `none`.
+def _motor_modules(parameters: Parameters) -> dict[str, int]:
+    """Return the modules of PX4's outputs that drive motors, by the functions of the outputs, with their instances.
 
     The first instance is of the MAIN outputs, if any of these has a function, and the next one of the AUX outputs.
     """
@@ -306,18 +332,43 @@ def _motor_module(parameters: Parameters) -> str:
     for match, function in parameters.functions(r"PWM_(MAIN|AUX)_FUNC\d+"):
         if function:
             drives[match[1]] = drives.get(match[1], False) or 0 < function - _PX4_MOTOR <= _MOST_MOTORS
-    driving = [drives[module] for module in sorted(drives, reverse=True)]
-    return f"instance {driving.index(True)}" if any(driving) else "none"
+    return {module: n for n, module in enumerate(sorted(drives, reverse=True)) if drives[module]}
 
 
-def _functions(parameters: Parameters) -> dict[int, Function]:
-    """Return what the outputs drive, by the number of the output, as far as the parameters tell it."""
+def _instances(modules: Mapping[str, int]) -> str:
+    """Return the words for the instances of PX4's outputs that drive motors."""
+    return f"instance {' and '.join(map(str, modules.values()))}" if modules else "none"
+
+
+def _joined(outputs: Sequence[_Outputs], modules: Mapping[str, int]) -> Iterator[_Outputs]:
+    """Yield the outputs of several instances together, where motors are on several; those of each begin at a multiple
+    of _PER_MODULE."""
+    by_part = {one.source.part: one for one in outputs}
+    parts = [by_part.get(f"instance {n}") for n in modules.values()]
+    found = [one for one in parts if one]
+    if len(modules) < 2 or len(found) < len(modules):
+        return
+    (time, _), topics = next(iter(found[0].series.values())), [topic for one in found for topic in one.topics]
+    series = {
+        n + _PER_MODULE * place: _at_times_of(time, *own)
+        for place, one in enumerate(found)
+        for n, own in one.series.items()
+    }
+    yield _Outputs(found[0].rule, replace(found[0].source, part=_instances(modules)), series, topics)
+
+
+def _functions(parameters: Parameters, modules: Mapping[str, int]) -> dict[int, Function]:
+    """Return what the outputs drive, by the number of the output, as far as the parameters tell it.
+
+    `modules` are those of PX4 that drive motors, whose outputs are numbered together.
+    """
     found = {}
     for match, function in parameters.functions(r"(?:SERVO|PWM_(MAIN|AUX)_FUNC)(\d+)(?(1)|_FUNCTION)"):
         motors = range(_PX4_MOTOR + 1, _PX4_MOTOR + 1 + _MOST_MOTORS) if match[1] else _ARDUPILOT_MOTORS
         motor = motors.index(int(function)) + 1 if function in motors else 0
         if motor or not match[1]:  # an output of PX4 that drives no motor may be another one of the same number
-            found[int(match[2])] = Function(int(match[2]), motor, f"{match[0]} {function:g}")
+            number = int(match[2]) + _PER_MODULE * ([*modules].index(match[1]) if motor and match[1] else 0)
+            found[number] = Function(number, motor, f"{match[0]} {function:g}")
     return found
 
 

@@ -48,6 +48,8 @@ _WARNINGS = {
         "{files}: {count:#value} of {columns} left out, because {what} is far from all others: a mark that nothing was "
         "measured"
     ),
+    "only mark": "{files}: {columns} left out, because all numbers are {what}: a mark that nothing was measured",
+    "below any": "{files}: {count:#value} of {columns} left out, because no measurement is below {what}",
     "missing column": (
         "{files}: there is no column of {column}. Its command is taken as 0. Add the column if this is wrong"
     ),
@@ -80,6 +82,10 @@ _WARNINGS = {
     "parameter changed": "{files}: {name} changed {at} s after the first command. Each value is used in its time",
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
+    "cut": (
+        "{files}: the file ends amid its messages, as after a loss of power. The {read} s before that are read, and "
+        "what was recorded later is missing"
+    ),
     "several vehicles": (
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; `vehicle` in [logs] of rov.toml names another"
     ),
@@ -130,10 +136,7 @@ _DOUBTS = {
         "push ahead above its neutral pulse"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
-    "depth by pressure": (
-        "{files}: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water "
-        "the true depth is 2.5 % smaller"
-    ),
+    "depth by pressure": "{files}: the depth is computed from the {by}",
 }
 _FACTS = {
     "other files": "{files}: not read, because {reason}",

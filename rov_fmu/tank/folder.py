@@ -33,7 +33,7 @@ from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked, uninterrupted
 from rov_fmu.tank.read_log import read_logs
-from rov_fmu.tank.readers.listing import BAG, NOT_OPENED, Listing, has_usual_suffix, list_files
+from rov_fmu.tank.readers.listing import NOT_OPENED, Listing, has_usual_suffix, is_bag, list_files
 from rov_fmu.tank.readers.parsers import header_of, one_parser
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
 from rov_fmu.vehicle.quantity import Quantity
@@ -92,7 +92,7 @@ class Folder:
     @property
     def voltages(self) -> list[Array]:
         """The samples of the voltage of each log that has one, V."""
-        return [c.samples[1] for log in self.logs if (c := log.used("voltage")) and c.count]
+        return [c.samples[1] for log in self.logs if (c := log.used("voltage"))]
 
     def counts(self, kind: str, subject: str, command: float) -> bool:
         """Return True if a command in a table is inside the window of rov.toml."""
@@ -282,10 +282,10 @@ def folder_and_files(paths: Sequence[Path]) -> tuple[Path, list[Path]]:
             raise DataFileError(f"{path}: {NOT_OPENED}")
         if path.suffix.lower() in OWN_SUFFIXES and path.is_file():
             check_suffix(path, TESTS, DataFileError)
-        is_bag = (path / BAG).is_file()
-        folder = path if path.is_dir() and not is_bag else path.parent
-        folder = folder.parent if (folder / BAG).is_file() else folder
-        folders.setdefault(folder, []).extend(list_files(path).tests if is_bag else [path])
+        is_whole_bag = path.is_dir() and is_bag(path)
+        folder = path if path.is_dir() and not is_whole_bag else path.parent
+        folder = folder.parent if is_bag(folder) else folder
+        folders.setdefault(folder, []).extend(list_files(path).tests if is_whole_bag else [path])
     (folder, files), *others = folders.items()
     if others or (folder in files and len(paths) > 1):
         raise DataFileError(f"{paths[1]}: is not beside {paths[0]}: copy all logs of a vehicle into one folder")

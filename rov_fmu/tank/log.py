@@ -65,7 +65,8 @@ class Channel:
     unused: str = ""
     """Why the channel is not used, such as `a setpoint`; empty for a channel that is used."""
     derived_from: str = ""
-    """The quantity that the sensor measures, such as `pressure`, if the values are computed from it."""
+    """The quantity that the sensor measures, with what is assumed, such as `pressure, for fresh water`, if the values
+    are computed from it."""
     corrected: str = ""
     """By what a velocity is corrected so that it agrees with the position, in words; empty for values as measured."""
 
@@ -180,5 +181,11 @@ class Log:
     """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
 
     def used(self, name: str) -> Channel | None:
-        """Return the channel that is used for a quantity, by the quantity's name, or None."""
-        return next((c for c in self.channels if c.quantity.name == name and not c.unused), None)
+        """Return the channel that is used for a quantity, by the quantity's name, or None if nothing measures it."""
+        return next((c for c in self.channels if c.quantity.name == name and not c.unused and c.count), None)
+
+    @property
+    def tilt(self) -> tuple[Channel, Channel] | None:
+        """The roll and the pitch, if the log has both. Where neither ever changes, nothing measures them."""
+        roll, pitch = self.used("roll angle"), self.used("pitch angle")
+        return (roll, pitch) if roll and pitch and any(np.ptp(one.samples[1]) for one in (roll, pitch)) else None

@@ -46,8 +46,7 @@ def checked(log: Log) -> Log:
     channels = _agreeing(channels, log.axis)
     findings = [*log.findings, *frozen, *_corrected(log.file, channels)]
     used = [channel for channel in channels if not channel.unused]
-    if any(channel.derived_from == "pressure" for channel in used):
-        findings.append(about(log.file, "depth by pressure"))
+    findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
     for channel in used:
         if not channel.quantity.is_velocity:

@@ -96,7 +96,9 @@ def _log(
         *_findings(file, layout, series, labels),
         *misfits(file, layout, commanded.without_pulse, without_thruster, config),
     ]
-    channels = channels_of(piece.topics, commanded.sender, commanded.other_vehicles, named)
+    channels = channels_of(
+        piece.topics, commanded.sender, commanded.other_vehicles, named, piece.parameters.specific_gravity
+    )
     used = {channel.source.topic for channel in channels} | {*commanded.topics}
     used |= {piece.fields[field] for field in entries.keys() & piece.fields.keys()}
     commands = None
@@ -148,7 +150,8 @@ def _meant(
                     if not topic.source.kind:
                         _check_bounds(path, field, quantity, converted)
                     source = replace(topic.source, topic=field)
-                    channels += of_scalar(quantity, source, topic.time, converted)
+                    gravity = piece.parameters.specific_gravity
+                    channels += of_scalar(quantity, source, topic.time, converted, gravity=gravity)
                 elif told.any():
                     labels[entry.name] = field
                     time = topic.time if told.all() else topic.time[told]

@@ -13,17 +13,34 @@ from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, Wit
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.output import is_same
-from rov_fmu.io.paths import DEVICE, inside, inside_or_shipped
+from rov_fmu.io.paths import inside, inside_or_shipped, is_portable
 from rov_fmu.io.toml_file import AS_TUPLE, Name, Strict, Text, folder_of, printable, rule
 from rov_fmu.vehicle.quantity import Interval
 
+_KEYWORDS = re.compile(
+    "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long|register|"
+    "restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while|"
+    "alignas|alignof|bool|constexpr|false|nullptr|static_assert|thread_local|true|typeof|typeof_unqual|"
+    "_(Alignas|Alignof|Atomic|BitInt|Bool|Complex|Decimal(32|64|128)|Generic|Imaginary|Noreturn|Static_assert|Thread_local)"
+)
+"""The keywords of C, from C99 to C23."""
+
+
+def why_no_identifier(text: str) -> str:
+    """Return why a text cannot name an FMU on every system, or an empty text."""
+    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
+        return "must be a C identifier: at most 100 letters, digits and underscores, no digit first"
+    if _KEYWORDS.fullmatch(text):
+        return "must be a C identifier, and not a keyword of C"
+    if not is_portable(text):
+        return "must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0 ... COM9, LPT0 ... LPT9"
+    return ""
+
 
 def _identifier(text: str) -> str:
-    """Return the text if it can name an FMU on every system. Raises ValueError."""
-    if not re.fullmatch(r"[A-Za-z_][A-Za-z0-9_]{0,99}", text):
-        raise ValueError("must be a C identifier: at most 100 letters, digits and underscores, no digit first")
-    if DEVICE.fullmatch(text):
-        raise ValueError("must not be a name that Windows reserves: CON, PRN, AUX, NUL, COM0 ... COM9, LPT0 ... LPT9")
+    """Return the text if it can name an FMU. Raises ValueError."""
+    if reason := why_no_identifier(text):
+        raise ValueError(reason)
     return text
 
 
@@ -33,7 +50,7 @@ class Head(Strict):
     name: Name
     """The name for people; at most 100 characters."""
     identifier: Annotated[str, AfterValidator(_identifier)]
-    """A C identifier that Windows does not reserve: the name of the FMU."""
+    """A C identifier that neither C nor Windows reserves: the name of the FMU."""
     version: Name
     """The version of the vehicle."""
     description: Text

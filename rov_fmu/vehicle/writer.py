@@ -17,7 +17,7 @@ from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, toml_text
-from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead
+from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead, why_no_identifier
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -209,7 +209,7 @@ def _own_identifier(stem: str, vehicle: Vehicle) -> str:
     """Return an identifier for a copy of a vehicle from the name of its file, which no vehicle has that ships."""
     identifier = re.sub(r"\W|^(?=\d)", "_", stem, flags=re.ASCII)[:90]
     taken = {name.lower() for name in (vehicle.identifier, *SHIPPED)}
-    return f"{identifier}_tuned" if identifier.lower() in taken else identifier
+    return f"{identifier}_tuned" if identifier.lower() in taken or why_no_identifier(identifier) else identifier
 
 
 def _remove_estimate(document: Any, name: str) -> None:

@@ -12,11 +12,19 @@ from dataclasses import dataclass, field
 from math import atan, cos, radians, sin
 from socket import AF_INET, SOCK_DGRAM, socket
 
-from verification.references.autopilot.ardusub import Hold, Motion, Pid
+from verification.references.autopilot.ardusub import VECTORED_6DOF, Hold, Motion, Pid
 
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
 KEYS |= {"voltage": 1, "current": 1}
 _OPTIONAL = {"rng_1", "voltage", "current"}
+START = 1.8
+"""The time during which ArduSub 4.7 starts, s."""
+
+
+def started(time: float, pulses: list[int], channels: int = 16) -> list[int]:
+    """What ArduSub sends: 1500 us to servos 1 to 8 while it starts, and then nothing to servos without a function."""
+    sent = [1500] * 8 if time < START else pulses
+    return [*sent, *[0] * (channels - len(sent))]
 
 
 def packet(rate: int, count: int, pulses: list[int]) -> bytes:
@@ -74,6 +82,8 @@ class ArduSub:
     timeout: float = 1.0
     """The time after which a packet without a reply is sent again, s."""
     channels: int = 16
+    motors: tuple[tuple[int, ...], ...] = VECTORED_6DOF
+    """The factors of each motor of the frame."""
     count: int = 0
     time: float = 0.0
     """The time that has passed by the time stamps of the replies, s."""
@@ -85,7 +95,7 @@ class ArduSub:
         self.socket.connect(("127.0.0.1", self.port))
         self.socket.settimeout(self.timeout)
         self.at: dict[str, list[float]] = {}
-        self.hold = Hold(self.depth, self.heading)
+        self.hold = Hold(self.depth, self.heading, frame=self.motors)
         self.north, self.east = (Pid(1.0, 0.5, 0.0, 10.0, error_filter=5.0) for _ in range(2))  # from m/s to m/s2
 
     def close(self) -> None:
@@ -117,18 +127,16 @@ class ArduSub:
 
     def pulses(self) -> list[int]:
         """The outputs of the motors, µs."""
-        found = [1500] * 8 + [0] * (self.channels - 8)
-        if not self.at:
-            return found
+        if self.time < START:
+            return started(self.time, [], self.channels)
         dt = 1.0 / self.rate
         (phi, theta, _), (ax, ay, az) = self.at["attitude"], self.at["accel_body"]
         fall = -sin(theta) * ax + sin(phi) * cos(theta) * ay + cos(phi) * cos(theta) * az + 9.80665
         attitude, gyro = (self._vector(key) for key in ("attitude", "gyro"))
         motion = Motion(attitude, gyro, self.at["position"][2], self.at["velocity"][2], fall)
         forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
-        for n, out in enumerate(self.hold.outputs(motion, forward, lateral, dt)):
-            found[n] = int(1500 + 400 * out)
-        return found
+        outputs = self.hold.outputs(motion, forward, lateral, dt)
+        return started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels)
 
     def _vector(self, key: str) -> tuple[float, float, float]:
         x, y, z = self.at[key]

@@ -201,7 +201,7 @@ def newtons_of(gazebo: Gazebo, rov: Vehicle, thrust: Mapping[str, float]) -> dic
     return {name: force * gazebo.largest[name] / full[name] for name, force in thrust.items()}
 
 
-@pytest.mark.parametrize("command", [0.3, *(pytest.param(c, marks=pytest.mark.long) for c in (-0.6, 1.0))])
+@pytest.mark.parametrize("command", [0.3, *(pytest.param(c, marks=pytest.mark.long) for c in (-0.6, 0.1, 1.0))])
 @pytest.mark.parametrize("name", SHIPPED)
 def test_an_axis_alone_has_the_steady_velocity_and_the_time_constant_of_the_fmu(name: str, command: float) -> None:
     rov = LOADED[name]

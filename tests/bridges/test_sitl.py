@@ -5,7 +5,7 @@ import random
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from math import atan2, nan, pi, remainder
@@ -18,6 +18,7 @@ from unittest.mock import patch
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rov_fmu
@@ -29,11 +30,12 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.tank.readers.ardusub_frames import servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.bridges.ardusub import ArduSub, packet, parsed
+from tests.bridges.ardusub import START, ArduSub, packet, parsed, started
 from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import numbered, pulsed, thruster
+from verification.references.autopilot.ardusub import VECTORED
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -58,11 +60,11 @@ def stamp(answer: bytes) -> float:
 
 
 @contextmanager
-def served(setup: Setup) -> Iterator[tuple[Connection, int]]:
+def served(setup: Setup, hint: Callable[[str], None] = lambda _: None) -> Iterator[tuple[Connection, int]]:
     """Serve a vehicle in a thread, and yield the connection and its port."""
     with socket(AF_INET, SOCK_DGRAM) as server:
         server.bind(("127.0.0.1", 0))
-        connection = Connection(setup)
+        connection = Connection(setup, hint)
 
         def serve() -> None:
             try:
@@ -300,18 +302,79 @@ TOO_MANY = "the pulses of {} change, but no thruster of the vehicle follows them
 def test_servos_that_do_not_fit_the_vehicle_are_named_once(
     vehicle: str, motors: int, moving: bool, said: list[str]
 ) -> None:
-    """In a flight of more than 1 s they are named then, otherwise at its end; pulses that come late count."""
-    for frames in (120, 20):
+    """They are named when they have not fitted for 1 s, or at the end of a shorter flight.
+
+    ArduSub sends pulses to servos 1 to 8 while it starts; an older one that starts at once sends them late.
+    """
+    for frames, start in ((120, START), (20, START), (120, 0.0), (20, 0.0)):
         hints: list[str] = []
         rov = SIMPLE if vehicle == "simplerov_4" else load_vehicle(SHIPPED[vehicle])
         connection = Connection(setup_of(rov), hints.append)
-        for count in range(frames):
+        for count in range(frames + round(50 * start)):
             pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
-            connection.answer(packet(50, count, [*pulses, *[0] * (16 - len(pulses))]), HERE)
+            sent = started(count / 50.0 + START - start, pulses)
+            connection.answer(packet(50, count, sent), HERE)
         assert hints == (said if frames == 120 else [])
         connection.end()
         connection.end()
         assert hints == said
+
+
+@pytest.mark.parametrize(
+    ("flight", "said"),
+    [
+        ([(3.0, [1500] * 6 + [1100])], []),  # a light that is off
+        ([(3.0, [1500] * 6 + [0, 1900])], []),  # what follows servo 7, which has no pulse
+        ([(2.0, [1500] * 6), (0.9, [1500] * 5), (2.0, [1500] * 6)], []),
+        ([(2.0, [1500] * 6), (3.0, [0] * 6), (2.0, [1500] * 6)], []),  # no servo has a pulse
+        ([(2.0, [1500] * 6), (1.1, [1500] * 5)], ["no pulses come to servo 6 (u_6)"]),
+        ([(3.0, [0] * 6 + [1500])], ["no pulses come to servos 1, 2, 3, 4, 5 and 6 (u_1, u_2, u_3, u_4, u_5 and u_6)"]),
+        (
+            [(2.0, [1500] * 6 + [1100]), (1.1, [1500] * 6 + [1900])],
+            ["the pulses of servo 7 change, but no thruster of"],
+        ),
+    ],
+)
+def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[int]]], said: list[str]) -> None:
+    hints: list[str] = []
+    connection = Connection(setup_of(load_vehicle(SHIPPED["bluerov2"])), hints.append)
+    sent = [pulses for seconds, pulses in [(START, []), *flight] for _ in range(round(50 * seconds))]
+    for count, pulses in enumerate(sent):
+        connection.answer(packet(50, count, started(count / 50.0, pulses)), HERE)
+    connection.end()
+    assert [hint[: len(words)] for hint, words in zip(hints, said, strict=True)] == said
+
+
+def test_the_frame_of_another_vehicle_is_noticed_in_flight() -> None:
+    hints: list[str] = []
+    with served(setup_of(z=1.0), hints.append) as (_, port):
+        autopilot = ArduSub(port, rate=200, motors=VECTORED)
+        autopilot.fly(START + 0.9)
+        assert hints == []
+        autopilot.fly(0.2)
+        autopilot.close()
+    assert hints == [NO_PULSES]
+
+
+@pytest.mark.parametrize(
+    ("name", "setting", "newtons"),
+    [("bluerov2", 0.0, 2.0), ("bluerov2", -5.5, 7.5), ("bluerov2", 5.0, 0.0), ("bluerov2_heavy", -4.0, 3.0)],
+)
+def test_how_far_a_vehicle_rises_before_ardusub_knows_its_position(
+    name: str, setting: float, newtons: float, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By SciPy: (m + m_a) w' = F - b_d w - a_d |w| w, with the numbers of the vehicle file."""
+    rov = load_vehicle(SHIPPED[name])
+    mass, linear, quadratic = rov["m_rov"] + rov["m_a_w"], rov["b_d_w"], rov["a_d_w"]
+    loads = {"F_0_w": 1.0, "W": 1.0, "B": -1.0}
+    force = setting + sum(sign * rov.coefficients.get(load, 0.0) for load, sign in loads.items())
+    fall = solve_ivp(
+        lambda _, y: (y[1], (force - linear * y[1] - quadratic * abs(y[1]) * y[1]) / mass), (0.0, 45.0), (0.0, 0.0)
+    )
+    assert main(["sitl", name, "--set", f"Z_ext={setting}", "--duration", "0.01", "--port", "0"]) == 0
+    said = re.findall(r"rises with (.*) N: (.*) m in the 45 s before", capsys.readouterr().err)
+    expected = [newtons, pytest.approx(-fall.y[0, -1], rel=0.05)]
+    assert [[*map(float, found)] for found in said] == ([expected] if newtons else [])
 
 
 def test_a_vehicle_without_roll_gets_a_word_about_the_roll_integrator(capsys: pytest.CaptureFixture[str]) -> None:
@@ -435,6 +498,7 @@ def test_the_command_flies_and_writes_a_log_that_identify_reads(tmp_path: Path) 
         assert process.stdout
         for number in range(1, 9):
             assert process.stdout.readline().startswith(f"servo {number} drives u_{number}: ")
+        assert process.stdout.readline() == "ArduSub must have FRAME_CONFIG 2 (vectored_6dof)\n"
         found = re.search(r"UDP port (\d+)", process.stdout.readline())
         assert found
         autopilot = ArduSub(int(found[1]), rate=200, sticks=lambda t: (0.4 if t % 3 < 1.5 else -0.4, 0.2))
@@ -468,6 +532,7 @@ def test_a_flight_without_packets_ends_with_its_duration_and_has_no_log(
         "servo 1 drives u_r: right thruster, positive forward",
         "servo 2 drives u_l: left thruster, positive forward",
         "servo 16 drives u_t: top thruster, positive down, reversed",
+        "ArduSub must have FRAME_CONFIG 4 (simplerov_3)",
         "listening on 127.0.0.1, UDP port 0; Ctrl-C ends it",
         "0.000 s of flight; 0 frames, 0 µs each; 0 repeated, 0 lost, 0 ignored, 0 restarts",
         "No log was written, because no row was complete.",

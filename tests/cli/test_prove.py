@@ -262,7 +262,10 @@ BAD: dict[str, tuple[Files, str]] = {
         f"{MANIFEST}: source = '../../../../etc/passwd' does not lead to a file in the FMU",
     ),
     "no expected results": ({_Y: None}, f"{_Y}: there is no such file in the FMU"),
-    "a file of 30 MB": ({_Y: "time,y\n" + "0,0\n" * 7_500_000}, f"{_Y}: has 30 MB; at most 20 MB are read"),
+    "a file of 30 MB": (
+        {_Y: "time,y\n" + "0,0\n" * 7_500_000},
+        f"{_Y}: has 30,000,007 bytes; at most 20,000,000 are read",
+    ),
     "a tolerance that all meet": (
         {_EXP: _exp('stopTime="1" tolerance="1e300">')},
         f"{_EXP}: experiment 'a': tolerance = 1e+300: must be less than 1, or nothing would be compared",

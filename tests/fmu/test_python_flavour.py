@@ -218,7 +218,7 @@ def test_inputs_that_saturate_and_steps_that_cannot_be_taken_are_told(
     many = "more than 1024 changes of commands wait for the dead time; change them less often."
     assert slave.step(slave.rov.time, 0.1) == (False, [many])
     slave.rov._set_fmu_state(slave.rov._get_fmu_state() | {"waiting": []})
-    overflow = ["the motion overflows within 0.1 s, or needs more than 100000 substeps."]
+    overflow = ["the motion overflows within 0.1 s, or takes too many substeps: it is too fast or long."]
     slave.put(X_ext=1.7e308)
     assert slave.step(slave.rov.time, 0.1) == (False, overflow)
     assert slave.get("u", "r", "delayed_u_r", "F_bow") == after

@@ -1,7 +1,10 @@
 """The C sources in the FMU compile in importers, without warnings."""
 
+import shutil
 import subprocess
 from pathlib import Path
+
+import pytest
 
 from rov_fmu.c.compile import WARNINGS, compiler, fmi_headers
 from tests.often import often
@@ -15,3 +18,23 @@ def test_no_warning_under_the_strictest_flags(either_dir: Path, tmp_path: Path, 
     command = [*compiler(), *flags, *how.split(), str(either_dir / "sources" / "fmu.c")]
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (0, "")
+
+
+_FAST = {
+    "gcc": ("-ffast-math", "-Ofast", "-ffinite-math-only", "-funsafe-math-optimizations", "-freciprocal-math"),
+    "clang": ("-ffast-math", "-Ofast", "-ffinite-math-only"),
+    "zig": ("-ffast-math", "-ffinite-math-only", "-D_M_FP_FAST"),
+}
+"""Options by which a compiler drops checks for NaN or rounding errors. MSVC defines the last one with /fp:fast."""
+
+
+@pytest.mark.parametrize("name", _FAST)
+def test_options_that_would_accept_nan_are_refused(name: str, videoray_dir: Path) -> None:
+    if name != "zig" and not shutil.which(name):
+        pytest.skip(f"needs {name}")
+    own = compiler() if name == "zig" else [name]
+    for option in ("-O3", *_FAST[name]):
+        command = [*own, option, "-E", "-I", str(fmi_headers()), str(videoray_dir / "sources" / "fmu.c")]
+        result = subprocess.run(command, capture_output=True, text=True, check=False)
+        refused = result.returncode != 0 and "compile without -ffast-math, -Ofast and /fp:fast" in result.stderr
+        assert refused == (option != "-O3"), (option, result.stderr)

@@ -178,7 +178,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
     ("voltage drop", structured(HEALTH, kind="voltage drop"), "they lose 50% of their thrust while all have", quiet()),
-    ("slew limit", structured(HEALTH, kind="slew limit", value=0.8, unit="1/s"), "at most 0.80 1/s, where 1", quiet()),
+    (
+        "slew limit",
+        structured(HEALTH, kind="slew limit", value=1.25, unit="s"),
+        "as ramps, which take 1.2 s from rest to full command",
+        structured(HEALTH, kind="slew limit", value=0.19, unit="s"),
+    ),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),
     ("second start", quiet(agreement=41.0), "two fits from different starts ended at", quiet(agreement=39.0)),

@@ -4,9 +4,10 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
@@ -53,6 +54,23 @@ def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) ->
 def test_a_voltage_that_acts_on_nothing_changes_no_answer(tmp_path: Path) -> None:
     """It sags with time and under load, and the speed of the thrusters is regulated."""
     check_idle(tmp_path, Battery(0.0, sag=0.1, droop=0.1), 0, replace(DIVE, seconds=25.0))
+
+
+@pytest.mark.parametrize("number", ["0", "65.535", "-1"])
+def test_a_voltage_that_nothing_measures_is_as_no_column(number: str, tmp_path: Path) -> None:
+    replace(DIVE, has_voltage=False).write(0, tmp_path)
+    dive = next(tmp_path.glob("dive*"))
+    rows = dive.read_text(encoding="utf-8").splitlines()
+    found = []
+    for cells in (["voltage [V]", *[number] * (len(rows) - 1)], []):
+        dive.write_text("\n".join(map(",".join, zip(rows, cells, strict=True)) if cells else rows), encoding="utf-8")
+        tests = load_tests(tmp_path)
+        assert not tests.folder.voltages
+        found.append(begin(tests))
+    (known, logs, _), (without, others, _) = found
+    assert (known.coefficients, known.layout) == (without.coefficients, without.layout)
+    for log, other in zip(logs, others, strict=True):
+        assert np.array_equal(log.record.inputs, other.record.inputs)
 
 
 @pytest.mark.weekly

@@ -194,6 +194,46 @@ def test_what_is_used_is_not_called_unrecognised(tmp_path: Path, inspect: Inspec
         assert "the log has the vehicles" not in out
 
 
+def test_headers_of_loggers_are_read_and_no_sentence_contradicts_them(tmp_path: Path, inspect: Inspect) -> None:
+    """Of two headers with the same meaning, one is read, and the other is told as such. A speed without an axis may be
+    that of surge."""
+    titles = "dvl_vx,gyro_z_dps,batt_V,Gyroscope (z) [rad/s],Tiefe [m],Kompass [°],depth_m,Fahrgeschwindigkeit [m/s]"
+    names = ",".join(f"u_{name} [1]" for name in motion.THRUSTERS)
+    rate = 0.3 + 0.01 * TIME
+    numbers = (
+        *THRUSTERS,
+        motion.U,
+        np.degrees(rate),
+        motion.VOLTAGE,
+        rate,
+        DEPTH,
+        np.degrees(motion.HEADING),
+        DEPTH,
+        motion.U,
+    )
+    table(tmp_path / "dive.csv", f"time [s],{names},{titles}", TIME, *numbers)
+    out, draft = inspect()
+    assert parsed(draft)["columns"] == {
+        "dvl_vx": "surge velocity [m/s]",
+        "gyro_z_dps": "yaw velocity [dps]",
+        "batt_V": "voltage [V]",
+        "Tiefe [m]": "depth [m]",
+        "Kompass [°]": "heading [°]",
+    }
+    assert re.search(r"\n- Gyroscope \(z\) \[rad/s\]: .*, another yaw velocity \[rad/s\]\n", out)
+    assert re.search(r"\n- depth_m: .*, another depth \[m\]\n", out)
+    assert "no log has a velocity or a position of surge" not in out
+    assert "no log has a velocity or a position of sway, unless Fahrgeschwindigkeit [m/s] is one. " in out
+
+
+def test_a_header_is_not_proposed_for_a_column_that_is_there(tmp_path: Path, inspect: Inspect) -> None:
+    names = ",".join(f"u_{name} [1]" for name in motion.THRUSTERS)
+    table(tmp_path / "dive.csv", f"time [s],{names},depth [m],bar30_depth_m", TIME, *THRUSTERS, DEPTH, 0.0 * DEPTH)
+    out, draft = inspect()
+    assert '"bar30_depth_m" = "depth' not in draft
+    assert "bar30_depth_m: always 0, another depth [m]" in out
+
+
 def test_thousands_of_columns_take_seconds_and_are_not_all_shown(tmp_path: Path, inspect: Inspect) -> None:
     """If each header were compared with all others, it would take minutes."""
     start = process_time()

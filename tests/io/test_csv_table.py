@@ -59,7 +59,10 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
             for cell in ("-", "nan", "")
         ),
         ("length [m],time [s]\n0,5,25\n", r"column 3 = '25': there is no such column \(are these decimal commas\?"),
-        ('length [m],time [s]\n"0,5",25\n', "must be a number with a decimal point, unless ; separates the columns"),
+        (
+            'length [m],time [s]\n"1,500",25\n',
+            "= '1,500': must be a number without a comma, which may separate decimals",
+        ),
         ("time [s]\n1\n", r"line 1: 'length \[m\]' is missing$"),
         (
             "0,1\n",
@@ -71,6 +74,24 @@ def _table(folder: Path, text: str, **also: Column) -> Columns:
 def test_what_is_no_table_of_numbers_is_refused(rows: str, reason: str, tmp_path: Path) -> None:
     with pytest.raises(DataFileError, match=reason):
         _table(tmp_path, rows, time=MAYBE)
+
+
+QUOTED = {
+    '"0,35",1\n"2",2\n': [0.35, 2.0],
+    '" ,5 ",3\n"1,500","0,1"\n"-2,250",2\n': [0.5, 1.5, -2.25],
+    '0.25,2\n"1,5e1",1\n': [0.25, 15.0],
+    '0.5,"0,25"\n': [0.5],
+}
+"""Rows with numbers in quotes, whose commas are decimal commas, and the first column of each."""
+
+
+@pytest.mark.parametrize("rows", QUOTED)
+def test_decimal_commas_in_quotes(rows: str, tmp_path: Path) -> None:
+    """A comma before three decimals is one where another number shows that commas separate no thousands."""
+    table = _table(tmp_path, f"length [m],time [s]\n{rows}", time=MAYBE)
+    assert [*table.values["length"]] == QUOTED[rows]
+    series = read_series(_file(tmp_path, f"time,u\n{rows}".replace("-2,2", "2,2")), lambda _: None)
+    assert [*series["time"]] == sorted(map(abs, QUOTED[rows]))
 
 
 def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
@@ -191,7 +212,7 @@ def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_pa
             continue
         with pytest.raises(DataFileError) as error:
             read_columns(path, columns, others=True, loose=True)
-        rest = "'1': there is no such column (are these decimal commas? They need ; between the columns)"
+        rest = "'1': there is no such column (are these decimal commas? They need ; between the columns, or quotes)"
         more = "and 99 rows have more cells than the header, which has 3. Complete the header"
         assert str(error.value) == f"{path}, line 3, column 4 = {rest}, {more}"
     ragged = [",".join(_cells(n) + ["1", "2"] * (n % 2)) for n in range(41)]
@@ -209,7 +230,7 @@ SERIES = {
     "time [ms],u\n0,1\n": ", line 1, column 'time [ms]': must be the time in s, which is the unit here",
     "time,u,u\n0,1,1\n": ", line 1, column 'u': this column occurs twice",
     "time,u\n0,1\n1,2,3\n": ", line 3, column 3 = '3': there is no such column (are these decimal commas? They need ; "
-    "between the columns)",
+    "between the columns, or quotes)",
     "time,u\n0,1\n1\n": ", line 3, column 'u' = '': must be a finite number",
     "time,u\n0,1\n2,1\n1,1\n": ", line 4: the time goes back",
     "time\n0\n": ": no columns beside the time",
@@ -273,7 +294,7 @@ def test_a_file_that_is_too_large_is_not_read(tmp_path: Path) -> None:
         file.truncate(LARGEST + 1_000_000)  # a sparse file, which takes no space on the disk
     with pytest.raises(DataFileError) as error:
         read_columns(path, {"length": LENGTH})
-    assert str(error.value) == f"{path}: is too large, with 501 MB: at most 500 MB are read"
+    assert str(error.value) == f"{path}: has 501,000,000 bytes; at most 500,000,000 are read"
 
 
 def test_a_line_of_numbers_before_the_header_is_refused_in_one_line(tmp_path: Path) -> None:

@@ -55,7 +55,7 @@ def test_a_toml_file_that_is_too_large_is_not_read(tmp_path: Path, capsys: Capsy
     with path.open("ab") as file:
         file.truncate(30_000_000)
     assert main(command) == 2
-    assert capsys.readouterr().err == f"rov-fmu: {path}: is too large, with 30 MB: at most 2 MB are read\n"
+    assert capsys.readouterr().err == f"rov-fmu: {path}: has 30,000,000 bytes; at most 2,000,000 are read\n"
 
 
 # What a parser would take minutes or gigabytes for, in less than 2 MB: its cost grows with the square of the parts.

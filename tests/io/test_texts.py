@@ -9,8 +9,8 @@ from jinja2 import UndefinedError
 from pydantic import TypeAdapter, ValidationError
 
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, part, shown
-from rov_fmu.io.reading import read_bytes, root_of_xml
+from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, part, reason_of, shown
+from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
 from rov_fmu.io.templates import render
 from rov_fmu.io.toml_file import Finite, Name, Symbol, Text, join_names
 
@@ -28,6 +28,20 @@ def test_long_texts_and_lists_are_cut() -> None:
     assert join_names(names[:11]) == ", ".join(names[:10]) + ", ..."
     assert lines_on(Path("a"), ["b", "c", "b", ""]) == ["a: b", "a: c", "a: 1 more mistake"]
     assert lines_on(Path("a"), names[:12])[9:] == ["a: n9", "a: 2 more mistakes"]
+
+
+@pytest.mark.parametrize(
+    "error", [MemoryError(), EOFError(), TimeoutError(), NotImplementedError(), KeyError("x"), IndexError(), OSError()]
+)
+def test_no_reason_is_empty_or_the_name_of_a_class(error: Exception) -> None:
+    reason = reason_of(error)
+    assert " " in reason
+    assert type(error).__name__ not in reason
+
+
+@pytest.mark.parametrize("most", [1_000, 100_000, 2_000_000, 500_000_000])
+def test_the_size_of_a_file_that_is_too_large_differs_from_what_is_allowed(most: int) -> None:
+    assert too_large(most + 1, most) == f"has {most + 1:,} bytes; at most {most:,} are read"
 
 
 def test_xml_of_a_stranger_contains_no_other_file(tmp_path: Path) -> None:
@@ -55,7 +69,7 @@ def test_a_file_has_a_largest_size(tmp_path: Path) -> None:
     path = tmp_path / "a"
     path.write_bytes(b"abc")
     assert read_bytes(path, most=3) == b"abc"
-    with pytest.raises(FileError, match="is too large, with 0 MB: at most 0 MB are read"):
+    with pytest.raises(FileError, match=r"has 3 bytes; at most 2 are read$"):
         read_bytes(path, most=2)
 
 

@@ -149,6 +149,6 @@ def test_a_description_is_read_in_another_process_and_refused_in_one_line(tmp_pa
         assert "\n" not in str(error.value)
     with pytest.raises(FileError, match=r"^a\.fmu: modelDescription\.xml: there is no such file in the FMU$"):
         read_description(Path("a.fmu"), tmp_path / "none")
-    _written(tmp_path, f"<a>{' ' * 40_000_001}</a>")
-    with pytest.raises(FileError, match=r"modelDescription\.xml has 40 MB; at most 40 MB are read$"):
+    _written(tmp_path, f"<a>{' ' * 39_999_994}</a>")
+    with pytest.raises(FileError, match=r"modelDescription\.xml has 40,000,001 bytes; at most 40,000,000 are read$"):
         read_description(Path("a.fmu"), tmp_path)

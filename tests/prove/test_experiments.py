@@ -85,7 +85,7 @@ def test_parameters_and_references_are_read(tmp_path: Path) -> None:
         ),
         ({"attributes": 'tolerance="0"'}, "a.exp: experiment 'a': must go on from its start"),
         ({"attributes": 'stopTime="-2" stepSize="-1"'}, "a.exp: experiment 'a': must go on from its start"),
-        ({"y": bytes(20_000_001)}, "y.csv: has 20 MB; at most 20 MB are read"),
+        ({"y": bytes(20_000_001)}, "y.csv: has 20,000,001 bytes; at most 20,000,000 are read"),
         ({"y": b"time,word\n0,1\n"}, "y.csv, line 1, column 'word': the variable is not a single number"),
         ({"inside": f"{_REFERENCES}<Zeal/><Other/>"}, "a.exp: experiment 'a': Other, Zeal cannot be run"),
         ({"inside": '<Parameters source="kg.ssv"/>'}, "kg.ssv: parameter 'k': is in kg, and not in m"),

@@ -186,11 +186,38 @@ def _many() -> bytes:
     return content
 
 
+def _field(kind: int, content: bytes = b"") -> bytes:
+    """Return an extra field (APPNOTE 4.5)."""
+    return struct.pack("<2H", kind, len(content)) + content
+
+
+_TIMES = _field(0x5455, b"\1abcd")
+_HONEST = (
+    _TIMES + _field(0x7875, b"\1\4abcd\4abcd"),  # Info-ZIP
+    _field(0x000A, bytes(4) + struct.pack("<2H", 1, 24) + bytes(24)),  # 7-Zip
+    _field(0xCAFE) + _field(0x5455, b"\7" + bytes(12)),  # Java
+    _field(0x5855, bytes(8)) + _field(0x7855) + _field(0xD935, b"\4\0\0\0\0"),
+    _field(0x5855, bytes(12)) + _field(0x7855, bytes(4)),
+)
+"""Extra fields that writers put into both headers."""
+
+
 def _with_extra_fields(zipped: zipfile.ZipFile) -> None:
-    for name, content in _FILES.items():
+    for n, (name, content) in enumerate([*_FILES.items(), ("a", b""), ("b", b"")]):
         entry = zipfile.ZipInfo(name, (2024, 2, 29, 1, 2, 4))
-        entry.extra, entry.comment, entry.external_attr = b"UT\5\0\3abcd", b"a word", 0o100755 << 16
+        entry.extra, entry.comment, entry.external_attr = _HONEST[n], b"a word", 0o100755 << 16
         zipped.writestr(entry, content, zipfile.ZIP_STORED)
+
+
+def _with_fields(before: bytes, of_directory: bytes) -> bytes:
+    """Return an archive with one file and these extra fields in its two headers."""
+    local, behind = bytearray(ONE[:DIRECTORY]), bytearray(ONE[DIRECTORY:])
+    name = len("modelDescription.xml")
+    local[30 + name : 30 + name], behind[46 + name : 46 + name] = before, of_directory
+    struct.pack_into("<H", local, 28, len(before))
+    struct.pack_into("<H", behind, 30, len(of_directory))
+    struct.pack_into("<2L", behind, len(behind) - 10, len(behind) - 22, len(local))
+    return bytes(local + behind)
 
 
 def _without_signatures(content: bytes) -> bytes:
@@ -276,6 +303,10 @@ HIDDEN: dict[str, tuple[Callable[[], bytes], str]] = {
         "member 'a/': its header and its content",
     ),
     "a folder with content": (lambda: archive({"a/": b"x"}), "member 'a/': is a folder, and must have no content"),
+    "a name in an unknown code page": (
+        lambda: flipped(flipped(archive({"ü": b""}), 7, 3), archive({"ü": b""}).index(b"PK\1\2") + 9, 3),
+        "member '├╝': must be ASCII, or marked as UTF-8: readers take it as different names",
+    ),
     "a number that is too large": (
         lambda: ONE[: DIRECTORY + 42] + b"\xff\xff\xff\x7f" + ONE[DIRECTORY + 46 :],
         "member 'modelDescription.xml': must begin at byte 0 of the archive, and not at 2147483647",
@@ -291,6 +322,47 @@ def test_what_readers_would_read_differently_is_refused_in_one_line(case: str, t
     assert str(error.value).startswith(f"a.fmu: {reason}")
     assert "\n" not in str(error.value)
     assert not (tmp_path / "unpacked").exists()
+
+
+_PATH_FIELD = b"\1" + struct.pack("<L", zlib.crc32(b"modelDescription.xml")) + b"binaries/linux64/videoray.so"
+_SIZES = len(b"<a/>"), struct.unpack_from("<L", ONE, 18)[0]
+FIELDS: dict[str, bytes] = {
+    "another path": _field(0x7075, _PATH_FIELD),
+    "another path behind times": _TIMES + _field(0x7075, _PATH_FIELD),
+    "a comment": _field(0x6375, _PATH_FIELD),
+    "a link of PKWARE": _field(0x000D, bytes(12) + b"/etc/passwd"),
+    "a link of ASi": _field(0x756E, bytes(14) + b"/etc/passwd"),
+    "another path of a Macintosh": _field(0x2605, b"ZPIT\4evil"),
+    "a link behind the owner": _field(0x7875, b"\1\4abcd\4abcd/etc/passwd"),
+    "encryption": _field(0x9901, b"\2\0AE\3\0\0"),
+    "an unknown kind": _field(0x4D4D, b"abcd"),
+    "one kind twice": 2 * _TIMES,
+    "times that are cut off": _TIMES[:-1],
+    "a kind that is cut off": _TIMES + b"UT",
+    "zeros": bytes(4),
+    "a word in what aligns": _field(0xD935, b"\4\0evil"),
+    "other sizes": _field(0x0001, struct.pack("<2Q", 3, 3)),
+    "a size that is cut off": _field(0x0001, b"abc"),
+}
+
+
+@pytest.mark.parametrize("place", ["before the content", "in the directory"])
+@pytest.mark.parametrize("case", FIELDS)
+def test_an_extra_field_that_could_give_a_file_another_name_is_refused(case: str, place: str, tmp_path: Path) -> None:
+    fields = (FIELDS[case], b"") if place == "before the content" else (b"", FIELDS[case])
+    reason = (
+        r"member 'modelDescription\.xml': (has an extra field|its header and)|is not an FMU, or is damaged: Corrupt"
+    )
+    with pytest.raises(FileError, match=rf"^a\.fmu: ({reason})"):
+        unpack_fmu(BytesIO(_with_fields(*fields)), Path("a.fmu"), tmp_path / "unpacked")
+    assert not (tmp_path / "unpacked").exists()
+
+
+@pytest.mark.parametrize("fields", [*_HONEST, _TIMES + _field(0x0001, struct.pack("<2Q", *_SIZES))])
+def test_extra_fields_without_a_name_are_accepted_in_either_header(fields: bytes, tmp_path: Path) -> None:
+    for n, (before, of_directory) in enumerate(((fields, b""), (b"", fields), (fields, fields))):
+        unpack_fmu(BytesIO(_with_fields(before, of_directory)), Path("a.fmu"), tmp_path / str(n))
+        assert (tmp_path / str(n) / "modelDescription.xml").read_bytes() == b"<a/>"
 
 
 @often("count", 100, 20_000)

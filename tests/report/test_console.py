@@ -150,6 +150,7 @@ class Runs:
     total: int = 12_000
     failed: int = 0
     dashboard: str = "http://localhost"
+    has_workers: bool = True
 
 
 def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
@@ -165,6 +166,8 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.Cap
     assert [task.completed for task in display.tasks] == [1.0, 1.0, 0.0]
     study.update(Runs(7_000))
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
+    study.update(Runs(7_000, has_workers=False))
+    assert display.tasks[2].description == "no worker is there", "the rate is of before"
     study.update(Runs(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
     assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"

@@ -358,6 +358,12 @@ WRITTEN = {
     "rostopic": ["%time,u_t [%],-z [m]", *(f"{1_669_909_208_000_000_000 + 10**8 * n},{n},{-n}" for n in range(10))],
     "pressure": ["time [s],t [us 1520 320],pressure [kPa]", *(f"{n},{1520 + n},{101.325 + n}" for n in range(10))],
     "force": ["time [us],u_t [N.m 40],z [mm],voltage [V]", *(f"{10**6 * n},{n},{n},16" for n in range(10))],
+    "times of day": [
+        "Date;Time;u_t [%];depth [m]",
+        *(f"10/8/25;11:59:{n + 50} PM;{n};{n}" for n in range(10)),
+        *(f"10/9/25;12:00:0{n} AM;{n};{n}" for n in range(10)),
+    ],
+    "decimal commas in quotes": ["time [s],u_t [%],depth [m]", *(f'"{n},5","{n},500","0,{n}"' for n in range(10))],
     "a clock set back": [
         ";".join(QUOTED),
         *(f"{100 * (n % 30)};12,5;{n},5;{5 * n // 2},{5 * n % 2 * 5};-" for n in range(42)),

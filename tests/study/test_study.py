@@ -4,12 +4,15 @@ import os
 import signal
 import subprocess
 import time
+from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from threading import Event
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -27,7 +30,7 @@ from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.child import Child
-from rov_fmu.study.run.cluster import Spent
+from rov_fmu.study.run.cluster import Spent, _Runs
 from rov_fmu.study.run.run_study import run_study
 from tests.commands import start, without_progress
 from tests.folders import beside
@@ -156,7 +159,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
     table = pq.read_table(results.folder / "runs")
     assert [table[name].null_count for name in ("end", "bad")] == [len(failed), 30]
     assert {*others.status} == {"incomplete"}
-    assert {*others.reason} == {"bad: ZeroDivisionError: division by zero"}
+    assert {*others.reason} == {"bad: division by zero"}
     assert others.end.to_numpy() == pytest.approx(_expected(others, 2.0).to_numpy(), rel=1e-12)
     assert {*results.trajectories().run} == {*others.index}
     assert [progress[0].failed, progress[-1].failed] == [0, len(failed)]
@@ -414,3 +417,17 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
             study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
     assert 0 < len(Results(results).runs) < SLOW["runs"]
     _same(study(plan, results, scheduler=scheduler), slow)
+
+
+def test_a_study_tells_that_no_worker_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its last rate would stand there otherwise, although nothing is done."""
+    monkeypatch.setattr("rov_fmu.study.run.cluster._WATCH", 0.001)
+    ended, told = Event(), list[Progress]()
+    threads = iter([{"a": 1}, {}, {}])
+    client = SimpleNamespace(nthreads=lambda: next(threads), dashboard_link=None)
+    nothing = cast("Any", None)
+    design = cast("Any", SimpleNamespace(runs=9))
+    runs = _Runs(cast("Any", client), nothing, design, nothing, deque(), Spent(runs=4), told.append)
+    runs.done_before = 0
+    runs._watch(ended)  # until the client has no answer
+    assert told == [Progress(4, 9, 0, "", has_workers=False)] * 2

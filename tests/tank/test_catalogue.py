@@ -84,10 +84,12 @@ def test_bounds_of_every_quantity(name: str, tmp_path: Path) -> None:
         (quantity.minimum, quantity.minimum * 1.001 - 1.0),
         (quantity.maximum, quantity.maximum * 1.001),
     ):
-        rows = [f"time [s],u_t [%],{beside},{name} [{quantity.unit}]", *(f"{n},{n},{n},{{0}}" for n in range(9))]
-        path.write_text("\n".join(rows).format(limit), encoding="utf-8")
+        rows = [f"time [s],u_t [%],{beside},{name} [{quantity.unit}]", *(f"{n},{n},{n},{{{n % 2}}}" for n in range(9))]
+        path.write_text("\n".join(rows).format(limit, limit), encoding="utf-8")
         assert len(read_logs(path, VIDEORAY.layout, Names())) == 1
-        path.write_text("\n".join(rows).format(beyond), encoding="utf-8")
+        if limit < quantity.least:  # what is below is no measurement
+            continue
+        path.write_text("\n".join(rows).format(beyond, (1.0 + 1e-8) * beyond), encoding="utf-8")
         with pytest.raises(DataFileError, match=r"column .* as in 9 rows: must be within"):
             read_logs(path, VIDEORAY.layout, Names())
 
@@ -215,3 +217,85 @@ def test_headers_and_their_numbers_tell_their_likely_meaning(
 
 def test_at_most_32_columns_are_commands() -> None:
     assert guessed_of({f"thr{n}": [1] for n in range(1, 34)}) == {f"thr{n}": f"u_{n} [1]" for n in range(1, 33)}
+
+
+# ---- Headers of loggers ----------------------------------------------------------------------------------------------
+
+SI: Mapping[str, Mapping[str, float]] = {
+    "m/s": {"mps": 1, "ms": 1, "m_s": 1, "m_per_s": 1, "[m/s]": 1, "(m/sec)": 1, "[cm/s]": 0.01, "kn": 1852 / 3600},
+    "rad/s": {"rad_s": 1, "radps": 1, "(rad/s)": 1, "[°/s]": pi / 180, "dps": pi / 180, "degps": pi / 180},
+    "rad": {"rad": 1, "deg": pi / 180, "[°]": pi / 180, "(degrees)": pi / 180, "[Deg]": pi / 180},
+    "m": {"m": 1, "cm": 0.01, "[m]": 1, "(meters)": 1, "ft": 0.3048},
+    "V": {"V": 1, "mV": 1e-3, "[V]": 1, "volts": 1},
+    "Pa": {"hPa": 100, "mbar": 100, "[kPa]": 1e3, "[Pa]": 1},
+}
+"""The ends of headers that tell a unit, by the SI unit, and how many of these each is."""
+NAMED: Mapping[str, tuple[str, Sequence[str]]] = {
+    "surge velocity": ("m/s", ("dvl_vx", "vel_x", "DvlVx", "velocity x", "v_x", "Vitesse x", "Geschwindigkeit (x)")),
+    "sway velocity": ("m/s", ("dvl_vy", "nav/vel.y", "speed_y", "velocidad y", "lateral speed")),
+    "heave velocity": ("m/s", ("dvl_vz", "a50.vz", "snelheid z", "heave_rate")),
+    "roll velocity": ("rad/s", ("gyro_x", "imu_wx", "GYROSCOPE X", "rollRate", "motionRotationRateX")),
+    "pitch velocity": ("rad/s", ("imu.gyr_y", "Gyroscope (y)", "pitchspeed", "angular_velocity_y")),
+    "yaw velocity": (
+        "rad/s",
+        ("gyro_z", "ahrs gyroZ", "imu gz", "Gyroscope (z)", "yaw_rate", "turn rate"),
+    ),
+    "depth": ("m", ("bar30_depth", "Tiefe", "PROFONDEUR", "profondità", "profundidad", "diepte", "Djup", "pos_z")),
+    "heading": ("rad", ("compass", "Kompass", "boussole", "brújula", "ahrs_heading", "imuYaw", "rumbo", "cap", "HDG")),
+    "roll angle": ("rad", ("imu_roll", "rollwinkel", "attitude.x", "roulis")),
+    "pitch angle": ("rad", ("ahrs pitch", "Nickwinkel", "tangage")),
+    "voltage": (
+        "V",
+        (
+            "batt",
+            "main battery",
+            "Batteriespannung",
+            "vbat",
+            "Spannung",
+            "tension",
+            "batterie",
+            "pack voltage",
+            "tensión",
+        ),
+    ),
+    "pressure": ("Pa", ("baro", "Druck", "abs_pressure", "presión", "press")),
+}
+"""What loggers, apps of phones and other languages call a quantity, with its SI unit."""
+HEADERS = [
+    (f"{name}{'_' * end[0].isalnum() or ' '}{end}", quantity, factor)
+    for quantity, (unit, names) in NAMED.items()
+    for name in names
+    for end, factor in SI[unit].items()
+]
+
+
+def test_a_header_splits_into_its_sensor_its_quantity_its_axis_and_its_unit() -> None:
+    """Each name of each quantity with each end that tells a unit: the column has the name and the factor."""
+    for header, quantity, factor in HEADERS:
+        ((_, meant),) = guessed_of({header: [1.0]}).items() or [("", "")]
+        name, _, unit = meant.rstrip("]").partition(" [")
+        assert (name, header) == (quantity, header)
+        assert 1.0 / QUANTITIES[name].units[unit] == pytest.approx(factor), header
+
+
+def test_a_unit_may_stand_before_the_axis_and_a_plural_is_a_rate_only_behind_one() -> None:
+    assert guessed_of({"gyro_dps_z": [1.0], "vel_mps_x": [1.0], "rads_y": [1], "yaw_rads": [1], "w_mps": [1]}) == {
+        "gyro_dps_z": "yaw velocity [dps]",
+        "vel_mps_x": "surge velocity [m/s]",
+        "rads_y": "pitch velocity [rad/s]",
+        "yaw_rads": "heading [rad]",
+        "w_mps": "heave velocity [m/s]",
+    }
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        *("Battery_A", "batt_mAh", "battery_temp [°C]", "Batterie_Temperatur", "cell_1_V", "servo_voltage", "batt_pct"),
+        *("acc_x", "az", "Linear Acceleration x (m/s^2)", "Magnetic field z (µT)", "gyro_temp", "Depth (fathoms)"),
+        *("tether_tension", "battery_cap", "Velocity_mps", "hull pressure [mbar]", "pressure", "locationHeadingX(µT)"),
+        *("depth_rate", "cmd_vel_x_mps", "desired_yaw_deg", "yaw_setpoint_deg", "surge [m/s2]", "gyro_z (m/s)"),
+    ],
+)
+def test_a_header_of_something_else_means_nothing(header: str) -> None:
+    assert guessed_of({header: [1.0]}) == {}

@@ -126,6 +126,13 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         )
         for name in ("CON", "Prn", "com1")
     },
+    **{
+        f"identifier {name}, a keyword": (
+            {"vehicle.identifier": name},
+            f"vehicle.identifier = '{name}': must be a C identifier, and not a keyword of C",
+        )
+        for name in ("int", "_Bool", "nullptr")
+    },
     # forms of keys and values
     "an unknown coefficient": (
         {"arm.mass": quantity(6.57, "kg")},

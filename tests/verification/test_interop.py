@@ -215,6 +215,12 @@ def test_the_page_of_the_importers_has_all_of_them() -> None:
         assert not re.search("differs|failed|not run", found)
 
 
+def test_the_readme_names_only_importers_that_were_run() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    (named,) = re.findall(r"which ([\w, ]+) and\s\[many other tools\]\(docs/importers.md\) read", readme)
+    assert {*named.split(", ")} <= {importer.title for importer in IMPORTERS}
+
+
 def test_no_registry_is_named() -> None:
     command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", str(HERE)]
     files = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split()

@@ -34,7 +34,7 @@ def build_target(sources: Mapping[str, str], output: Path, fmi: int = 2) -> None
     """Compile the fuzzer for the sources of an FMU, with AddressSanitizer and UndefinedBehaviorSanitizer."""
     content = {**sources, "legal.h": legal_header(fmi)}
     # With the loops of a step unrolled and instrumented, the compiler takes six times as long.
-    # With the sanitizers, a million pieces take longer than an input may.
+    # With the sanitizers, 100,000 pieces take longer than an input may.
     flags = ("-Dalways_inline=noinline", "-DMOST_PIECES=10000")
     compile_c(TARGET_SOURCE, output, content, *flags, sanitizers="fuzzer,address,undefined")
 

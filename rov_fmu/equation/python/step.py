@@ -16,6 +16,8 @@ from .dop853 import FIFTH, THIRD, A, B, C
 
 MOST_SUBSTEPS = 100_000
 """The largest number of substeps that a step may try. Hours of a fast turn or of a fast decay need more."""
+MOST_AT_ONCE = 500
+"""Of these, a step may try so many at once, and the others as time passes, as in fmu_src/c/step.c."""
 MOST_WAITING = 1024
 """The largest number of changes of commands that may wait for the dead time, as in fmu_src/c/delay.c."""
 BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
@@ -44,7 +46,7 @@ def step(model: Any, values: Mapping[str, float], h: float) -> dict[str, float]:
     """Return the states of a vehicle after h > 0 seconds with the inputs held, by their names.
 
     `values` are the coefficients, inputs and states by their names. The result is not finite when the motion overflows
-    or would need more than MOST_SUBSTEPS substeps.
+    or would need too many substeps.
     """
     motion = Motion(model, values)
     return motion.end() if motion.move(h) else dict.fromkeys(motion.end(), nan)
@@ -106,9 +108,9 @@ class Motion:
 
     def move(self, rest: float) -> bool:
         """Move for a time. Return False if the motion overflows or needs too many substeps."""
-        h, shortest = rest, min(_SHORTEST, _SHORTEST * rest)
-        while rest > 0.0 and h > shortest and self.tried < MOST_SUBSTEPS:
-            self.tried += 1
+        h, shortest, total = rest, min(_SHORTEST, _SHORTEST * rest), rest
+        per_second = MOST_SUBSTEPS / max(rest, 1.0)
+        while rest > 0.0 and h > shortest and self.tried < MOST_AT_ONCE + per_second * (total - rest):
             left = self.until - self.time
             h = min(h, rest, left)
             y, error = self.trial(h)
@@ -132,6 +134,7 @@ class Motion:
 
     def trial(self, h: float) -> tuple[State, float]:
         """Return the states after a substep, and the largest error relative to the tolerance."""
+        self.tried += 1
         slopes = [self.rate]
         for node, weights in _STAGES:
             change = self.combined(weights, slopes)

@@ -87,7 +87,8 @@ class Inspected:
         dives = self.dives
         if self.description.layout.has_wrench:
             dives = [replace(log, commands=c.relative_to(c.largest)) for log in dives if (c := log.commands)]
-        return [*undetermined(dives, self.description, self.headers.curves)] if dives else []
+        unread = [title for one in self.logs for title in one.unread]
+        return [*undetermined(dives, self.description, self.headers.curves, unread)] if dives else []
 
     def draft_for(self, base: Path | None) -> Draft:
         """Return a rov.toml that nobody has to complete, with the vehicle that the logs seem to be of, or with a given

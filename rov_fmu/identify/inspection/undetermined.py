@@ -7,15 +7,18 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
-from rov_fmu.identify.findings import how_to_measure, how_to_record, sentences
+from rov_fmu.identify.findings import LOG_OUTPUTS, UNLOGGED, how_to_measure, how_to_record, is_unlogged, sentences
+from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words
 from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
+from rov_fmu.identify.result import without
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import listed
+from rov_fmu.io.messages import brief, listed
 from rov_fmu.io.numbers import percent
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.description import Description
+from rov_fmu.tank.description import ROV_FILE, Description
 from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.inspection.headers import may_be_velocity
 from rov_fmu.tank.log import Commands, Log
 
 _LEAST_PUSH, _ASIDE = 0.1, 1.0 / 3.0
@@ -23,6 +26,8 @@ _LEAST_PUSH, _ASIDE = 0.1, 1.0 / 3.0
 axes that share thrusters with it are below the second one, relative to it."""
 _LEAST_TIME = 1.0
 """An axis that is commanded alone for less than this time, s, is never commanded alone."""
+_MOST_NAMES = 3
+"""The largest number of headers in a sentence."""
 _FULL = 0.95
 """A command above this counts as full."""
 _REASONS = {
@@ -35,11 +40,13 @@ _REASONS = {
 """Why a log that measures the motion along an axis tells nothing about it, by the kind of the finding."""
 
 
-def undetermined(logs: Sequence[Log], description: Description, measured: Collection[str]) -> Iterator[str]:
+def undetermined(
+    logs: Sequence[Log], description: Description, measured: Collection[str], unread: Sequence[str] = ()
+) -> Iterator[str]:
     """Yield a sentence for everything that logs cannot determine about the vehicle that a rov.toml describes.
 
-    The forces of the `measured` thrust curves are in tables. Nothing is fitted: it follows from what is measured, and
-    from how the thrusters are commanded.
+    The forces of the `measured` thrust curves are in tables. `unread` are headers that are not recognised. Nothing is
+    fitted: it follows from what is measured, and from how the thrusters are commanded.
     """
     layout = description.logged
     driven: dict[Log, list[Axis]] = {}
@@ -49,11 +56,18 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
         findings += of_log
     tested = {axis for axes in driven.values() for axis in axes}
     untested = [axis for axis in layout.bare_axes if axis not in tested]
-    for (reason, sensor), axes in grouped((_reason(axis, findings, logs), axis) for axis in untested).items():
-        named, base, are_many = listed([axis.name for axis in axes]), description.base_name, len(axes) > 1
-        stays = f"{'stay those' if are_many else 'stays that'} of {base}" if base else "cannot be identified"
+    sources = dict.fromkeys(untested, description.base_name)
+    sources |= {axis: ROV_FILE for axis in untested if axis.coefficient("a_d") in description.known}
+    kept = [axis for axis in layout.bare_axes if sources.get(axis, ROV_FILE)]
+    reasons = ((*_reason(axis, layout, findings, logs, unread), sources[axis]) for axis in untested)
+    for (reason, sensor, base), axes in grouped(zip(reasons, untested, strict=True)).items():
+        named, are_many = listed([axis.name for axis in axes]), len(axes) > 1
+        gone = thrusters_along_no_other(layout, axes, kept)
+        stays = f"{'stay those' if are_many else 'stays that'} of {base}"
+        stays = stays if base else f"cannot be identified, so {without(axes, gone)}"
         why = reason.replace("{it}", named)
         how = how_to_record(axes) if sensor else f"Command {'each' if are_many else 'it'} both ways"
+        how = LOG_OUTPUTS if reason == UNLOGGED else how
         yield f"{named} {stays}: {why}. {how}"
     if not layout.has_wrench:
         weak: list[str] = []
@@ -75,10 +89,14 @@ def undetermined(logs: Sequence[Log], description: Description, measured: Collec
         yield from sentences(Finding("assumed thrust", curve=name) for name in assumed)
 
 
-def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> tuple[str, str]:
+def _reason(
+    axis: Axis, layout: Layout, findings: Sequence[Finding], logs: Sequence[Log], unread: Sequence[str]
+) -> tuple[str, str]:
     """Return why no log tests an axis, which is {it} in the reason, and what would show its motion, or an empty text
     where the logs do."""
     sensor = how_to_measure(axis, "<axis>")
+    if is_unlogged(axis, layout, logs):
+        return UNLOGGED, ""
     kinds = dict.fromkeys(finding.kind for finding in findings if finding.axis == axis.name)
     if reasons := [_REASONS[kind] for kind in kinds if kind in _REASONS]:
         return listed(reasons), sensor if {*kinds} & {"constant motion", "too few samples"} else ""
@@ -86,7 +104,9 @@ def _reason(axis: Axis, findings: Sequence[Finding], logs: Sequence[Log]) -> tup
     if unused:
         return f"{unused[0].quantity.name} from {unused[0].source} is left out ({unused[0].unused})", sensor
     what = "an angle or a rate" if axis.is_rotation else "a velocity or a position"
-    return f"no log has {what} of {{it}}", sensor
+    possible = [brief(title) for title in unread if may_be_velocity(title, is_rotation=axis.is_rotation)]
+    doubt = f", unless {listed(possible[:_MOST_NAMES], 'or')} is one" if possible else ""
+    return f"no log has {what} of {{it}}{doubt}", sensor
 
 
 def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[float, list[str]]:

@@ -87,6 +87,8 @@ class Record:
     beside: Array | None = None
     """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
     change along straight lines from row to row."""
+    anew: Indices | None = None
+    """m: 0 for a row that goes on with the change of the row before, and shares its delay. None: there is none."""
 
 
 @dataclass(frozen=True)
@@ -158,7 +160,7 @@ class Run:
 class _Record(ctypes.Structure):
     _fields_ = [
         *((name, ctypes.c_ssize_t) for name in ("samples", "rows", "sensors")),
-        *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told")),
+        *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told", "anew")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
         *((name, ctypes.c_ssize_t) for name in ("tilts", "wanders")),
         *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
@@ -356,12 +358,13 @@ class Filter:
         active[self.force : self.force + len(acting) - sensors] = acting[sensors:]
         active[-1] = 1
         error[lagged : lagged + sensors] = [_USUAL_RATE[sensor.axis.is_rotation] for sensor in record.sensors]
+        anew = np.ones(len(record.told), np.intc) if record.anew is None else record.anew
         arrays: list[Array | Indices] = [
             *(np.ascontiguousarray(array, np.float64) for array in (record.time - first, record.value)),
             np.ascontiguousarray(record.sensor, np.intc),
             *(np.array(column, np.intc) for column in zip(*kinds, strict=True)),
             *(np.ascontiguousarray(array, np.float64) for array in (record.since - first, record.told - first)),
-            *(start, error, active),
+            *(anew, start, error, active),
         ]
         sizes = len(record.time), len(record.told), len(record.sensors)
         tilt = [np.ascontiguousarray(row) for row in record.tilt - np.array([[first], [0.0], [0.0]])]

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf, log
+from math import exp, inf
 
 import numpy as np
 
@@ -50,8 +50,11 @@ class Hypothesis:
     """What is told, with `in_words`, `value`, the number of the parameter, and `odds`."""
     in_words: InWords = lambda _known, _logs, variant: {"of": listed(variant.of)}
     """What may have it, as `of`, and what else the sentence says about it."""
-    most: float = inf
-    """A number of its parameter above this one is told as an effect alone."""
+    least: float = 0.0
+    """If the number of its parameter is nearer than this to where it is absent, it is told as an effect alone."""
+    why_no_null: str = ""
+    """Why nothing within its bounds is the model without it; empty if it is where its parameter has its null, or with
+    times that leave out nothing."""
     alarm: float = ALARM
     """The error over 10 s, relative to the noise, above which it is tried."""
     changes_thrust: bool = True
@@ -317,6 +320,7 @@ HYPOTHESES = {
         ),
         in_words=_of_twins,
         is_contrast=True,
+        why_no_null="a thruster pushes ahead or astern, and nothing lies between",
     ),
     "swapped commands": Hypothesis(
         0.03,
@@ -324,6 +328,7 @@ HYPOTHESES = {
         _permuted(lambda of: (of[::-1], 1.0)),
         sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
         is_contrast=True,
+        why_no_null="two commands are swapped or not, and nothing lies between",
     ),
     "rotor lag": Hypothesis(
         0.07,
@@ -335,6 +340,7 @@ HYPOTHESES = {
         ),
         alarm=1.0,
         changes_thrust=False,
+        why_no_null="a lag of the speed and one of the force are the same only where both are 0, below their bounds",
     ),
     "momentary commands": Hypothesis(
         0.15,
@@ -342,10 +348,11 @@ HYPOTHESES = {
         _momentary,
         sentence=(
             "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
-            "({rate} per second). Fly in MANUAL, or log at 50 Hz"
+            "({rate} per second). Fly in MANUAL, or log at 50 Hz, which ArduSub's own log cannot"
         ),
         in_words=_of_lost,
         changes_thrust=False,
+        why_no_null="a straight line between two rows is not a command that holds, however small the short force is",
     ),
     "health": Hypothesis(
         0.1,
@@ -356,7 +363,7 @@ HYPOTHESES = {
         (0.0, 0.5, 0.75),
         "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
         _of_twins,
-        most=0.79,
+        least=0.21,
         is_contrast=True,
     ),
     "command limit": Hypothesis(
@@ -380,10 +387,10 @@ HYPOTHESES = {
         0.03,
         _commanded,
         _slewing,
-        (log(0.3), log(1.0), log(3.0)),
-        "all thrusters: commands act at a rate of at most {value}, where 1 is full command{odds}. Check the ramp of "
+        (3.0, 1.0, 0.3),
+        "all thrusters: commands act as ramps, which take {value} from rest to full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
-        most=5.0,  # a ramp to full command within 0.2 s is rather a delay or a lag
+        least=0.2,  # a shorter ramp is rather a delay or a lag
     ),
 }
 """All hypotheses about the structure, by the kind of their parameter, in the order in which they change a model: first

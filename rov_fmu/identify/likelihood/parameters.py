@@ -310,7 +310,7 @@ class Table:
 
     def followed(self, z: Array, one: SampledLog) -> Array:
         """Return the inputs that thrusters follow, by limits and a drop of the voltage: (sets x) rows x inputs."""
-        numbers = np.broadcast(self.limit(z), self.get(z, "slew limit", default=np.inf), self.get(z, "voltage drop"))
+        numbers = np.broadcast(self.limit(z), self.get(z, "slew limit"), self.get(z, "voltage drop"))
         some = [_followed(one, *map(float, each)) for each in numbers]
         return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
 
@@ -321,23 +321,38 @@ class Table:
 
 
 @lru_cache(64)
-def _followed(one: SampledLog, limit: float, slew: float, drop: float) -> Array:
-    """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same."""
+def _followed(one: SampledLog, limit: float, rise: float, drop: float) -> Array:
+    """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same.
+
+    `rise` is the least time from rest to full command, s.
+    """
     found = one.record.inputs
-    if one.log.follows_axis or (limit == slew == np.inf and drop == 0.0):
+    if one.log.follows_axis or (limit == np.inf and rise == drop == 0.0):
         return found
-    found, steps = found.copy(), np.diff(one.record.told).tolist() if slew < np.inf else []
+    found = found.copy()
     places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
     for n in places:
-        values = found[:, n] = np.clip(found[:, n], -limit, limit)
-        now = float(values[0])
-        for row, (value, step) in enumerate(zip(values.tolist(), steps, strict=False)):
-            before, now = now, now + min(max(value - now, -slew * step), slew * step)
-            found[row, n] = 0.5 * (before + now)  # the mean over a row is that at its middle
+        found[:, n] = np.clip(found[:, n], -limit, limit)
+        if rise > 0.0:
+            found[:, n] = [*_ramped(found[:, n].tolist(), one.spans.tolist(), rise)]
     # Power and thrust grow about with the square of a command. The load is the mean of these squares.
     load = np.mean(found[:, places] ** 2, axis=1)
     found[:, places] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
     return found
+
+
+def _ramped(values: Sequence[float], spans: Sequence[float], rise: float) -> Iterator[float]:
+    """Yield the mean over each row of a command that moves at a limited rate to that of the row, and then stays."""
+    now = values[0]
+    for value, span in zip(values, spans, strict=True):
+        change, ramp = value - now, rise * abs(value - now)
+        if ramp < span:
+            now = value
+            yield value - 0.5 * change * ramp / span
+        else:
+            before = now
+            now += np.copysign(span / rise, change)
+            yield 0.5 * (before + now)
 
 
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:

@@ -122,7 +122,7 @@ class SampledLog:
         def some(record: Record) -> Record:
             horizontal = np.array([sensor.is_horizontal for sensor in record.sensors])
             kept = (record.time >= time) | ~horizontal[record.sensor]
-            some = [s for s in record.sensors if s.is_horizontal]
+            some = [] if kept.all() else [s for s in record.sensors if s.is_horizontal]
             velocities = dict.fromkeys((s.axis.velocity for s in some if s.is_velocity), _CALM)
             positions = dict.fromkeys((DRIFTS[s.axis.place] for s in some if not s.is_velocity), _ANYWHERE)
             return replace(
@@ -137,15 +137,22 @@ class SampledLog:
         measured = tuple(counts(m) for m in self.measured)
         return replace(self, measured=measured, record=some(self.record), thinned=some(self.thinned), settled=time)
 
+    @property
+    def spans(self) -> Array:
+        """How long each row of inputs holds, s: the last one until the last sample, or for the usual time."""
+        told = self.record.told
+        return np.diff(told, append=max(self.record.time[-1], told[-1] + self.interval))
+
     def refined(self, interval: float) -> "SampledLog":
         """Return the log with rows that are at most so far apart, s, and have the same commands."""
         told, since = self.record.told, self.record.since
-        counts = np.maximum(np.ceil(np.diff(told) / interval), 1.0).astype(int)
-        rows = np.append(np.repeat(np.arange(len(counts)), counts), len(told) - 1)
-        parts = np.concatenate([*(np.arange(count) / count for count in counts.tolist()), [0.0]])
-        later = told[rows] + parts * np.append(np.diff(told), 0.0)[rows]
-        earlier = np.where(parts > 0.0, later, since[rows])
-        made = {"told": later, "since": earlier, "inputs": self.record.inputs[rows]}
+        counts = np.maximum(np.ceil(self.spans / interval - 1e-6), 1.0).astype(int)
+        rows = np.repeat(np.arange(len(counts)), counts)
+        parts = np.concatenate([np.arange(count) / count for count in counts.tolist()])
+        later = told[rows] + parts * self.spans[rows]
+        earlier = since[rows] + parts * np.diff(since, append=since[-1] + self.spans[-1])[rows]
+        anew = (parts == 0.0).astype(np.intc)
+        made = {"told": later, "since": earlier, "inputs": self.record.inputs[rows], "anew": anew}
         if self.record.beside is not None:
             made["beside"] = self.record.beside[rows]
         return self._with_rows(**made)
@@ -433,10 +440,9 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
 
 def _tilt(log: Log, layout: Layout) -> Array:
     """Return times, roll and pitch of a dive of a vehicle that has neither axis, 3 x k; k = 0 if unknown."""
-    roll, pitch = log.used("roll angle"), log.used("pitch angle")
-    if log.follows_axis or layout.has_attitude or roll is None or pitch is None:
+    if log.follows_axis or layout.has_attitude or not log.tilt:
         return np.zeros((3, 0))
-    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in (roll, pitch))
+    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in log.tilt)
     if min(len(times), len(time)) < LEAST_SAMPLES:
         return np.zeros((3, 0))
     return np.array([time, np.interp(time, times, rolls), pitches])

@@ -334,6 +334,8 @@ class Trial:
     """2 ln of the posterior probability, but for a constant."""
     quick: float
     """2 ln of the evidence of thinned logs."""
+    absent: frozenset[Variant] = frozenset()
+    """The hypotheses for which its parameters are no evidence: they end near where these are absent."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -365,11 +367,23 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
     return None
 
 
+def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
+    """Return the minimum of J with some hypotheses for all samples, from the end of a fit; None if a motion diverges."""
+    model = model.applied(*starts)
+    objective = model.objective()
+    with suppress(DivergedError):
+        start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
+        return _trial(starts, model, objective, minimise(objective, start, last=False), prior, near.quick)
+    return None
+
+
 def _trial(starts: Starts, model: Model, objective: Objective, full: Minimum, prior: float, quick: float) -> Trial:
     """Return the fit with some hypotheses, whose parameters are where it ends."""
     places = {one: objective.table.place(*one.parameter) for one in starts}
     ends = {one: None if place is None else float(full.z[place]) for one, place in places.items()}
-    return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick)
+    posterior = Posterior.of(objective.table, full.z, full.information)
+    absent = (one for one, place in places.items() if place is not None and posterior.evidence(place) <= WINS)
+    return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick, frozenset(absent))
 
 
 def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
@@ -424,7 +438,7 @@ class StructureSearch:
             if self._gain(best) <= 0.0:
                 rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
-            self.now = best
+            self.now = self._without_absent(best)
         now, nearest = self._explaining()
         trials = [one for one in self.tried.values() if one]
         adopted = (
@@ -472,6 +486,20 @@ class StructureSearch:
     def _gain(self, other: Trial) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""
         return other.score - self.now.score - (-WINS if len(other.starts) < len(self.now.starts) else WINS)
+
+    def _without_absent(self, trial: Trial) -> Trial:
+        """Return a fit without the hypotheses for which it has no evidence, from there, unless it is clearly worse.
+
+        Such a fit is better than the last one because it ended in another minimum, which needs no hypothesis.
+        """
+        rest = {one: start for one, start in trial.starts.items() if one not in trial.absent}
+        if len(rest) == len(trial.starts):
+            return trial
+        other, before = refitted(self.model, rest, self._prior(rest), trial), self.tried.get(frozenset(rest))
+        if not other or (before and before.score >= other.score):
+            return trial
+        self.tried[frozenset(rest)] = other
+        return other if other.score > trial.score - WINS else trial
 
     @cached_property
     def variants(self) -> list[Variant]:

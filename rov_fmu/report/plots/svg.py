@@ -28,7 +28,7 @@ from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.io.picture import read_svg
 from rov_fmu.report.palette import PALETTE
 from rov_fmu.report.templates import in_words
@@ -72,7 +72,7 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str =
     try:
         svg = svg_file(draw, size, salt=label + salt, background="none", margin=0.02, marked=marked)
     except Exception as error:  # Matplotlib raises any kind
-        reason = brief(str(error) or type(error).__name__)
+        reason = brief(reason_of(error))
         return Markup("<p>{}: this plot cannot be drawn: {}</p>").format(label, reason)
     head = f'role="img" aria-label="{escape(label)}">'
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")[^>]*>', lambda found: f"<svg {found[1]} {head}", svg, count=1)

@@ -295,7 +295,7 @@ def _truth(value: _Value) -> np.bool_:
 
 def _array(value: _Value) -> _Value:
     if not isinstance(value, np.ndarray):
-        raise TypeError(f"{type(value).__name__!r} object is not subscriptable")
+        raise TypeError("a single number has no elements")
     return value
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, BeyondError, Expression, Function
 
 Array = npt.NDArray[np.float64]
@@ -160,13 +160,9 @@ def _number(expression: Expression, values: Mapping[str, Any]) -> float:
     try:
         value = expression.value(values)
     except ZeroDivisionError as error:  # Python's message differs between versions
-        raise _NoNumberError("ZeroDivisionError: division by zero") from error
-    except TimeError as error:
-        raise _NoNumberError(str(error)) from error
-    except BeyondError as error:
-        raise _NoNumberError(brief(f"IndexError: {error}")) from error
+        raise _NoNumberError("division by zero") from error
     except Exception as error:  # NumPy raises many kinds
-        raise _NoNumberError(brief(f"{type(error).__name__}: {error}")) from error
+        raise _NoNumberError(brief(reason_of(error))) from error
     if isinstance(value, np.ndarray):
         raise _NoNumberError("must be one number, and not an array") from TypeError()
     number = float(value)

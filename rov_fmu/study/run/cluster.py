@@ -10,6 +10,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
+from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
@@ -19,7 +20,7 @@ from distributed.comm.core import CommClosedError
 from distributed.utils import silence_logging_cmgr
 
 from rov_fmu.io.interrupts import ctrl_c_withheld, temporary_folder
-from rov_fmu.io.messages import FileError, StudyError, brief
+from rov_fmu.io.messages import FileError, StudyError, brief, reason_of
 from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.results.store import Store
@@ -35,6 +36,8 @@ _AHEAD = 3
 _GONE = (CancelledError, CommClosedError)
 """Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
+_WATCH = 2.0
+"""The seconds after which it is asked again whether workers are there."""
 _WAIT = 10.0
 """The seconds within which a scheduler or a worker must answer."""
 
@@ -50,6 +53,8 @@ class Progress:
     """The number of runs that failed in this call."""
     dashboard: str
     """The address of Dask's page about its workers, or an empty text."""
+    has_workers: bool = True
+    """False while no worker is there, so that nothing is done."""
 
 
 @dataclass
@@ -84,7 +89,7 @@ def execute(
             client.register_plugin(Delivery(job, own_cluster=scheduler is None))
         except Exception as error:  # whatever a worker may raise
             needs = "a worker cannot run the study. It needs the same version of rov-fmu[study] as this machine"
-            raise StudyError(f"{needs}: {brief(str(error))}") from error
+            raise StudyError(f"{needs}: {brief(reason_of(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
         try:
@@ -123,7 +128,8 @@ class _Runs:
         """Do all missing runs."""
         self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
         self._report()
-        coming = as_completed(loop=self.client.loop)
+        coming, ended = as_completed(loop=self.client.loop), Event()
+        Thread(target=self._watch, args=(ended,), daemon=True).start()
         try:
             self._submit_tasks(coming)
             for future in coming:
@@ -131,6 +137,7 @@ class _Runs:
                 del future  # otherwise its rows stay in memory
                 self._submit_tasks(coming)
         finally:
+            ended.set()
             with suppress(Exception):  # a client that is closed raises
                 self.client.cancel(list(self.futures), force=True)
 
@@ -161,7 +168,7 @@ class _Runs:
         except _GONE:
             raise
         except Exception as error:  # the cluster raises various exceptions
-            raise StudyError(f"the workers are lost: {brief(str(error) or type(error).__name__)}") from error
+            raise StudyError(f"the workers are lost: {brief(reason_of(error))}") from error
         self.store.write(first, end, part.runs, part.trajectories)
         self.spent.runs += end - first
         self.spent.failed += part.failed
@@ -169,9 +176,16 @@ class _Runs:
         self.seconds = max(part.seconds / (end - first), 1e-6)
         self._report()
 
-    def _report(self) -> None:
-        link = self.client.dashboard_link
-        self.on_progress(Progress(self.done_before + self.spent.runs, self.design.runs, self.spent.failed, link or ""))
+    def _watch(self, ended: Event) -> None:
+        """Report again and again while no worker is there, until the runs end."""
+        with suppress(Exception):  # a client that is closed, or has lost its scheduler, raises
+            while not ended.wait(_WATCH):
+                if not self.client.nthreads() and not ended.is_set():
+                    self._report(has_workers=False)
+
+    def _report(self, *, has_workers: bool = True) -> None:
+        done, link = self.done_before + self.spent.runs, self.client.dashboard_link or ""
+        self.on_progress(Progress(done, self.design.runs, self.spent.failed, link, has_workers))
 
 
 @contextmanager

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
-from rov_fmu.io.messages import brief
+from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
 from rov_fmu.study.plan.model import TYPES, Model, Variable
 from rov_fmu.study.plan.plan import Plan
@@ -181,7 +181,7 @@ class Simulator:
                     self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep_message
                 )
         except Exception as error:  # FMPy raises that itself
-            what = str(error).replace(self._folder + os.sep, "").rstrip(".")
+            what = reason_of(error).replace(self._folder + os.sep, "").rstrip(".")
             raise LoadError(brief(f"{what}{last_message()}", 240)) from error
 
     def _with_message(self, values: Sequence[float]) -> str:

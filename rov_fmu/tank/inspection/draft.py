@@ -17,6 +17,7 @@ from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrust
 from rov_fmu.tank.inspection.inspection import Inspection
 from rov_fmu.tank.readers.ardusub_frames import config_of, fitting_frames
 from rov_fmu.tank.readers.parsers import format_of
+from rov_fmu.vehicle.description import why_no_identifier
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -41,7 +42,8 @@ def likely_vehicle(inspections: Sequence[Inspection], curves: Collection[str]) -
     layouts = {name: load_vehicle(file).layout for name, file in SHIPPED.items()}
     most = max(inspections, key=lambda one: (len(one.commands), sum(row.low < row.high for row in one.commands)))
     ends = {row.name.removeprefix("thruster "): (row.low, row.high) for row in most.commands}
-    thrusters = likely_thrusters(ends, layouts.values()) if _is_bag(most.path) else [*ends]
+    is_named = not _is_bag(most.path) or not EXTERNAL.isdisjoint(ends)
+    thrusters = [*ends] if is_named else likely_thrusters(ends, layouts.values())
     frames = {one.log.frame for one in inspections if one.log and one.log.frame}
     possible = [layout for layout in layouts.values() if frames <= {*fitting_frames(layout)} or not frames]
     fits = fitting(thrusters, possible)
@@ -74,7 +76,7 @@ def draft(
         shipped=SHIPPED,
         base=likely.base,
         name=name,
-        identifier=word if word[:1].isalpha() else f"rov_{word}".rstrip("_"),
+        identifier=f"rov_{word}".rstrip("_") if why_no_identifier(word) else word,
         curves=tables.curves or ["all"],
         axes=AXES.values(),
         signals={row.name for one in inspections for row in one.channels},

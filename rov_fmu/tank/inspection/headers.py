@@ -17,14 +17,19 @@ from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, Know
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
     COMMANDS,
+    FALSE_FRIENDS,
     FORCE,
     HEADERS,
     NOT_COMMANDED,
     NOT_MEASURED,
+    PLURALS,
     QUANTITIES,
     THRUSTER,
     TIMES,
     TORQUE,
+    meanings,
+    unit_names,
+    words_in,
 )
 from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
 from rov_fmu.tank.commands import PULSE_RANGE
@@ -32,7 +37,8 @@ from rov_fmu.tank.folder import kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
 from rov_fmu.tank.readers.parsers import header_of
 
-_HEADER = re.compile(r"(?P<name>[^\[(]*)[\[(](?P<unit>[^\])]*)[\])]\s*")
+_HEADER = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]\s*")
+_NO_UNIT = re.compile(r".*\S\(\d+\)|.*[\[(][xyz][\])]\s*", re.IGNORECASE)
 _PERCENT = re.compile(r"(?P<name>.*\S)\s+(?P<unit>%)")
 _MOST_THRUSTERS = 32
 """The largest number of columns of a CSV file that are taken as the commands of thrusters; no vehicle has more."""
@@ -51,6 +57,13 @@ _NO_COMMAND = {"rc", "rcin", "max", "min", "limit", "n", "kgf", "lbf", *NOT_COMM
 """Words in headers that are no commands: of a pilot, limits, and forces."""
 _SHARES = {"force", "thrust", "torque"}
 """Words of forces, which are commands if their unit is one of commands: a thrust in percent."""
+_UNKNOWN_UNITS = {
+    *("a", "ma", "ah", "mah", "w", "wh", "c", "degc", "f", "k", "g", "hz", "rpm", "psi", "dbar", "ut", "gauss", "n"),
+    *("percent", "pct", "raw", "count", "counts", "fathom", "fathoms", "fm", "id", "std", "var"),
+}
+"""Words at the end of a header that are units of other quantities, or of no measurement."""
+_WITH_UNIT = {"pressure"}
+"""The quantities that, like velocities, are recognised only with a unit: a pressure may be of air."""
 _NAME = re.compile(r"[a-z][a-z0-9_]*|[1-9][0-9]?", re.IGNORECASE)
 """A name of a thruster that a vehicle file may have."""
 _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
@@ -58,6 +71,7 @@ _LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle":
 """The largest number that is likely in the SI unit. If a larger one has no unit, it is in a smaller unit."""
 _EXTERNAL = {axis.external.casefold(): axis for axis in AXES.values()}
 _VELOCITIES = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
+_RATES = {True: "yaw velocity", False: "surge velocity"}
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """The least time since 1970 that is in a unit."""
 
@@ -75,11 +89,32 @@ class TableHeaders:
 def header_parts(title: str) -> tuple[str, str]:
     """Return the name and the unit in a header with brackets of any kind, or with a percent sign at its end.
 
-    A number in round brackets right behind the name is that of a column of a matrix, such as `pwm(1)`.
+    A number in round brackets right behind the name is that of a column of a matrix, such as `pwm(1)`, and the letter
+    of an axis is no unit, either.
     """
     match = _HEADER.fullmatch(title) or _PERCENT.fullmatch(title)
-    has_unit = match and not re.fullmatch(r".*\S\(\d+\)", title)
+    has_unit = match and not _NO_UNIT.fullmatch(title)
     return (match["name"].rstrip(), match["unit"]) if match and has_unit else (title, "")
+
+
+def name_and_unit(title: str, units: Collection[str]) -> tuple[list[str], str | None]:
+    """Return the words of a header without its unit, and which of some units that is: empty for none, None for another.
+
+    It stands in brackets, or among the words of the name, as in `gyro_z_dps`; a letter is a unit only at the end.
+    """
+    name, bracket = header_parts(title)
+    words, names = words_in(name), unit_names(tuple(units))
+    if bracket in units:
+        return words, bracket
+    if bracket.strip():
+        given = bracket, bracket.split()[-1]  # such as azimuth °
+        return words, next((unit for one in given if (unit := names.get(" ".join(words_in(one))))), None)
+    for end in range(len(words), 0, -1):
+        for start in range(max(end - 3, 0), end):
+            own = " ".join(words[start:end])
+            if own in names and end - start < len(words) and (len(own) > 1 or end == len(words)):
+                return words[:start] + words[end:], names[own]
+    return words, None if len(words) > 1 and words[-1] in _UNKNOWN_UNITS else ""
 
 
 def axis_in_name(path: Path) -> Axis | None:
@@ -211,7 +246,7 @@ def _clock(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
 
 def _is_up(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> bool:
     """Return True if the third component of a position is negative, so that z points up and y to port."""
-    depths = (numbers[title] for title, name in meant.items() if name == "depth" and _words(title).endswith(" z"))
+    depths = (numbers[title] for title, name in meant.items() if name == "depth" and "z" in words_in(title))
     depth = next((found for found in depths if len(found)), None)
     return depth is not None and bool(np.median(depth) < 0.0)
 
@@ -222,14 +257,14 @@ def _measured(meant: Mapping[str, str], numbers: Mapping[str, Array], *, is_up: 
     for title, name in meant.items():
         if name not in taken:
             taken.add(name)
-            sign = "-" if is_up and _words(title).endswith((" y", " z")) else ""
+            sign = "-" if is_up and {"y", "z"}.intersection(words_in(title)) else ""
             columns[title] = f"{sign}{name} [{_unit(title, name, numbers[title])}]"
     return columns
 
 
 def _words(title: str) -> str:
-    """Return the words and numbers of a header in small letters, without its unit."""
-    return " ".join(re.findall("[a-z]+|[0-9]+", header_parts(title)[0].casefold()))
+    """Return the words and numbers of a header in small letters and in English, without a unit in brackets."""
+    return " ".join(meanings(words_in(header_parts(title)[0])))
 
 
 def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
@@ -241,19 +276,45 @@ def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
 def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
     """Return the name of the column that a header seems to mean, or an empty text.
 
-    `rotations` are the beginnings of headers of quaternions. Nothing is measured in percent.
+    `rotations` are the beginnings of headers of quaternions.
     """
-    words, unit = _words(title), header_parts(title)[1]
-    is_part = words.endswith((" x", " y", " z"))
-    if is_part and (words[:-1] in rotations or not len(numbers)):
+    words = _words(title)
+    if words.endswith((" x", " y", " z")) and (words[:-1] in rotations or not len(numbers)):
         return ""
-    for name in _candidates(title, ("", "time", *QUANTITIES)):
+    candidates = [*_candidates(title, ("", "time", *QUANTITIES))]
+    for name in takewhile(bool, candidates):
         quantity = QUANTITIES.get(name)
-        if quantity and unit == "%":
-            continue
-        if not (quantity and quantity.is_velocity) or unit in quantity.units or (is_part and not unit):
+        own, unit = name_and_unit(title, quantity.units if quantity else TIMES)
+        is_sure = not (quantity and quantity.is_velocity) or own[-1] in ("x", "y", "z")
+        if unit and (is_sure or PLURALS.isdisjoint(words_in(title))):
+            return name
+        if unit == "" and is_sure and name not in _WITH_UNIT and FALSE_FRIENDS.isdisjoint(own):
+            return name
+    return "" if candidates else _velocity_by_unit(title)
+
+
+def _velocity_by_unit(title: str) -> str:
+    """Return the velocity that a unit and a symbol or the letter of an axis mean, as in `r_dps` and `imu_gz_dps`."""
+    for axis in AXES.values():
+        name = f"{axis.name} velocity"
+        words, unit = name_and_unit(title, QUANTITIES[name].units)
+        is_part = len(words[-1:]) == 1 and len(words[-1]) <= 2 and words[-1].endswith("xyz"[axis.place])
+        if unit and (is_part or words == [axis.velocity]):
             return name
     return ""
+
+
+def one_of_several(title: str, numbers: Array) -> str:
+    """Return words about a header that is not read, because others tell the same; empty for any other header."""
+    name = _meant(title, numbers, ())
+    return f"another {name} [{_unit(title, name, numbers)}]" if name and len(numbers) else ""
+
+
+def may_be_velocity(title: str, *, is_rotation: bool) -> bool:
+    """Return True for an unknown header or field whose words or unit are those of a velocity, of whatever axis."""
+    words, (own, unit) = {*_words(title).split()}, name_and_unit(title, QUANTITIES[_RATES[is_rotation]].units)
+    rates = {"gyro"} if is_rotation else {"velocity", "vel", "speed", "dvl"}
+    return bool((unit or rates & words) and NOT_MEASURED.isdisjoint(words) and own)
 
 
 def _may_be_command(title: str, numbers: Array) -> bool:
@@ -262,7 +323,8 @@ def _may_be_command(title: str, numbers: Array) -> bool:
     is_unit_of_command = unit == "%" or unit.startswith(PULSES)
     no_command = _NO_COMMAND - _SHARES if is_unit_of_command else _NO_COMMAND
     is_possible = is_unit_of_command or unit in ("", "1", "-", "pwm")
-    return bool(is_possible and len(numbers) and not no_command & {*_words(title).split()})
+    is_other = no_command.intersection(_words(title).split()) or _velocity_by_unit(title)
+    return bool(is_possible and len(numbers) and not is_other)
 
 
 def _is_command(title: str, numbers: Array, meant: str) -> bool:
@@ -314,15 +376,15 @@ def _names(titles: Sequence[str]) -> list[str]:
 
 def _unit(title: str, name: str, numbers: Array) -> str:
     """Return the unit of a column, from its header or else the likely one."""
-    given, most = header_parts(title)[1], float(np.abs(numbers).max(initial=0.0))
-    units = QUANTITIES[name].units if name in QUANTITIES else TIMES
+    units, most = QUANTITIES[name].units if name in QUANTITIES else TIMES, float(np.abs(numbers).max(initial=0.0))
+    given = name_and_unit(title, units)[1]
     if name == "time":
         usual = float(np.ptp(numbers)) / max(len(numbers) - 1, 1) if len(numbers) else 0.0
         likely = next((unit for least, unit in _EPOCHS if most > least), "ms" if usual > 5.0 and most < 1e9 else "s")
     else:
         largest = _LIKELY.get(name, inf)
         likely = next((unit for unit, per in units.items() if most <= largest * per), [*units][-1])
-    return given if given in units else likely
+    return given or likely
 
 
 def _force(title: str) -> Axis | None:

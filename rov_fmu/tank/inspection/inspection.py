@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from math import nan
 from pathlib import Path
@@ -12,20 +13,22 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_header
+from rov_fmu.equation.parts import VehicleAxis
+from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_start
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import kind_of_table
-from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table
+from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table, one_of_several
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tank_tables import read_rows
+from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, time_columns
 
 PARTS = 32
 """The number of parts of the time for which the course of a signal is told."""
@@ -90,7 +93,8 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
-        titles = read_header(path, open_stream)
+        start = read_start(path, open_stream, FIRST_ROWS)
+        titles = start[0]
         numbers, ranges = _numbers(path, titles, open_stream)
         if not any(map(len, numbers.values())):
             raise DataFileError(
@@ -99,18 +103,23 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         columns = renamed = {title: tables.columns[title] for title in titles if title in tables.columns}
         if kind := kind_of_table(path, columns):
             return [_of_table(path, kind, columns, ranges)]
+        renamed = time_columns(start, renamed) | renamed
         own = {renamed.get(title, title): numbers[title] for title in titles}
         guess, columns = guessed([*own], own, axis, [described] if described else layouts)
         layout = described or guess
         known = columns_of_log(layout, axis)
-        is_known = KnownColumns(known_columns(known)).has
-        told = {*map(_quantity, renamed.values())}
-        guesses = {title: meant for title, meant in columns.items() if title in numbers and is_known(meant)}
-        columns = {title: meant for title, meant in guesses.items() if _quantity(meant) not in told} | renamed
+        name_of = partial(_known_name, KnownColumns(known_columns(known)))
+        told = {*map(name_of, own), ""}
+        columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
+        columns |= renamed
         names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
         is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
-        unread = {title: ranges[title] for title in titles if not (is_column(meant[title]) or title in flags)}
+        unread = {
+            title: ", ".join(filter(None, (ranges[title], one_of_several(title, numbers[title]))))
+            for title in titles
+            if not (is_column(meant[title]) or title in flags)
+        }
         count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
         if not has_time and (table := _of_unnamed_table(path, renamed, ranges)):
@@ -120,13 +129,20 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
     else:
         names, _ = names_of(described, tables)
         axis = None
-    logs = map(checked, read_logs(path, layout, names, axis, is_part=True))
-    return [_of_log(path, log, unread, columns) for log in logs]
+    logs = read_logs(path, layout, names, axis, is_part=True)
+    if not (described or open_stream or any(log.commands for log in logs)):
+        of_wrench = read_logs(path, Layout.of_wrench(map(VehicleAxis, AXES.values())), names, is_part=True)
+        if any(log.commands for log in of_wrench):  # it need not have all components
+            kept = (tuple(one for one in log.findings if one.kind != "missing column") for log in of_wrench)
+            logs = [replace(log, findings=own) for log, own in zip(of_wrench, kept, strict=True)]
+    return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
 
 
-def _quantity(meant: str) -> str:
-    """Return what a header stands for, without its sign and its unit."""
-    return meant.removeprefix("-").partition(" [")[0]
+def _known_name(known: KnownColumns, header: str) -> str:
+    """Return the name of the column that has a header; empty without one."""
+    with suppress(ValueError):
+        return found.name if (found := known.find(header, others=True)) else ""
+    return ""
 
 
 def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:

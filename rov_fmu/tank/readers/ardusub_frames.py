@@ -57,9 +57,9 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
         if key in servos:
             raise InputError(f"--servo {servo}={name}: another servo drives this input")
         servos[key] = servo, -1.0 if name.startswith("-") else 1.0
-    if frame is None and table:
+    own = chosen_frame(layout, frame, table)
+    if table and not own:
         return servos
-    own = frame or next(iter(fitting_frames(layout)), None)
     matched = own and _matched(layout, FRAMES[own], table)
     if not matched:
         if frame:
@@ -75,6 +75,11 @@ def servos_of(layout: Layout, frame: str | None, table: Mapping[int, str]) -> Se
             f"thrusters: write for example {example}, or their positions into the vehicle file"
         )
     return free | servos
+
+
+def chosen_frame(layout: Layout, frame: str | None, table: Mapping[int, str]) -> str:
+    """Return the frame of `servos_of`, which has the same arguments; an empty text if there is none."""
+    return frame or ("" if table else next(iter(fitting_frames(layout)), ""))
 
 
 def fitting_frames(layout: Layout) -> list[str]:

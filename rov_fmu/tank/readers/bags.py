@@ -1,4 +1,5 @@
-"""Read bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap) with rosbags, and MCAP files of JSON messages, such as BlueOS's.
+"""Read the messages of bags of ROS 1 (.bag) and ROS 2 (.db3, .mcap), and of any MCAP file, such as those of BlueOS and
+Blueye: their definitions tell how to decode them.
 
 The catalogue says which types of messages are read and what they measure. Frames are those of REP 103 (forward, left,
 up in east, north, up), unless the name of the frame says otherwise. The vehicle is the first part of a topic's name,
@@ -7,9 +8,9 @@ its namespace.
 
 import json
 import re
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
-from itertools import islice
 from math import nan
 from pathlib import Path
 from shutil import copyfileobj
@@ -18,55 +19,163 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.tank.catalogue import is_known
-from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.log import Source
-from rov_fmu.tank.readers.content import Content, Messages, content_of, described, topic_of
+from rov_fmu.tank.readers.content import Content, described, topic_of
 from rov_fmu.tank.readers.mavlink import Message, read_messages
+from rov_fmu.tank.readers.recordings import (
+    ZSTD,
+    Damage,
+    Raw,
+    Stream,
+    bag_messages,
+    database_messages,
+    mcap_messages,
+)
 
 _LONGEST = 32
-"""Longer arrays in messages are covariances, images or clouds, and are not read."""
+"""Longer arrays in messages are images or clouds, and are not read."""
+_COVARIANCE = 6
+"""The number of rows and columns of the covariance of a pose or a twist, of which the variances are read."""
 _FIRST = 100
 """The number of messages of an unknown topic whose ranges are told."""
-_RC_OUT = "std_msgs/Header header\nuint8 rssi\nuint16[] channels\n"
-"""The definition of mavros_msgs/RCOut, for bags without definitions."""
-ZSTD = b"\x28\xb5\x2f\xfd"
-"""The first bytes of what zstd compressed. A message of ROS 2 begins with 0."""
+_DEFINITIONS = {
+    "mavros_msgs/msg/RCOut": "std_msgs/Header header\nuint8 rssi\nuint16[] channels\n",
+}
+"""The definitions of types beside those of ROS 2, for bags without definitions."""
+_IDL = f"{'=' * 80}\nIDL: "
+"""What is before each of several definitions in IDL."""
 _MAVLINK_TOPIC = re.compile(r"mavlink/(\d+)/(\d+)/(\w+)")
 """The topics of BlueOS: system, component and kind of the message."""
+_SECONDS, _NANOSECONDS = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos")
+"""The names of the parts of a time stamp."""
+
+Decode = Callable[[bytes], Any]
+"""Returns a message as an object or a mapping of its fields. Raises any exception for one that is damaged."""
 
 
 def read_bag(path: Path, named: Collection[str]) -> Content:
-    """Read the messages that the catalogue knows, and those of the topics in `named`."""
-    from rosbags.highlevel import AnyReader
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+    """Read the messages of a bag of ROS 1 that the catalogue knows, and those of the topics in `named`."""
+    return _read(path, named, bag_messages)
 
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg(_RC_OUT, "mavros_msgs/msg/RCOut"))
-    sources: dict[str, Source] = {}
-    messages: Messages = {}
-    damaged = 0
-    with AnyReader([path], default_typestore=store) as reader:
-        read = [c for c in reader.connections if c.topic in named or is_known(c.msgtype)]
-        others = {c.topic: c for c in reader.connections if c not in read}
-        counts = {topic: connection.msgcount for topic, connection in others.items()}
-        unread = described((_first_messages(reader, connection) for connection in others.values()), counts)
-        for connection, arrival, raw in reader.messages(read) if read else ():
-            try:
-                message: Any = reader.deserialize(_unpacked(raw), connection.msgtype)
-            except Exception:  # a damaged message, or one of an unknown type
-                damaged += 1
-                continue
-            topic, header = connection.topic, getattr(message, "header", None)
-            stamp = header.stamp.sec + header.stamp.nanosec * 1e-9 if header else 0.0
-            if topic not in sources:
-                frames = _frames(message, connection.msgtype)
-                namespace, _, _ = topic.strip("/").rpartition("/")[0].partition("/")
-                sources[topic] = Source(topic, connection.msgtype, namespace, frames=frames)
-            numbers = dict(_numbers("", message))
-            messages.setdefault(sources[topic], []).append((stamp or nan, arrival * 1e-9, numbers))
-    content = content_of(path.name, messages, damaged=damaged)
-    content.unread = unread
+
+def read_database(path: Path, named: Collection[str]) -> Content:
+    """Read the same messages in the database of a bag of ROS 2."""
+    return _read(path, named, database_messages)
+
+
+def read_mcap(path: Path, named: Collection[str]) -> Content:
+    """Read the same messages in an MCAP file, written by ROS or by others."""
+    return _read(path, named, mcap_messages)
+
+
+def _read(path: Path, named: Collection[str], messages: Callable[[Path, Damage], Iterator[Raw]]) -> Content:
+    damage, unknown = Damage(), _Unknown()
+    content = read_messages(path, _decoded(messages(path, damage), named, unknown), named)
+    content.unread |= unknown.described()
+    content.count("damaged pieces", damage.pieces)
+    if damage.is_cut:
+        content.add_cut()
     return content
+
+
+def unpack(path: Path, to: Path) -> None:
+    """Write the file that zstd compressed, such as a bag of ROS 2 with `--compression-mode file`. Raises ZstdError."""
+    import zstandard
+
+    with path.open("rb") as packed, to.open("wb") as file:
+        copyfileobj(zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True), file)
+
+
+class _Unknown:
+    """The topics that nobody knows, and their first messages."""
+
+    def __init__(self) -> None:
+        self.counts: Counter[Source] = Counter()
+        self.rows: dict[Source, list[Mapping[str, float]]] = {}
+
+    def add(self, stream: Stream, decode: Decode | None, raw: bytes) -> None:
+        """Add a message. It is listed even if it is damaged, or if there is no decoder."""
+        source = Source(stream.topic, stream.kind or stream.encoding)
+        self.counts[source] += 1
+        if decode and self.counts[source] <= _FIRST:
+            with suppress(Exception):
+                self.rows.setdefault(source, []).append(dict(_numbers("", decode(raw))))
+
+    def described(self) -> dict[str, str]:
+        """Return descriptions of the topics, and of the range of each number in their first messages."""
+        rows = {source: self.rows.get(source, []) for source in self.counts}
+        topics = [topic_of(source, np.arange(float(len(own))), own) for source, own in rows.items()]
+        return described(topics, {source.topic: count for source, count in self.counts.items()})
+
+
+def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown) -> Iterator[Message | None]:
+    """Yield the messages that are read, and None for a damaged one."""
+    decoders: dict[Stream, Decode | None] = {}
+    frames: dict[Stream, tuple[str, str]] = {}
+    for stream, time, raw in messages:
+        if stream not in decoders:
+            decoders[stream] = _decoder(stream)
+        decode, match = decoders[stream], _MAVLINK_TOPIC.fullmatch(stream.topic)
+        is_read = stream.topic in named or is_known(stream.kind)
+        if not decode or not (match or is_read):
+            unknown.add(stream, decode, raw)
+            continue
+        try:
+            message = decode(raw)
+            if match:
+                yield _of_mavlink(match, message["message"], time * 1e-9)
+                continue
+            if stream not in frames:
+                frames[stream] = _frames(message, stream.kind)
+            namespace, _, _ = stream.topic.strip("/").rpartition("/")[0].partition("/")
+            source = Source(stream.topic, stream.kind or stream.topic, namespace, frames=frames[stream])
+            yield Message(source, time * 1e-9, dict(_numbers("", message)), stamp=_stamp(message))
+        except MemoryError:
+            raise
+        except Exception:  # a parser may raise anything on damaged bytes
+            yield None
+
+
+# ---- Decoders --------------------------------------------------------------------------------------------------------
+
+
+def _decoder(stream: Stream) -> Decode | None:
+    """Return what decodes the messages of a stream; None for an encoding or a definition that is not known."""
+    makers = {"json": lambda _: json.loads, "protobuf": _of_protobuf, "cdr": _of_ros, "ros1": _of_ros}
+    try:
+        return makers[stream.encoding](stream) if stream.encoding in makers else None
+    except (MemoryError, ModuleNotFoundError):
+        raise
+    except Exception:  # a definition that is damaged
+        return None
+
+
+def _of_protobuf(stream: Stream) -> Decode | None:
+    from mcap.records import Schema
+    from mcap_protobuf.decoder import DecoderFactory
+
+    schema = Schema(id=1, name=stream.kind, encoding=stream.language, data=stream.definition)
+    return DecoderFactory().decoder_for(stream.encoding, schema)
+
+
+def _of_ros(stream: Stream) -> Decode | None:
+    from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+    text = stream.definition.decode()
+    store = get_typestore(Stores.EMPTY if text else Stores.ROS2_HUMBLE)
+    if not text:
+        for kind, definition in _DEFINITIONS.items():
+            store.register(get_types_from_msg(definition, kind))
+    elif stream.language.endswith("msg"):
+        store.register(get_types_from_msg(text, stream.kind))
+    else:
+        for part in text.split(_IDL):
+            store.register(get_types_from_idl(part.partition("\n")[2] if text.startswith(_IDL) else part))
+    kind = re.sub(r"^(\w+)/(\w+)$", r"\1/msg/\2", stream.kind)
+    if kind not in store.fielddefs:
+        return None
+    deserialize = store.deserialize_ros1 if stream.encoding == "ros1" else store.deserialize_cdr
+    return lambda raw: deserialize(_unpacked(raw), kind)
 
 
 def _unpacked(raw: bytes) -> bytes:
@@ -78,12 +187,33 @@ def _unpacked(raw: bytes) -> bytes:
     return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
 
 
-def unpack(path: Path, to: Path) -> None:
-    """Write the file that zstd compressed, such as a bag of ROS 2 with `--compression-mode file`. Raises ZstdError."""
-    import zstandard
+def _of_mavlink(topic: re.Match[str], body: Any, arrival: float) -> Message:
+    """Return a message of BlueOS, with the sender in the name of the topic. Raises an exception for a damaged one."""
+    system, component, kind = topic.groups()
+    parameter = _text(body["param_id"]) if kind == "PARAM_VALUE" else ""
+    source = Source(topic[0], kind, system, f"component {component}")
+    return Message(source, arrival, dict(_numbers("", body)), parameter)
 
-    with path.open("rb") as packed, to.open("wb") as file:
-        copyfileobj(zstandard.ZstdDecompressor().stream_reader(packed, read_across_frames=True), file)
+
+def _text(value: Any) -> str:
+    """Return a text that JSON may give as a list of characters or codes."""
+    return "".join(chr(c) if isinstance(c, int) else str(c) for c in value).rstrip("\0")
+
+
+# ---- The parts of a message ------------------------------------------------------------------------------------------
+
+
+def _part(message: Any, *names: str) -> Any:
+    """Return the first field of a message that has one of these names, or None."""
+    found = (message.get(name) if isinstance(message, Mapping) else getattr(message, name, None) for name in names)
+    return next((part for part in found if part is not None), None)
+
+
+def _stamp(message: Any) -> float:
+    """Return the time of a message, s, by its header or its field `timestamp`; NaN without one, and for 0."""
+    stamp = _part(_part(message, "header"), "stamp") or _part(message, "timestamp")
+    seconds, nanoseconds = _part(stamp, *_SECONDS), _part(stamp, *_NANOSECONDS)
+    return (seconds + (nanoseconds or 0) * 1e-9 if seconds is not None else 0.0) or nan
 
 
 def _frames(message: Any, kind: str) -> tuple[str, str]:
@@ -92,8 +222,7 @@ def _frames(message: Any, kind: str) -> tuple[str, str]:
     A child frame is that of the body: of the rotation of a pose, and of the twist in odometry. Otherwise, the frame in
     the header is that in which the numbers are given, or, in a message of an IMU or a wrench, the body's.
     """
-    header = getattr(message, "header", None)
-    frame, child = (header.frame_id if header else ""), getattr(message, "child_frame_id", "")
+    frame, child = f"{_part(_part(message, 'header'), 'frame_id') or ''}", f"{_part(message, 'child_frame_id') or ''}"
     return ("", frame) if re.search("Imu|Twist|Wrench", kind) else (frame, child)
 
 
@@ -101,59 +230,24 @@ def _numbers(place: str, value: Any) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message with their paths, except those of the header and of the layout of an array."""
     if isinstance(value, bool | int | float | np.number):
         yield place, float(value)
-    elif isinstance(value, np.ndarray | list | tuple):
-        if len(value) <= _LONGEST:
-            for n, one in enumerate(value):
-                yield from _numbers(f"{place}[{n}]", one)
+    elif isinstance(value, np.ndarray | Sequence):
+        is_covariance = place.endswith("covariance") and len(value) == _COVARIANCE**2
+        if is_covariance or (len(value) <= _LONGEST and not isinstance(value, str | bytes)):
+            for n in range(0, len(value), _COVARIANCE + 1 if is_covariance else 1):
+                yield from _numbers(f"{place}[{n}]", value[n])
     else:
-        fields = value if isinstance(value, Mapping) else getattr(value, "__dict__", {})
-        for name, inner in fields.items():
+        for name, inner in _fields(value):
             if name not in ("header", "layout"):
                 yield from _numbers(f"{place}.{name}" if place else name, inner)
 
 
-def _first_messages(reader: Any, connection: Any) -> Topic:
-    """Return the first messages of a topic, as far as they can be read."""
-    rows: list[Mapping[str, float]] = []
-    with suppress(Exception):  # a message that is damaged, or of an unknown type
-        for _, _, raw in islice(reader.messages([connection]), _FIRST):
-            rows.append(dict(_numbers("", reader.deserialize(_unpacked(raw), connection.msgtype))))
-    return topic_of(Source(connection.topic, connection.msgtype), np.arange(float(len(rows))), rows)
-
-
-# ---- MCAP with JSON --------------------------------------------------------------------------------------------------
-
-
-def read_mcap(path: Path, named: Collection[str]) -> Content:
-    """Read an MCAP file: a bag of ROS, or messages in JSON.
-
-    Those of BlueOS are MAVLink messages, with the sender in the name of the topic.
-    """
-    from mcap.reader import make_reader
-
-    with path.open("rb") as file:
-        reader = make_reader(file)
-        summary = reader.get_summary()
-        if summary and any(channel.message_encoding == "json" for channel in summary.channels.values()):
-            messages = (_of_json(channel.topic, raw) for _, channel, raw in reader.iter_messages())
-            return read_messages(path, messages, named)
-    return read_bag(path, named)
-
-
-def _of_json(topic: str, raw: Any) -> Message | None:
-    """Return a message in JSON, or None if it is damaged."""
-    match = _MAVLINK_TOPIC.fullmatch(topic)
-    system, component, kind = match.groups() if match else ("", "", topic)
-    try:
-        document = json.loads(raw.data)
-        body = document["message"] if match else document
-        parameter = _text(body["param_id"]) if kind == "PARAM_VALUE" else ""
-        source = Source(topic, kind, system, component and f"component {component}")
-        return Message(source, raw.log_time * 1e-9, dict(_numbers("", body)), parameter)
-    except (ValueError, KeyError, TypeError, RecursionError):
-        return None
-
-
-def _text(value: Any) -> str:
-    """Return a text that JSON may give as a list of characters or codes."""
-    return "".join(chr(c) if isinstance(c, int) else str(c) for c in value).rstrip("\0")
+def _fields(value: Any) -> Iterator[tuple[str, Any]]:
+    """Yield the fields of a structure with their names. A structure of protobuf that was not sent has none."""
+    if isinstance(value, Mapping):
+        yield from ((f"{name}", inner) for name, inner in value.items())
+    elif form := getattr(value, "DESCRIPTOR", None):
+        for field in getattr(form, "fields", ()):
+            if not field.has_presence or value.HasField(field.name):
+                yield field.name, getattr(value, field.name)
+    else:
+        yield from getattr(value, "__dict__", {}).items()

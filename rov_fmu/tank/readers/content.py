@@ -53,6 +53,12 @@ class Content:
         if count:
             self.findings.append(about(self.file, kind, count=count, **words))
 
+    def add_cut(self) -> None:
+        """Add a finding that the file ends before its end mark, with the time that could be read."""
+        times = [topic.time for piece in self.pieces for topic in piece.topics if len(topic.time)]
+        read = max((time[-1] for time in times), default=0.0) - min((time[0] for time in times), default=0.0)
+        self.findings.append(about(self.file, "cut", read=f"{read:.4g}"))
+
     def split_by_clock(self) -> None:
         """Split the log where a clock was set, and leave out and count the messages with times that none has shown.
 
@@ -94,6 +100,8 @@ def content_of(
     splits the log.
     """
     content, late = Content(file, []), Counter[str]()
+    for rows in messages.values():
+        rows.sort(key=lambda message: message[1])
     stamps = [np.array([message[:2] for message in own]) for own in messages.values()]
     again = restarts(stamps)
     begin = min((float(pairs[0, 1]) for pairs in stamps), default=0.0)

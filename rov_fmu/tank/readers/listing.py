@@ -1,6 +1,7 @@
 """The files of a folder: which are logs and tables, by their content, and why the others are not read."""
 
 import os
+import re
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -13,11 +14,14 @@ from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.readers.other_files import PICTURE
 from rov_fmu.tank.readers.parsers import FORMAT_NAMES, TABLE, format_of
+from rov_fmu.tank.readers.recordings import WAL
 
-BAG = "metadata.yaml"
+_BAG = "metadata.yaml"
 """The file in the folder of a bag of ROS 2."""
-_OF_SYSTEM = (BAG, "Thumbs.db", "desktop.ini")
+_OF_SYSTEM = (_BAG, "Thumbs.db", "desktop.ini")
 """The files that systems put into folders."""
+_OF_DATABASE = (WAL, "-shm", "-journal")
+"""What SQLite appends to the name of a database for those of its other files."""
 NOT_OPENED = "a device, a pipe or a link that leads nowhere is not opened"
 _NO_TABLE = "a table needs a header, and rows of numbers with commas, semicolons or tabs between the columns"
 _IN_FOLDER = "logs and tables in another folder do not count. If they belong to the tests, move them beside rov.toml"
@@ -61,8 +65,8 @@ def list_files(folder: Path, known: Collection[str] = ()) -> Listing:
     """
     listing = Listing(folder)
     for path in sorted(folder.iterdir()):
-        if os.path.isfile(path / BAG):  # noqa: PTH113 (in a folder that nobody may search, there is no bag)
-            listing.tests += sorted(part for part in path.iterdir() if part.name != BAG and part.is_file())
+        if is_bag(path):
+            listing.tests += sorted(part for part in path.iterdir() if part.is_file() and not _needs_no_word(part))
         elif path.is_dir() and not has_usual_suffix(path):
             if _has_tests(path):
                 listing.others.setdefault(_IN_FOLDER, []).append(path)
@@ -74,6 +78,18 @@ def list_files(folder: Path, known: Collection[str] = ()) -> Listing:
     return listing
 
 
+def is_bag(folder: Path) -> bool:
+    """Return True for the folder of a bag of ROS 2. A recorder that lost its power has written no metadata, but its
+    files are named after the folder."""
+    if os.path.isfile(folder / _BAG):  # noqa: PTH113 (in a folder that nobody may search, there is no bag)
+        return True
+    own = rf"{re.escape(folder.name)}_\d+\.(db3|mcap)(\.zstd)?"
+    with suppress(OSError):
+        names = [part.name for part in folder.iterdir() if not _needs_no_word(part)]
+        return bool(names) and all(re.fullmatch(own, name) for name in names)
+    return False
+
+
 def has_usual_suffix(path: Path) -> bool:
     """Return True if the name of a file tells that it is a log or a table."""
     return path.name.lower().endswith((*LOG_SUFFIXES, *TABLE_SUFFIXES))
@@ -82,6 +98,8 @@ def has_usual_suffix(path: Path) -> bool:
 def _needs_no_word(path: Path) -> bool:
     """Return True for a hidden file, a file of the system, and one that this program has written or reads by name."""
     if path.name.startswith(".") or path.name in _OF_SYSTEM or path.suffix.lower() in OWN_SUFFIXES:
+        return True
+    if any(path.name.endswith(end) and path.with_name(path.name[: -len(end)]).is_file() for end in _OF_DATABASE):
         return True
     if path.suffix.lower() == ".mcap" and path.is_file():
         with suppress(OSError), path.open("rb") as file:

@@ -24,6 +24,8 @@ from rov_fmu.tank.readers.content import Content, Messages, content_of
 
 _WRAP = 2.0**32 * 1e-6
 """The time after which the clock of SERVO_OUTPUT_RAW restarts at 0, s."""
+_PER_PORT = 16
+"""The outputs that SERVO_OUTPUT_RAW has for each port."""
 _STATUS = {"EKF_STATUS_REPORT", "XKF4", "NKF4"}
 """The messages about the state of the filter."""
 _VELOCITY_KNOWN, _CONSTANT_POSITION = 2, 128
@@ -46,6 +48,8 @@ class Message:
     numbers: Mapping[str, float]
     parameter: str = ""
     """The name of the parameter that it tells."""
+    stamp: float = nan
+    """The time that its header states, s; NaN for a message of MAVLink, whose numbers may have it."""
 
 
 def read_telemetry(path: Path, named: Collection[str]) -> Content:
@@ -59,9 +63,9 @@ def _is_read(named: Collection[str], *names: str) -> bool:
 
 
 def read_messages(path: Path, messages: Iterable[Message | None], named: Collection[str]) -> Content:
-    """Return the content of a log of MAVLink messages; None stands for a damaged one.
+    """Return the content of a log of messages; None stands for a damaged one.
 
-    Messages have times since the vehicle was booted, or none.
+    Those of MAVLink have times since the vehicle was booted, or none.
     """
     rows: Messages = {}
     parameters: defaultdict[str, list[tuple[float, float]]] = defaultdict(list)
@@ -75,22 +79,35 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
         if message.parameter:
             value = numbers.get("param_value", numbers.get("Value", nan))
             parameters[message.parameter].append((arrival, value))
-        elif not _is_read(named, source.kind, source.topic) or numbers.get("port", 0.0) != 0.0:
+        elif not _is_read(named, source.kind, source.topic):
             others[source.topic] += 1
         else:
-            stamp = numbers.get("time_boot_ms", numbers.get("TimeUS", nan) * 1e-3) * 1e-3
-            if isfinite(stamp):
-                boots[source.vehicle] = stamp - arrival
+            boot = numbers.get("time_boot_ms", numbers.get("TimeUS", nan) * 1e-3) * 1e-3
+            stamp = message.stamp if isfinite(message.stamp) else boot
+            if isfinite(boot):
+                boots[source.vehicle] = boot - arrival
             elif source.kind == "SERVO_OUTPUT_RAW":
                 stamp = numbers.get("time_usec", nan) * 1e-6
                 if isfinite(stamp) and source.vehicle in boots:
                     stamp += _WRAP * round((boots[source.vehicle] + arrival - stamp) / _WRAP)
+            source, numbers = _of_port(source, numbers)
             rows.setdefault(source, []).append((stamp, arrival, numbers))
-    content = content_of(path.name, dict(sorted(rows.items())), parameters, damaged)  # the first instance is the main
+    rows = dict(sorted(rows.items(), key=lambda row: row[0].part))  # the first instance is the main
+    content = content_of(path.name, rows, parameters, damaged)
     content.unread = {topic: f"{count} messages" for topic, count in others.items()}
     for piece in content.pieces:
         piece.topics = _of_primary_core([*_with_known_velocities(piece.topics, content)])
     return content
+
+
+def _of_port(source: Source, numbers: Mapping[str, float]) -> tuple[Source, Mapping[str, float]]:
+    """Return outputs with their numbers among those of all ports, and a topic for each port but the first."""
+    port = int(numbers.get("port", 0.0)) if source.kind == "SERVO_OUTPUT_RAW" else 0
+    if not port:
+        return source, numbers
+    servos = {f"servo{n}_raw": f"servo{n + _PER_PORT * port}_raw" for n in range(1, _PER_PORT + 1)}
+    moved = {servos[name]: value for name, value in numbers.items() if name in servos}
+    return replace(source, topic=f"{source.topic}_{port}"), moved
 
 
 def _numbers(message: Any) -> Mapping[str, float]:

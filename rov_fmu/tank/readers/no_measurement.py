@@ -2,13 +2,18 @@
 
 A column or field whose name has the word `valid` is a flag: of the quantities that its other words mean (`dvl_valid` of
 the velocities, `depth_valid` of the depth), or, without other words, of all in the same message or row. The table
-[valid] of rov.toml names others.
+[valid] of rov.toml names others. VALIDITIES of the catalogue has the other marks of validity inside messages, such as a
+covariance of -1.
 
 A mark is known by what it is to the other numbers, and no list of marks is needed: it repeats exactly, and lies farther
 from all others than these lie from each other, so that a vehicle would have to jump there and back between two samples.
 The numbers of a sensor that saturates, rests or wraps are near others. A velocity of 0 is never a mark.
 
-Both rules apply to the numbers as they stand in the log, before a vector is rotated into another frame.
+If all numbers are the same, no others tell whether it is a mark. It is one if it is beyond the bounds of the quantity,
+and so is the largest or least integer of a type if it is no motion. What the catalogue says is below any measurement,
+such as a voltage of 0, is none either.
+
+All rules apply to the numbers as they stand in the log, before a vector is rotated into another frame.
 """
 
 import re
@@ -23,7 +28,16 @@ from numpy.typing import NDArray
 from rov_fmu.io.csv_table import Column, KnownColumns
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, Flags
-from rov_fmu.tank.catalogue import FLAGS, MESSAGES, QUANTITIES, QUATERNION, VECTORS, Quantity, words_of
+from rov_fmu.tank.catalogue import (
+    FLAGS,
+    MESSAGES,
+    QUANTITIES,
+    QUATERNION,
+    VALIDITIES,
+    VECTORS,
+    Quantity,
+    words_of,
+)
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.columns import Entry, LogColumn, Names, in_degrees, known_columns
@@ -40,10 +54,17 @@ _FAR_FROM_FEW = 100.0
 """A mark among few other values is farther from them than this many times their range and their size."""
 _TURN = 2.1 * pi
 """The largest range of an angle that wraps, rad."""
+_EXTREMES = [sign * 2.0**bits - shift for bits in (15, 16, 31, 32) for sign, shift in ((1.0, 1.0), (-1.0, 0.0))]
+_DECIMALS = 4
+"""The largest and the least numbers of integers, of which fewer digits than this may be behind the decimal point."""
 _GAP_INTERVALS = 10.0
 """Between samples that are farther apart than this many usual intervals, a vehicle may move."""
 _VALID = {"valid", "validity", "invalid"}
 """The words that make a name that of a flag."""
+_OFF_NORM = 0.1
+"""A quaternion whose norm differs from 1 by more than this is no rotation."""
+_OF_PARTS = {"beam", "beams", "range", "ranges"}
+"""The words that make a flag that of a part of a measurement, without which the sensor may well have measured."""
 _TRUE, _FALSE = ("true", "t", "yes", "valid", "ok", "a"), ("false", "f", "no", "invalid", "v")
 
 
@@ -67,7 +88,7 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> d
     if name in valid:
         return {quantity.removeprefix("-"): not quantity.startswith("-") for quantity in valid[name]}
     words = words_of(re.split(r"[\[(]", place or name)[0])
-    if not words & _VALID:
+    if not words & _VALID or words & _OF_PARTS:
         return {}
     others = words - _VALID - {"is", "flag", "data", "measurement"}
     exact = {"velocity" if word in ("rate", "speed") else word for word in others}
@@ -120,20 +141,40 @@ def measured_only(
     kept = []
     for topic in topics:
         fields = dict(topic.fields)
+        for places, gone, what in _denied(topic):
+            for place in places:
+                fields[place] = without(fields[place], gone.copy(), "invalid", what, topic.full_name(place))
         for place, (quantities, convert) in _measured(topic, entries).items():
             column = topic.full_name(place)
             for flag in flags:
                 fields[place] = without(fields[place], flag.denies(topic, quantities), "invalid", flag.name, column)
+            quantity = QUANTITIES[quantities[0]]
+            factor, unit = in_degrees(quantity.unit)
             in_si = convert(fields[place])
-            for mark in marks(topic.time, in_si, QUANTITIES[quantities[0]]):
-                factor, unit = in_degrees(QUANTITIES[quantities[0]].unit)
-                fields[place] = without(fields[place], in_si == mark, "mark", f"{factor * mark:.6g} {unit}", column)
+            least = f"{factor * quantity.least:g} {unit}"
+            fields[place] = without(fields[place], in_si < quantity.least, "below any", least, column)
+            in_si = np.where(in_si < quantity.least, np.nan, in_si)
+            found = dict.fromkeys(marks(topic.time, in_si, quantity), "mark")
+            for mark, kind in (found or dict.fromkeys(only_mark(in_si, quantity), "only mark")).items():
+                fields[place] = without(fields[place], in_si == mark, kind, f"{factor * mark:.6g} {unit}", column)
         kept.append(replace(topic, fields=fields))
     findings = [
         about(file, kind, what=what, columns=listed(counts), count=sum(counts.values()))
         for (kind, what), counts in left.items()
     ]
     return kept, findings
+
+
+def _denied(topic: Topic) -> Iterator[tuple[Collection[str], Flags, str]]:
+    """Yield fields of a topic, where the same messages say that they are no measurements, and what says it."""
+    for validity in VALIDITIES:
+        if re.fullmatch(validity.kind, topic.source.kind) and validity.place in topic.fields:
+            places = [place for place in topic.fields if re.fullmatch(validity.about, place)]
+            yield places, validity.denies(topic.fields[validity.place]), topic.full_name(validity.place)
+    for message in MESSAGES:
+        if message.gives == QUATERNION and topic.has(message):
+            norm = np.linalg.norm([topic.fields[place] for place in message.fields], axis=0)
+            yield message.fields, np.abs(norm - 1.0) > _OFF_NORM, "the norm of the quaternion"
 
 
 def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, _Meaning]:
@@ -177,6 +218,18 @@ def marks(time: Array, values: Array, quantity: Quantity) -> list[float]:
         found += levels[marked].tolist()
         levels, counts = np.delete(levels, marked), np.delete(counts, marked)
     return found
+
+
+def only_mark(values: Array, quantity: Quantity) -> list[float]:
+    """Return the number of values in SI units that are all the same, if it marks that nothing was measured."""
+    levels, counts = np.unique(values[np.isfinite(values)], return_counts=True)
+    if len(levels) != 1 or counts[0] < 2:
+        return []
+    level = float(levels[0])
+    is_beyond = not quantity.minimum <= level <= quantity.maximum
+    integers = level * 10.0 ** np.arange(_DECIMALS)
+    is_extreme = quantity.axis is None and bool(np.isclose(integers[:, None], _EXTREMES, rtol=1e-9, atol=0.0).any())
+    return [level] if is_beyond or is_extreme else []
 
 
 def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:

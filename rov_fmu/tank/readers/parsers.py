@@ -7,7 +7,6 @@ returns, and only its result comes back. A format can be read nowhere else.
 
 import os
 import re
-import shutil
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
@@ -24,13 +23,14 @@ import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text, read_header
-from rov_fmu.io.messages import FileError, brief, listed
+from rov_fmu.io.messages import FileError, brief, listed, reason_of
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
-from rov_fmu.tank.readers.bags import ZSTD, read_bag, read_mcap, unpack
+from rov_fmu.tank.readers.bags import read_bag, read_database, read_mcap, unpack
 from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
 from rov_fmu.tank.readers.other_files import reason_against
+from rov_fmu.tank.readers.recordings import ZSTD
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.tank.readers.ulog import read_ulog
 
@@ -53,8 +53,6 @@ class Format:
     """The parser, and the extra of this package that installs it."""
     repair: str = ""
     """The command that may repair a file that was cut short."""
-    suffix: str = ""
-    """The suffix without which its parser does not know the format."""
     growth: int = 1
     """How many times as large as the file an honest content may be: it is compressed, or a number has few digits."""
 
@@ -64,11 +62,9 @@ TABLE = Format("a CSV file", rb"\xff\xfe|\xfe\xff|[^\0]*\Z", open_text, growth=3
 FORMATS = (
     Format("a DataFlash log", rb"\xa3\x95", read=read_dataflash, needs=_PYMAVLINK),
     Format("a ULog", rb"ULog\x01\x12\x35", read=read_ulog, needs="pyulog: pip install 'rov-fmu[px4]'"),
-    Format("a bag of ROS 1", rb"#ROSBAG V", read=read_bag, needs=_ROSBAGS, repair="rosbag reindex", suffix=".bag"),
-    Format(
-        "a bag of ROS 2", rb"SQLite format 3\0", read=read_bag, needs=_ROSBAGS, repair="sqlite3 .recover", suffix=".db3"
-    ),
-    Format("an MCAP file", rb"\x89MCAP0\r\n", read=read_mcap, needs=_ROSBAGS, repair="mcap recover", suffix=".mcap"),
+    Format("a bag of ROS 1", rb"#ROSBAG V", read=read_bag, needs=_ROSBAGS, repair="rosbag reindex"),
+    Format("a bag of ROS 2", rb"SQLite format 3\0", read=read_database, needs=_ROSBAGS, repair="sqlite3 .recover"),
+    Format("an MCAP file", rb"\x89MCAP0\r\n", read=read_mcap, needs=_ROSBAGS, repair="mcap recover"),
     Format("a file that zstd compressed", re.escape(ZSTD), unpack=unpack, needs=_ROSBAGS, growth=8),
     Format("a .mat file", rb"MATLAB (5\.0|7\.3) MAT-file", open_matlab, growth=4),
     # µs since 1970, most significant byte first, and then the first byte of a MAVLink message
@@ -212,8 +208,8 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
     except FileError:
         raise
     except Exception as error:
-        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, str(error))  # where it was unpacked
-        kind, reason = format_of(path), brief(told) or type(error).__name__
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, reason_of(error))  # where it was unpacked
+        kind, reason = format_of(path), brief(told)
         hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
         raise UnreadableFileError(
             f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
@@ -245,7 +241,7 @@ def read_content(path: Path, named: Collection[str]) -> Content:
                 kind = _format_of_unpacked(file, shown)
             if not kind.read:
                 raise UnreadableFileError(f"{shown}: is {kind.name}, and not a log with messages")
-            content = kind.read(_under_its_suffix(file, kind, Path(folder)), named)
+            content = kind.read(file, named)
     except ModuleNotFoundError:
         raise DataFileError(f"{path}: {kind.name} needs {kind.needs}") from None
     if printed.getvalue():
@@ -260,18 +256,6 @@ def _format_of_unpacked(file: Path, shown: str) -> Format:
         return format_of(file)
     except DataFileError as error:
         raise UnreadableFileError(str(error).replace(str(file), shown)) from error
-
-
-def _under_its_suffix(path: Path, kind: Format, folder: Path) -> Path:
-    """Return a path to a file that has the suffix that its parser needs, if necessary in a temporary folder."""
-    if path.name.lower().endswith(kind.suffix):
-        return path
-    link = folder / f"log{kind.suffix}"
-    try:
-        link.symlink_to(path.resolve())
-    except OSError:  # on a system without links
-        shutil.copyfile(path, link)
-    return link
 
 
 @guarded

@@ -26,13 +26,15 @@ from rov_fmu.io.csv_table import (
     NO_OUTPUT,
     NUMBER,
     PULSES,
+    QUOTED_NUMBER,
     SPAN,
+    THOUSANDS,
     VALUE,
     Columns,
     DataFileError,
     OpenStream,
     read_columns,
-    read_header,
+    read_start,
 )
 from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
@@ -59,6 +61,8 @@ from rov_fmu.tank.findings import Finding, about, refusal
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
+from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, HOW, time_columns, times_of_day
+from rov_fmu.tank.readers.times_of_day import rules_of_page as clock_rules
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order. If it is exceeded, the times are not those of a log."""
@@ -78,8 +82,11 @@ def rules_of_page() -> dict[str, Any]:
     return {
         "number": NUMBER.pattern,
         "value": VALUE.pattern,
+        "quoted": QUOTED_NUMBER.pattern,
+        "thousands": THOUSANDS.pattern,
         "mostBefore": MOST_BEFORE,
         "times": TIMES,
+        "clock": clock_rules(),
         "fractions": FRACTION.units,
         "pulses": {"units": PULSES, "neutral": NEUTRAL, "span": SPAN, "none": NO_OUTPUT},
         "forces": [unit for unit in COMMANDS if unit not in PULSES],
@@ -114,7 +121,9 @@ def read_table(
     opens its lines. A part of a dive may have only commands or only motion.
     """
     known = columns_of_log(layout, axis, names.keys)
-    flags = flag_columns(read_header(path, open_stream), known, names)
+    start = read_start(path, open_stream, FIRST_ROWS)
+    names = replace(names, columns={**time_columns(start, names.columns), **names.columns})
+    flags = flag_columns(start[0], known, names)
     known |= dict.fromkeys(flags, LogColumn(FLAG))
     check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
@@ -127,12 +136,15 @@ def read_table(
         check_header=check,
         open_stream=open_stream,
     )
-    table = replace(table, headers={**table.headers, **flags})
+    headers = {name: title for name, title in {**table.headers, **flags}.items() if name != "date"}
+    table = replace(table, headers=headers)
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
     pulses = _pulses(table, commanding)
     unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
-    values = {name: np.frombuffer(numbers) for name, numbers in table.values.items()}
+    values = {name: np.frombuffer(table.values[name]) for name in table.headers}
+    if (times := times_of_day(table)) is not None:
+        values["time"] = times
     values |= {name: pulses[name] for name in unstated}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
@@ -166,7 +178,7 @@ def _wrong_columns(
     if len(found) > 1:
         reason = "a log must have the commands of the axis, of the inputs or of the thrusters, but only one of these"
         yield f"columns {', '.join(found.values())}: {reason}"
-    if is_part and headers.keys() != {"time"}:
+    if is_part and headers.keys() - {"date"} != {"time"}:
         return
     unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
     renaming = RENAMING if unread else ""
@@ -234,7 +246,8 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
     if not told.any():
         what = "both a time and a command" if commanding else "a time"
         for name in (name for name in ("time", *commanding) if table.unread[name]):
-            reason = f"is no {'time' if name == 'time' else 'number'}, and no row has {what}"
+            kind, how = ("time", f". Otherwise, {HOW}") if name == "time" else ("number", "")
+            reason = f"is no {kind}, and no row has {what}{how}"
             raise table.error(table.unread[name][0], name, reason)
         raise DataFileError(f"{table.path}: no row has {what}")
     rows = np.flatnonzero(timed)
@@ -281,7 +294,7 @@ def _tell_cells(content: Content, table: Columns, pulses: Mapping[str, Array], n
     """Add what the cells tell: too many in a row, no numbers, and no pulses. `neutral` is that of rov.toml, µs."""
     content.count("torn rows", table.torn)
     for name, rows in table.unread.items():
-        if name != "time":
+        if name not in ("time", "date"):
             content.count("unread cells", len(rows), column=table.headers[name])
     for name, values in pulses.items():
         is_none = np.isin(values, NO_OUTPUT) & (np.frombuffer(table.values[name]) == 0.0)

@@ -1,7 +1,7 @@
 """Read logs of PX4 (.ulg) with pyulog.
 
 The catalogue says which topics are read and what they measure. Times are those of the sample, where a message has one,
-and otherwise of the message. Where a flag says that the filter does not know a number, it is NaN.
+and otherwise of the message.
 """
 
 from collections import Counter
@@ -20,8 +20,6 @@ from rov_fmu.tank.readers.content import Content, Piece, described
 
 _FRAMES = {1: "ned", 3: "frd"}
 """The numbers of the frames of vehicle_odometry; others are not usable."""
-_VALID = {"x": "xy_valid", "y": "xy_valid", "z": "z_valid", "vx": "v_xy_valid", "vy": "v_xy_valid", "vz": "v_z_valid"}
-"""The flags of vehicle_local_position."""
 
 
 def read_ulog(path: Path, named: Collection[str]) -> Content:
@@ -57,11 +55,6 @@ def _topic(data: Any, several: bool) -> Topic:
     sampled = columns.get("timestamp_sample", columns["timestamp"])
     stamp = np.where(sampled > 0.0, sampled, columns["timestamp"]) * 1e-6
     fields = {key: values for key, values in columns.items() if not key.startswith("timestamp")}
-    fields |= {
-        key: np.where(fields[flag] > 0.0, fields[key], np.nan)
-        for key, flag in _VALID.items()
-        if {key, flag} <= fields.keys()
-    }
     frames = ("ned", _FRAMES.get(int(np.median(fields.get("velocity_frame", np.ones(1)))), ""))
     if data.name == "vehicle_odometry" and not frames[1]:
         fields = {key: values for key, values in fields.items() if not key.startswith("velocity")}

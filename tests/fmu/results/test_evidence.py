@@ -308,7 +308,7 @@ def test_files_that_were_added_or_taken_away_are_named(
         twice.writestr(META_DATA, b"2")
     assert refused(fmu, code=2) == f"member '{META_DATA}': is 2 times in the archive\n"
     said = refused(_write(fmu, {META_DATA: bytes(20_000_001)}), code=2)
-    assert said == f"{META_DATA}: has 20 MB; at most 20 MB are read\n"
+    assert said == f"{META_DATA}: has 20,000,001 bytes; at most 20,000,000 are read\n"
 
 
 def test_a_byte_changed_in_the_archive_itself_names_the_file(
@@ -401,6 +401,9 @@ def test_a_signature_that_does_not_fit_fails(
     assert refused(fmu).startswith(f"the signature {signature} does not fit: the FMU was altered or built again after")
     signature.unlink()
     assert refused(fmu, "--key", str(keys / "key.pub")) == f"is not signed: there is no file {signature}\n"
+    signature.symlink_to("gone")
+    for more in ([], ["--key", str(keys / "key.pub")]):
+        assert refused(fmu, *more, code=2) == f"rov-fmu: {signature}: is a link to a file that is not there\n"
 
 
 def test_no_letter_of_a_signature_can_be_altered(signed_fmu: Path, tmp_path: Path) -> None:

@@ -28,6 +28,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     probability,
     twins,
 )
+from rov_fmu.identify.likelihood.kinds import KINDS
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
@@ -101,7 +102,7 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
         "drooping": Fault("voltage drop", acting=lambda u: drooping(u, 0.3), value=0.3),
-        "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=0.8),
+        "slewed": Fault("slew limit", acting=lambda u: {n: slewed(c, 0.8) for n, c in u.items()}, value=1.25),
     }
 
 
@@ -261,15 +262,57 @@ def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
     (fine,), z = slow.logs, np.array([p.mean for p in slow.table.parameters])
     place = slow.table.place("slew limit")
     assert place is not None
-    z[place] = np.log(0.8)
-    acting = slow.table.followed(z, fine)[:, 0]
-    now, told = fine.record.inputs[0, 0], fine.record.told
-    for n, step in enumerate(np.diff(told)):
-        after = now + np.clip(fine.record.inputs[n, 0] - now, -0.8 * step, 0.8 * step)
-        assert acting[n] == pytest.approx(0.5 * (now + after))
-        now = after
-    assert np.diff(told).max() <= 0.05 + 1e-9
+    told = fine.record.told
+    for rise in (1.25, 0.04, 0.0):  # the second ramp ends within its row
+        z[place] = rise
+        acting = slow.table.followed(z, fine)[:, 0]
+        now = fine.record.inputs[0, 0]
+        for wanted, mean in zip(fine.record.inputs[:200, 0].tolist(), acting, strict=False):
+            h, within = 0.05 / 100, [now]
+            for _ in range(100):
+                now = wanted if abs(wanted - now) * rise <= h else now + np.copysign(h / rise, wanted - now)
+                within.append(now)
+            assert mean == pytest.approx(np.mean(within), abs=0.01)
+    assert fine.spans[:-1] == pytest.approx(0.05)
+    assert told[-1] + fine.spans[-1] >= one.record.time[-1]
     assert {*one.record.told} <= {*told}
+
+
+def seldom(one: SampledLog, number: int) -> SampledLog:
+    """The log of a logger that writes only some of its rows."""
+    told, inputs = one.record.told[::number], one.record.inputs[::number]
+    since = np.append(told[0], told[:-1])
+    record, thinned = (replace(own, told=told, since=since, inputs=inputs) for own in (one.record, one.thinned))
+    return replace(one, interval=number * one.interval, record=record, thinned=thinned)
+
+
+@pytest.mark.parametrize("number", [1, 4])
+@pytest.mark.parametrize("kind", HYPOTHESES)
+def test_a_hypothesis_that_is_absent_is_the_model_without_it(kind: str, number: int, model: Model) -> None:
+    """J of the data is the same, and close to where the hypothesis is absent, it is almost the same."""
+    hypothesis, null = HYPOTHESES[kind], KINDS[kind].null if HYPOTHESES[kind].starts else None
+    has_null = null is not None or hypothesis.has_times or hypothesis.is_first
+    assert has_null != bool(hypothesis.why_no_null)
+    if not has_null:
+        return
+    plain = replace(model, logs=[seldom(one, number) for one in model.logs])
+    if hypothesis.is_first:
+        absent = replace(plain, logs=[one.settled_at(-np.inf) for one in plain.logs])
+    else:
+        of = next(hypothesis.variants(plain.known, plain.logs))
+        absent = plain.applied(Variant(kind, of, ((-np.inf, np.inf),) * len(of) if hypothesis.has_times else ()))
+    values = []
+    for some in (plain, absent):
+        objective = some.objective(thinned=True)
+        places = [n for n, p in enumerate(objective.table.parameters) if p.kind == kind]
+        sets = np.repeat(np.array([p.mean for p in objective.table.parameters])[:, None], 2, axis=1)
+        sets[places] = null
+        runs = objective.runs(sets[:, 0])
+        values.append(objective.value(sets[:, 0], runs) - objective.prior(sets[:, 0]))
+        sets[places, 1] += np.where(objective.high[places] > sets[places, 1], 1e-11, -1e-11)
+        near = objective.trials(sets, [objective.whole] * 2, runs)
+        values += [value - objective.prior(z) for (value, _), z in zip(near, sets.T, strict=True)]
+    assert values == pytest.approx([values[0]] * len(values), abs=1e-6, rel=0.0)
 
 
 def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
@@ -629,6 +672,26 @@ def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(revers
     assert [some for some, _ in search._ranked(sets)] == [second]
     search.lost[REVERSED] = 0.9 * fall
     assert [some for some, _ in search._ranked(sets)] == [first, second]
+
+
+@pytest.mark.parametrize(("again", "names"), [(38.0, {REVERSED}), (20.0, {REVERSED, DEAD})])
+def test_another_minimum_is_no_evidence_for_a_hypothesis(
+    again: float, names: set[Variant], reversed_model: Model, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fit is much better with a thruster that ends whole. So it is without that hypothesis, if begun from there."""
+
+    def trial(starts: Starts, score: float) -> Trial:
+        nothing = cast("Objective", None), cast("Minimum", None)
+        return Trial(starts, reversed_model, *nothing, score, 0.0, frozenset({DEAD} & {*starts}))
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: trial(starts, again))
+    search = StructureSearch(trial({}, 0.0), _search)
+    search.variants = [REVERSED, DEAD]
+    search.now = search.tried[frozenset({REVERSED})] = trial({REVERSED: None}, 10.0)
+    both = search.tried[frozenset({REVERSED, DEAD})] = trial({REVERSED: None, DEAD: 1.0}, 40.0)
+    rounds = iter([[both]])
+    monkeypatch.setattr(search, "_round", lambda: next(rounds, []))
+    assert {*search.explained().trial.starts} == names
 
 
 @pytest.mark.long

@@ -1,5 +1,6 @@
 """Axes that no test shows: they do not decide about the others, and every surface says so."""
 
+import re
 from collections.abc import Iterator, Mapping
 from io import StringIO
 from itertools import combinations
@@ -12,8 +13,10 @@ from rov_fmu import load
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.fmu.card import card_text
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.result import Identification
+from rov_fmu.identify.inspection.undetermined import undetermined
+from rov_fmu.identify.result import AxisOfBase, Identification
 from rov_fmu.report.console import _Console
 from rov_fmu.report.console_results import print_identification
 from rov_fmu.report.page.fmu_page import documentation_page
@@ -43,6 +46,7 @@ SENSORS: dict[Axis, str] = {
 """A column for each axis that a dive may show."""
 NORTH = "surge distance [m]"
 DRAG = {"a_d": "N.s2/m2", "b_d": "N.s/m"}
+VERTICAL = ("u_5 [1]", "u_6 [1]")
 BASES = {"bluerov2": (SURGE, SWAY, HEAVE, YAW), "bluerov2_heavy": tuple(AXES.values())}
 
 
@@ -93,6 +97,24 @@ def test_the_drag_and_the_inertia_of_what_a_dive_with_a_heading_does_not_show_ar
     own = "".join(f'{n}_u = {{ value = 9.0, unit = "{u}", source = "s" }}\n' for n, u in DRAG.items())
     exact, _, _ = begin(load_tests(folder_of(tmp_path, f'base = "{base}"\n{HEAD}[known]\n{own}', {})))
     assert {"a_d_u", "b_d_u"} <= exact.exact
+
+
+def test_what_a_vehicle_without_a_base_lacks_is_told(tmp_path: Path) -> None:
+    """Also axes that rov.toml does not declare, and the thrusters that drive nothing else."""
+    whole = load_vehicle(SHIPPED["bluerov2"]).layout
+    assert thrusters_along_no_other(whole, [HEAVE], [SURGE, SWAY, YAW]) == ["5", "6"]
+    assert thrusters_along_no_other(whole, [SURGE], [HEAVE, YAW]) == []
+    lacking = AxisOfBase(HEAVE, "", "nothing in the logs shows it", ("5", "6"))
+    told = "heave: not identified: nothing in the logs shows it, so the vehicle has no heave and no thrusters 5 and 6."
+    assert lacking.verdict.of(HEAVE) == told
+    Drawn(("surge", "heave", "yaw"), ("heave", "yaw"), seconds=10.0).write(0, tmp_path)
+    description = tmp_path / "rov.toml"
+    text = re.sub(r"(?m)^\[axes\..*\n", "", description.read_text(encoding="utf-8"))
+    description.write_text(text, encoding="utf-8")
+    tests = load_tests(tmp_path)
+    assert ("axis left out", "surge") in {(one.kind, one.axis) for one in tests.folder.findings}
+    sentences = [*undetermined(tests.folder.logs, tests.description, ())]
+    assert any("surge cannot be identified, so the vehicle has no surge: " in one for one in sentences)
 
 
 @pytest.mark.parametrize(
@@ -185,3 +207,16 @@ def test_every_surface_has_the_same_word_for_every_axis(
     assert made
     assert made.words == {axis.name: verdict.word for axis, verdict in result.verdicts.items()}
     assert all(map(VERDICT.fullmatch, made.verdicts))
+
+
+@pytest.mark.parametrize("is_there", [True, False])
+def test_an_axis_whose_thrusters_the_log_lacks_asks_for_their_outputs(is_there: bool, tmp_path: Path) -> None:
+    """Commands of others do not help where a message has too few outputs."""
+    time, columns = drawn("bluerov2", SENSORS[HEAVE], SENSORS[YAW])
+    kept = {name: 0.0 * own if name in VERTICAL else own for name, own in columns.items()}
+    folder = folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', {})
+    write_dive(folder / "dive.csv", time, {n: v for n, v in kept.items() if is_there or n not in VERTICAL})
+    tests = load_tests(folder)
+    (heave,) = (one for one in undetermined(tests.folder.logs, tests.description, ()) if one.startswith("heave"))
+    assert heave.endswith("Command it both ways") == is_there
+    assert ("Log the outputs to all thrusters" in heave) != is_there

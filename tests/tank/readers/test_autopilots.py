@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.mavlink import Message, read_messages
@@ -19,7 +20,17 @@ from rov_fmu.tank.readers.parsers import read_topics
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import altitude, attitude, flash, servos, ulog_of, write_tlog
+from tests.tank.readers.writers import (
+    altitude,
+    attitude,
+    dataflash,
+    flash,
+    packed,
+    parameter,
+    servos,
+    ulog_of,
+    write_tlog,
+)
 
 N = 60
 EKF, LOCAL = "EKF_STATUS_REPORT", "LOCAL_POSITION_NED"
@@ -100,6 +111,48 @@ def test_a_log_that_ends_amid_a_message_is_read_so_far(tmp_path: Path) -> None:
     path = flash(tmp_path, DIVE)
     path.write_bytes(path.read_bytes()[:-500])
     assert 90 < len(measured(read_log(path, BLUEROV2).log, "heading")) <= 100
+
+
+def test_motors_on_servos_beyond_the_first_message(tmp_path: Path) -> None:
+    """They are in other messages of the vehicle's log, and on the second port of a .tlog."""
+    assigned = {servo: 33 + motor for motor, servo in enumerate((13, 14, 15, 18, 19, 32))}
+    messages = [packed("PARM", 10**6, f"SERVO{servo}_FUNCTION".encode(), of, 0.0) for servo, of in assigned.items()]
+    sent = [parameter(f"SERVO{servo}_FUNCTION", of) for servo, of in assigned.items()]
+    for n, time in enumerate(TIME):
+        pulses = dict.fromkeys(range(1, 33), 1500) | dict(
+            zip(assigned, DIVE.pulses[n].astype(int).tolist(), strict=True)
+        )
+        outputs, stamp = [*pulses.values()], round((50.0 + time) * 1e6)
+        messages += [packed("RCOU", stamp, *outputs[:14]), packed("RCO2", stamp + 70, *outputs[14:18])]
+        messages += [packed("RCO3", stamp + 90, *outputs[18:])]
+        sent += [servos(50.0 + time, *outputs[:16]), servos(50.01 + time, *outputs[16:], port=1)]
+        sent += [altitude(50.0 + time, -motion.DEPTH[n])]
+    for path in (dataflash(tmp_path / "a.bin", messages), write_tlog(tmp_path / "a.tlog", sent)):
+        log = read_log(path, BLUEROV2).log
+        for thruster, values in motion.THRUSTERS.items():
+            assert commanded(log, thruster) == pytest.approx(values)
+
+
+@pytest.mark.parametrize(
+    ("gravity", "water"), [(1.024, "water of 1024 kg/m3"), (None, "fresh water"), (0.0, "fresh water")]
+)
+def test_the_water_that_ardusub_was_told_gives_the_depth(gravity: float | None, water: str, tmp_path: Path) -> None:
+    """Its altitude is computed for it, and the pressure is not."""
+    told = gravity or 1.0
+    sent = [parameter("BARO_SPEC_GRAV", gravity)] if gravity is not None else []
+    for n, time in enumerate(TIME):
+        pressure = 1013.25 + 98.0665 * told * motion.DEPTH[n]
+        scaled = mavlink.MAVLink_scaled_pressure2_message(round((50.0 + time) * 1e3), pressure, 0.0, 2000)
+        sent += [servos(50.0 + time, *DIVE.pulses[n].astype(int).tolist()), (50.0 + time, scaled)]
+    path = write_tlog(tmp_path / "a.tlog", sent)
+    log = read_log(path, BLUEROV2)
+    assert measured(log.log, "depth") == pytest.approx(motion.DEPTH, abs=1e-3)
+    (line,) = (line for line in sentences(log.findings) if "depth is computed" in line)
+    assert line.startswith(f"a.tlog: the depth is computed from the pressure, for {water}")
+    altitudes = [(time, message) for time, message in sent if message.get_type() != "SCALED_PRESSURE2"]
+    altitudes += [altitude(50.0 + time, -motion.DEPTH[n]) for n, time in enumerate(TIME)]
+    both = read_log(write_tlog(tmp_path / "b.tlog", sorted(altitudes, key=lambda one: one[0])), BLUEROV2).log
+    assert measured(both, "depth") == pytest.approx(motion.DEPTH, abs=1e-3)
 
 
 # ---- Neither ---------------------------------------------------------------------------------------------------------

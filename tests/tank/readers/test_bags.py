@@ -1,20 +1,35 @@
 """Bags of ROS 1 and ROS 2, which the tests write with rosbags."""
 
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode
+from rosbags.typesys import get_types_from_msg
 
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import sentences
+from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers.listing import list_files
 from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import Ros, messages_of, outputs
+from tests.tank.readers.writers import Ros, messages_of, outputs, write_mcap
+
+DVLS = {
+    "dvl_msgs/msg/DVL": "std_msgs/Header header\nfloat64 time\ngeometry_msgs/Vector3 velocity\nfloat64 fom\n"
+    "float64 altitude\nbool velocity_valid\nint64 status\n",
+    "marine_acoustic_msgs/msg/Dvl": "std_msgs/Header header\nuint8 velocity_mode\ngeometry_msgs/Vector3 velocity\n"
+    "float64[9] velocity_covar\nuint8 num_good_beams\nbool beam_ranges_valid\nbool beam_velocities_valid\n",
+}
+"""The parts of the definitions of a DVL's messages that matter here."""
 
 
 def told(log: Read) -> tuple[str, ...]:
@@ -86,3 +101,94 @@ def test_the_table_of_topics_names_what_is_not_known(tmp_path: Path) -> None:
     found = read_log(ros.write(tmp_path / "autopilot", messages), BLUEROV2, names=names).log
     assert commanded(found, "2") == pytest.approx(motion.THRUSTERS["2"])
     assert (axes(found), [*found.unread]) == (["heave"], ["/out", *(f"/out.data[{n}]" for n in range(6))])
+
+
+FORCES = {
+    "X_ext": motion.COMMAND,
+    "Y_ext": -motion.COMMAND,
+    "Z_ext": 2.0 * motion.COMMAND,
+    "N_ext": 0.1 * motion.COMMAND,
+}
+
+
+def blueye() -> Iterator[tuple[str, str, float, Mapping[str, Any]]]:
+    """Yield the messages of a dive of a Blueye."""
+    for n, time in enumerate(TIME.tolist()):
+        roll, pitch, yaw = np.degrees(DIVE.euler[n]).tolist()
+        rates = {"surge_rate": motion.U[n], "sway_rate": motion.V[n], "yaw_rate": 0.3, "is_valid": n >= 10}
+        force = dict(zip(("surge", "sway", "heave", "yaw"), (float(own[n]) for own in FORCES.values()), strict=True))
+        told = {
+            "ControlForce": {"control_force": force},
+            "Depth": {"depth": {"value": float(DIVE.position[n, 2])}},
+            "Attitude": {"attitude": {"roll": roll, "pitch": pitch, "yaw": yaw}},
+            "PositionEstimate": {"position_estimate": {"heading": float(motion.HEADING[n]), **rates}},
+        }
+        yield from ((f"{name}Tel", f"blueye.protocol.{name}Tel", time, fields) for name, fields in told.items())
+
+
+def test_the_forces_and_the_motion_of_a_blueye(tmp_path: Path) -> None:
+    """Forces are along the body, forward, starboard and down; `inspect` finds them before a vehicle is known."""
+    path = write_mcap(tmp_path / "dive.mcap", "protobuf", blueye())
+    layout = Layout.of_wrench(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
+    log = read_log(path, layout).log
+    for name, values in FORCES.items():
+        assert commanded(log, name) == pytest.approx(values)
+    assert measured(log, "depth") == pytest.approx(DIVE.position[:, 2])
+    assert measured(log, "roll angle") == pytest.approx(motion.ROLL)
+    assert measured(log, "heading") == pytest.approx(motion.HEADING)
+    for name, values in {"surge": motion.U, "sway": motion.V, "yaw": np.full(100, 0.3)}.items():
+        assert measured(log, f"{name} velocity") == pytest.approx(values[10:])
+    (found,) = inspect(path, [BLUEROV2])
+    assert {one.name: one.high for one in found.commands if one.high} == {
+        name: pytest.approx(values.max()) for name, values in FORCES.items() if values.max()
+    }
+    assert not found.unread
+
+
+@pytest.mark.parametrize("encoding", ["json", "protobuf", "flatbuffer"])
+def test_messages_of_an_own_kind_are_listed_and_rov_toml_names_them(encoding: str, tmp_path: Path) -> None:
+    messages = [
+        (
+            topic,
+            f"own.{topic.title()}",
+            time,
+            {"data": {"down": float(motion.DEPTH[n]), "push": float(motion.COMMAND[n])}},
+        )
+        for n, time in enumerate(TIME.tolist())
+        for topic in ("sensor", "mixer")
+    ]
+    path = write_mcap(tmp_path / "dive.mcap", encoding, messages)
+    (found,) = inspect(path, [BLUEROV2])
+    fields = {"sensor.data.down": "1 to 1.99", "mixer.data.push": "0 to 0.25"} if encoding != "flatbuffer" else {}
+    assert {"sensor": "own.Sensor, 100 messages", **fields}.items() <= found.unread.items()
+    if fields:
+        names, _ = names_of(BLUEROV2, RovTables(topics={"sensor.data.down": "depth [m]", "mixer.data.push": "u_5 [1]"}))
+        log = read_log(path, BLUEROV2, names=names).log
+        assert measured(log, "depth") == pytest.approx(motion.DEPTH)
+        assert commanded(log, "5") == pytest.approx(motion.COMMAND)
+
+
+def test_depth_and_heading_of_mavros_and_velocities_of_a_dvl(tmp_path: Path) -> None:
+    """A DVL says itself which of its velocities are valid, and a flag of its beams says nothing about them."""
+    ros = Ros(2)
+    for kind, text in DVLS.items():
+        ros.store.register(get_types_from_msg(text, kind))
+    number = ros.store.types["std_msgs/msg/Float64"]
+    for kind, known in {"dvl_msgs/msg/DVL": TIME >= 2.0, "marine_acoustic_msgs/msg/Dvl": TIME < 8.0}.items():
+        messages: list[tuple[str, float, Any]] = []
+        for n, (time, is_known) in enumerate(zip(TIME, known.tolist(), strict=True)):
+            told = {"velocity_valid": is_known, "velocity_mode": 1 if is_known else 2, "num_good_beams": 4}
+            told = {name: value for name, value in told.items() if name in DVLS[kind]}
+            velocity = ros.vector("Vector3", DIVE.velocity[n] if is_known else [0.0] * 3)
+            degrees = float(np.degrees(motion.HEADING[n]) % 360.0)
+            messages += [
+                ("/mavros/rc/out", time, outputs(ros, DIVE, n)),
+                ("/mavros/global_position/rel_alt", time, number(data=-motion.DEPTH[n])),
+                ("/mavros/global_position/compass_hdg", time, number(data=degrees)),
+                ("/dvl/data", time, ros.message(kind, header=ros.header(time, "dvl"), velocity=velocity, **told)),
+            ]
+        log = read_log(ros.write(tmp_path / kind.partition("_")[0], messages), BLUEROV2).log
+        assert measured(log, "depth") == pytest.approx(motion.DEPTH)
+        assert measured(log, "heading") == pytest.approx(motion.HEADING)
+        for axis, values in zip(("surge", "sway", "heave"), DIVE.velocity.T, strict=True):
+            assert measured(log, f"{axis} velocity") == pytest.approx(values[known])

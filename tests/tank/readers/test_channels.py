@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.catalogue import QUANTITIES, Message
 from rov_fmu.tank.channels import Topic, channels_of, frames_of, of_scalar
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Channel, Log, Source
@@ -44,7 +44,7 @@ def found(topics: Sequence[Topic], quantity: str) -> Channel:
 )
 def test_names_of_frames(names: tuple[str, str], earth: Array, body: Array) -> None:
     """Of the earth and of the body; those of the sea are NED for both."""
-    np.testing.assert_equal(frames_of(Source("/odom", frames=names)), [earth, body])
+    np.testing.assert_equal(frames_of(Message("", (), ""), Source("/odom", frames=names)), [earth, body])
 
 
 QUATERNION = Rotation.from_matrix(DIVE.rotation).as_quat(scalar_first=True)

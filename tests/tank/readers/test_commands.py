@@ -6,6 +6,7 @@ What a pulse means is held to the law by which ArduSub makes it (`AP_Motors6DOF:
 
 import random
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -42,6 +43,12 @@ def number(name: str, rows: Rows) -> Topic:
 
 def servos(*outputs: Rows, name: str = SERVOS, system: str = "1") -> Topic:
     return topic(name, SERVOS, {f"servo{n}_raw": rows for n, rows in enumerate(outputs, start=1)}, system)
+
+
+def servo_log(name: str, first: int, *outputs: Rows) -> Topic:
+    """Return messages that come a little later the higher the number of their first output is."""
+    one = topic(name, name, {f"C{n}": rows for n, rows in enumerate(outputs, start=first)})
+    return replace(one, time=one.time + 1e-3 * first)
 
 
 def commanded(topics: Sequence[Topic], names: str = "a", told: Numbers | None = None, **keys: object) -> Commanded:
@@ -113,6 +120,27 @@ USED: Mapping[str, tuple[list[Topic], str, Numbers, str, Mapping[str, Rows]]] = 
     "AUX by its first motor": (PX4, "a", {"PWM_MAIN_FUNC1": 100, "PWM_AUX_FUNC2": 101}, AUX, {"a": [0, 0.5]}),
     "AUX alone": (PX4, "a", {"PWM_MAIN_FUNC1": 0, "PWM_AUX_FUNC2": 101}, MAIN, {"a": [0, 0.5]}),
     "MAIN": (PX4, "a", {"PWM_MAIN_FUNC1": 101, "PWM_AUX_FUNC1": 420}, MAIN, {"a": [0, 0.25]}),
+    "MAIN and AUX": (
+        PX4,
+        "ab",
+        {"PWM_MAIN_FUNC1": 102, "PWM_AUX_FUNC2": 101},
+        MAIN,
+        {"a": [0, 0.5], "b": [0, 0.25]},
+    ),
+    "servos of three messages": (
+        [servo_log("RCOU", 1, [1500, 1600]), servo_log("RCO2", 15, [1500, 1700]), servo_log("RCO3", 19, [1500, 1400])],
+        "abc",
+        {"SERVO1_FUNCTION": 35, "SERVO15_FUNCTION": 33, "SERVO19_FUNCTION": 34},
+        "RCOU",
+        {"a": [0, 0.5], "b": [0, -0.25], "c": [0, 0.25]},
+    ),
+    "servos of messages without those between": (
+        [servo_log("RCOU", 1, [1500, 1600]), servo_log("RCO3", 32, [1500, 1400])],
+        "a",
+        {"SERVO32_FUNCTION": 33},
+        "RCOU",
+        {"a": [0, -0.25]},
+    ),
 }
 
 

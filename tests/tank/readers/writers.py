@@ -8,6 +8,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from google.protobuf.descriptor_pb2 import DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet
+from google.protobuf.descriptor_pool import DescriptorPool
+from google.protobuf.json_format import ParseDict
+from google.protobuf.message_factory import GetMessageClass
 from mcap.writer import Writer
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from rosbags.rosbag1 import Writer as Writer1
@@ -18,7 +22,7 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.readers.bags import _RC_OUT
+from rov_fmu.tank.readers.bags import _DEFINITIONS
 
 RATES = np.array([0.1, -0.2, 0.3])
 """The velocities in roll, pitch and yaw that logs state beside the angles, rad/s."""
@@ -181,6 +185,48 @@ def blueos(folder: Path, dive: Dive) -> Path:
     return path
 
 
+def _form_of(name: str, fields: Mapping[str, Any]) -> DescriptorProto:
+    """Return the definition of a structure of protobuf with such fields."""
+    form = DescriptorProto(name=name)
+    for number, (key, value) in enumerate(fields.items(), start=1):
+        field = form.field.add(name=key, number=number, label=FieldDescriptorProto.LABEL_OPTIONAL)
+        if isinstance(value, Mapping):
+            form.nested_type.append(_form_of(f"Of_{key}", value))
+            field.type, field.type_name = FieldDescriptorProto.TYPE_MESSAGE, f"Of_{key}"
+        else:
+            is_flag = isinstance(value, bool)
+            field.type = FieldDescriptorProto.TYPE_BOOL if is_flag else FieldDescriptorProto.TYPE_DOUBLE
+    return form
+
+
+def write_mcap(path: Path, encoding: str, messages: Iterable[tuple[str, str, float, Mapping[str, Any]]]) -> Path:
+    """Write an MCAP file without a profile: the topic, the type, the time since START, and the fields of each message.
+
+    An encoding beside `json` and `protobuf` is one that nobody knows.
+    """
+    with path.open("wb") as file:
+        writer, channels, kinds = Writer(file), {}, {}
+        writer.start(profile="", library="test")
+        for topic, kind, time, fields in messages:
+            if topic not in channels:
+                package, _, name = kind.rpartition(".")
+                form = FileDescriptorProto(name=f"{kind}.proto", package=package, syntax="proto3")
+                form.message_type.append(_form_of(name, fields))
+                pool = DescriptorPool()
+                pool.Add(form)
+                kinds[topic] = GetMessageClass(pool.FindMessageTypeByName(kind))
+                definition = FileDescriptorSet(file=[form]).SerializeToString()
+                language, data = {"protobuf": ("protobuf", definition)}.get(encoding, ("jsonschema", b"{}"))
+                schema = writer.register_schema(kind, language, data)
+                channels[topic] = writer.register_channel(topic, encoding, schema)
+            text = json.dumps(fields)
+            raw = ParseDict(fields, kinds[topic]()).SerializeToString() if encoding == "protobuf" else text.encode()
+            stamp = round((START + time) * 1e9)
+            writer.add_message(channels[topic], stamp, raw, stamp)
+        writer.finish()  # type: ignore[no-untyped-call]
+    return path
+
+
 # ---- DataFlash -------------------------------------------------------------------------------------------------------
 
 # Type, name, format and columns, as ArduSub 4.1 declares them.
@@ -189,6 +235,8 @@ FORMATS = {
     "ATT": (152, "QccccCCCCB", "TimeUS,DesRoll,Roll,DesPitch,Pitch,DesYaw,Yaw,ErrRP,ErrYaw,AEKF"),
     "XKF1": (154, "QBccCfffffffccce", "TimeUS,C,Roll,Pitch,Yaw,VN,VE,VD,dPD,PN,PE,PD,GX,GY,GZ,OH"),
     "BAT": (156, "QBf", "TimeUS,Inst,Volt"),
+    "RCO2": (157, "QHHHH", "TimeUS,C15,C16,C17,C18"),
+    "RCO3": (158, "QHHHHHHHHHHHHHH", f"TimeUS,{','.join(f'C{n}' for n in range(19, 33))}"),
     "PARM": (155, "QNff", "TimeUS,Name,Value,Default"),
 }
 CODES = {"Q": "Q", "H": "H", "h": "h", "f": "f", "c": "h", "C": "H", "B": "B", "I": "I", "e": "i", "N": "16s"}
@@ -342,7 +390,8 @@ class Ros:
     def __init__(self, version: int) -> None:
         self.version = version
         self.store = get_typestore(Stores.ROS1_NOETIC if version == 1 else Stores.ROS2_HUMBLE)
-        self.store.register(get_types_from_msg(_RC_OUT, "mavros_msgs/msg/RCOut"))
+        for kind, definition in _DEFINITIONS.items():
+            self.store.register(get_types_from_msg(definition, kind))
 
     def message(self, kind: str, **fields: Any) -> Any:
         """Make a message; fields that are not given are zero."""
