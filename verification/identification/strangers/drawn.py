@@ -167,6 +167,8 @@ def _body(random: np.random.Generator, count: int, kind: Kind) -> Body:
     linear = random.uniform(0.08, 0.25, 4)
     push = full * np.array([2.0, 1.0, 1.0, 1.8 * arm])
     astern = np.where([True, False, True, False], random.uniform(0.9, 1.15, 4), 1.0)
+    if kind.has_hidden_sway:
+        push = push * np.array([1.0, 4.0, 1.0, 1.0])  # a hull that slips sideways a little
     load = random.uniform(-0.015, 0.015) * full
     return Body(
         mass=mass,

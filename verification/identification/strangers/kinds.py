@@ -76,11 +76,11 @@ def _power(m: Moment, b: Body) -> None:
 
 def _cubic(m: Moment, b: Body) -> None:
     v, top = m.velocity, b.top[:, None]
-    m.drag += 2.0 * _squares(b, v) * v * v / top
+    m.drag += 1.2 * _squares(b, v) * v * v / top
 
 
 def _turning(m: Moment, b: Body) -> None:
-    turn = 3.0 * b.top[SURGE] * np.abs(m.velocity[YAW]) / b.top[YAW]
+    turn = b.top[SURGE] * np.abs(m.velocity[YAW]) / b.top[YAW]
     for axis in (SURGE, SWAY):
         m.drag[axis] += b.quadratic[axis] * turn * m.velocity[axis]
 
@@ -91,27 +91,27 @@ def _fouled(m: Moment, _: Body) -> None:
 
 def _crisis(m: Moment, b: Body) -> None:
     share = np.abs(m.velocity) / b.top[:, None]
-    m.drag *= 1.0 - 0.5 / (1.0 + np.exp(-(share - 0.45) / 0.04))
+    m.drag *= 1.0 - 0.35 / (1.0 + np.exp(-(share - 0.45) / 0.04))
 
 
 def _two_shapes(m: Moment, b: Body) -> None:
     v, top = m.velocity, b.top[:, None]
-    m.drag += np.where(v < 0.0, _squares(b, v) * (0.6 * top - np.abs(v)), 0.0)
+    m.drag += np.where(v < 0.0, 0.5 * _squares(b, v) * (0.6 * top - np.abs(v)), 0.0)
 
 
 def _remembered(m: Moment, b: Body) -> None:
     lag = m.velocity - m.memory
     m.recall += lag / 1.5
-    m.push -= 0.6 * b.quadratic[:, None] * b.top[:, None] * lag
+    m.push -= 0.25 * b.quadratic[:, None] * b.top[:, None] * lag
 
 
 def _heavier(m: Moment, b: Body) -> None:
-    m.inertia *= 1.0 + 1.2 * (1.0 - np.exp(-((m.velocity / (0.4 * b.top[:, None])) ** 2)))
+    m.inertia *= 1.0 + 0.6 * (1.0 - np.exp(-((m.velocity / (0.4 * b.top[:, None])) ** 2)))
 
 
 def _wake(m: Moment, b: Body) -> None:
     m.recall += (m.velocity - m.memory) / 4.0
-    m.drag += b.drag(m.velocity - 0.35 * m.memory) - b.drag(m.velocity)
+    m.drag += b.drag(m.velocity - 0.2 * m.memory) - b.drag(m.velocity)
 
 
 def _away(m: Moment) -> Array:
@@ -119,12 +119,12 @@ def _away(m: Moment) -> Array:
 
 
 def _tether(m: Moment, _: Body) -> None:
-    m.drag *= 1.0 + _away(m) / 4.0
+    m.drag *= 1.0 + _away(m) / 8.0
 
 
 def _wall(m: Moment, _: Body) -> None:
     if m.where == "dive":
-        m.drag *= 1.0 + 1.5 * np.exp(-_away(m) / 2.0)
+        m.drag *= 1.0 + 0.8 * np.exp(-_away(m) / 2.0)
 
 
 # ---- Thrusters -------------------------------------------------------------------------------------------------------
@@ -137,13 +137,13 @@ def _jets(m: Moment, _: Body) -> None:
 
 
 def _jet_astern(m: Moment, _: Body) -> None:
-    m.gain[STBD] *= np.where(m.goal[PORT] < 0.0, 0.6, 1.0)
+    m.gain[STBD] *= np.where(m.goal[PORT] < 0.0, 0.75, 1.0)
 
 
 def _stiction(rows: Array) -> Array:
     found, turns = np.zeros_like(rows), np.zeros(rows.shape[1:], dtype=bool)
     for row, command in enumerate(rows):
-        turns = np.abs(command) > np.where(turns, 0.03, 0.25)
+        turns = np.abs(command) > np.where(turns, 0.03, 0.3)
         found[row] = np.where(turns, command, 0.0)
     return found
 
@@ -162,21 +162,21 @@ def _coanda(m: Moment, b: Body) -> None:
 
 def _limited(m: Moment, _: Body) -> None:
     power = np.sum(np.abs(m.goal) ** 1.5, axis=0)
-    m.goal *= np.minimum(1.0, 0.12 / np.maximum(power, 1e-9)) ** (2.0 / 3.0)
+    m.goal *= np.minimum(1.0, 0.2 / np.maximum(power, 1e-9)) ** (2.0 / 3.0)
 
 
 def _ventilated(m: Moment, _: Body) -> None:
     if m.where != "bench":
-        m.gain *= 1.0 - 0.5 / (1.0 + np.exp(-(np.abs(m.command) - 0.4) / 0.03))
+        m.gain *= 1.0 - 0.3 / (1.0 + np.exp(-(np.abs(m.command) - 0.4) / 0.03))
 
 
 def _warming(m: Moment, _: Body) -> None:
     if m.where != "bench":
-        m.gain *= 1.0 - 0.35 * (1.0 - np.exp(-m.clock / 30.0))
+        m.gain *= 1.0 - 0.25 * (1.0 - np.exp(-m.clock / 30.0))
 
 
 def _uneven_lag(m: Moment, _: Body) -> None:
-    m.lag *= np.where(np.abs(m.goal) > 0.0, 4.0, 0.5)
+    m.lag *= np.where(np.abs(m.goal) > 0.0, 2.5, 0.5)
 
 
 # ---- Sensors ---------------------------------------------------------------------------------------------------------
@@ -208,16 +208,16 @@ def _filtered(values: Array, time_constant: float) -> Array:
 
 def _wander(values: Array, random: np.random.Generator) -> Array:
     white = random.standard_normal(values.shape) * np.sqrt(2.0 * 8.0 / ROW)
-    return values + 0.08 * _filtered(white, 8.0)
+    return values + 0.04 * _filtered(white, 8.0)
 
 
 def _turned(columns: dict[int, Array], _: np.random.Generator) -> None:
-    angle, u, v = np.radians(35.0), columns[SURGE], columns[SWAY]
+    angle, u, v = np.radians(25.0), columns[SURGE], columns[SWAY]
     columns[SURGE], columns[SWAY] = u * np.cos(angle) + v * np.sin(angle), v * np.cos(angle) - u * np.sin(angle)
 
 
 def _compass(columns: dict[int, Array], _: np.random.Generator) -> None:
-    columns[YAW] = columns[YAW] + np.radians(20.0) * np.sin(columns[YAW])
+    columns[YAW] = columns[YAW] + np.radians(12.0) * np.sin(columns[YAW])
 
 
 # ---- What the product knows ------------------------------------------------------------------------------------------
@@ -260,27 +260,27 @@ STRANGERS = (
     Kind("jets", "port and starboard lose up to 25 % where they push alike", _jets),
     Kind("stale velocity", "a DVL repeats a value for 3 s, four times in each dive", shown=_of_velocities(_stale)),
     Kind("fouling", "drag is 50 % higher after 20 s of the first dive", _fouled),
-    Kind("stiction", "a thruster starts at 25 % and stops at 3 %", followed=_stiction),
+    Kind("stiction", "a thruster starts at 30 % and stops at 3 %", followed=_stiction),
     Kind("memory", "a force that forgets the velocity within 1.5 s", _remembered),
-    Kind("power limit", "the power of all thrusters is limited to 6 % of the full one of two", _limited),
-    Kind("turns drag", "turns add up to three times the quadratic drag of surge", _turning),
-    Kind("wandering velocity", "an estimator's velocity wanders by 0.08 m/s within 8 s", shown=_of_velocities(_wander)),
-    Kind("cubic drag", "a cubic term, at full speed twice the quadratic one", _cubic),
+    Kind("power limit", "the power of all thrusters is limited to 10 % of the full one of two", _limited),
+    Kind("turns drag", "turns add as much as the full quadratic drag of surge", _turning),
+    Kind("wandering velocity", "an estimator's velocity wanders by 0.04 m/s within 8 s", shown=_of_velocities(_wander)),
+    Kind("cubic drag", "a cubic term, at full speed 1.2 times the quadratic one", _cubic),
     Kind("coanda", "jets lose 35 % on the hull at rest, and nothing at speed", _coanda),
     Kind("hidden sway", "turns throw it sideways, which nothing shows", has_hidden_sway=True, counts=(2,)),
-    Kind("crisis", "drag falls by half at 45 % of the full speed", _crisis),
+    Kind("crisis", "drag falls by 35 % at 45 % of the full speed", _crisis),
     Kind("play", "thrusters follow a command only after 8 %", followed=_play),
-    Kind("tether", "drag grows by 25 % for each metre away", _tether),
-    Kind("warming", "thrust falls by 35 % within 30 s", _warming),
-    Kind("compass", "the heading deviates by up to 20 degrees", shown=_compass),
-    Kind("two shapes", "drag is linear astern and quadratic ahead", _two_shapes),
-    Kind("jet on a jet", "starboard loses 40 % while port pushes astern", _jet_astern),
-    Kind("heavier", "inertia grows by up to 120 % with speed", _heavier),
-    Kind("turned DVL", "the DVL is turned by 35 degrees", shown=_turned, counts=(4,)),
-    Kind("own wake", "the water follows by 35 % within 4 s", _wake),
-    Kind("ventilation", "thrusters lose half above 40 % of the command", _ventilated),
-    Kind("uneven lag", "thrusters start 4 times as slowly, and stop twice as fast", _uneven_lag),
-    Kind("wall", "drag is 2.5 times as large beside a wall, and usual 2 m away", _wall),
+    Kind("tether", "drag grows by 1/8 for each metre away", _tether),
+    Kind("warming", "thrust falls by 25 % within 30 s", _warming),
+    Kind("compass", "the heading deviates by up to 12 degrees", shown=_compass),
+    Kind("two shapes", "half of the quadratic drag is linear astern", _two_shapes),
+    Kind("jet on a jet", "starboard loses 25 % while port pushes astern", _jet_astern),
+    Kind("heavier", "inertia grows by up to 60 % with speed", _heavier),
+    Kind("turned DVL", "the DVL is turned by 25 degrees", shown=_turned, counts=(4,)),
+    Kind("own wake", "the water follows by 20 % within 4 s", _wake),
+    Kind("ventilation", "thrusters lose 30 % above 40 % of the command", _ventilated),
+    Kind("uneven lag", "thrusters start 2.5 times as slowly, and stop twice as fast", _uneven_lag),
+    Kind("wall", "drag is 80 % higher beside a wall, and 30 % 2 m away", _wall),
     Kind(
         "scaled velocity",
         "the velocity sensor shows 10 % too much",
