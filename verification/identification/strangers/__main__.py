@@ -17,7 +17,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, print_table, table
 from verification.identification.strangers import gates
-from verification.identification.strangers.judge import Judged, judged, judged_case, read
+from verification.identification.strangers.judge import Judged, judged, judged_case, name_of, read
 
 
 @click.command(help=__doc__)
@@ -45,14 +45,15 @@ def _command(
     ]
     for n in range(folders if seed is not None else 0):
         assert seed is not None
-        work.append((f"{axes} axes, seed {seed + n}", partial(judged, seed + n, int(axes))))
-    for one in _run([job for name, job in work if name not in names], processes):
+        work.append((name_of(seed + n, int(axes)), partial(judged, seed + n, int(axes))))
+    jobs = [job for name, job in work if name not in names]
+    for number, one in enumerate(_run(jobs, processes), 1):
+        console(stderr=True).print(f"{number} of {len(jobs)}: {one.name}, {one.kind}, {one.seconds:.0f} s")
         done.append(one)
         with output.open("a", encoding="utf-8") as file:
             file.write(f"{one.line()}\n")
     _print(gates.cases(done))
-    drawn = [one for one in done if gates.is_drawn(one)]
-    if drawn:
+    if drawn := [one for one in done if one.count]:
         now = [gates.stage(keep or "now", drawn)]
         for rows in (gates.gates(now), gates.by_kind(now), gates.by_kind(now, hidden=True)):
             _print(rows)
@@ -70,13 +71,12 @@ def _with_truth(folder: Path) -> list[Path]:
 
 def _run(jobs: Sequence[Callable[[], Judged]], processes: int) -> Iterator[Judged]:
     """Yield the folders as they are done."""
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(processes, mp_context=context) as pool:
+    if processes == 1:
+        yield from (job() for job in jobs)
+        return
+    with ProcessPoolExecutor(processes, mp_context=multiprocessing.get_context("spawn")) as pool:
         waiting: list[Future[Judged]] = [pool.submit(job) for job in jobs]
-        for number, one in enumerate(as_completed(waiting), 1):
-            result = one.result()
-            console(stderr=True).print(f"{number} of {len(jobs)}: {result.name}, {result.kind}, {result.seconds:.0f} s")
-            yield result
+        yield from (one.result() for one in as_completed(waiting))
 
 
 def _print(rows: gates.Table) -> None:

@@ -147,7 +147,7 @@ class _Axis:
 
         begin = np.clip(self.begin, _LOW + 1e-6, _HIGH - 1e-6)
         found = least_squares(
-            lambda x: both(x)[0], begin, lambda x: both(x)[1], bounds=(_LOW, _HIGH), x_scale=1.0, max_nfev=25
+            lambda x: both(x)[0], begin, lambda x: both(x)[1], bounds=(_LOW, _HIGH), ftol=1e-5, max_nfev=25
         )
         return np.asarray(found.x)
 

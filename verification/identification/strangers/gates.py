@@ -3,7 +3,7 @@
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from statistics import median
+from statistics import mean, median
 from typing import Any
 
 from verification.identification.strangers.judge import NEAR, Judged, JudgedAxis
@@ -25,52 +25,41 @@ Counts = dict[str, list[int]]
 
 
 def group_of(one: Judged, axis: JudgedAxis) -> str:
-    """Return the group in which an axis counts: one of GROUPS, `hidden`, or `given`."""
-    if one.kind not in BY_NAME:
-        return "given"
+    """Return the group in which an axis of a drawn vehicle counts: one of GROUPS, or `hidden`."""
     kind = BY_NAME[one.kind]
     if kind.group == "law":
         return RIGHT if kind is AS_MODELLED else FAULTY
-    if axis.distance <= NEAR:
+    if axis.distance is not None and axis.distance <= NEAR:
         return NEAR_FIT
     return SHOWN if kind.group == "stranger" else "hidden"
 
 
 def stage(name: str, folders: Sequence[Judged]) -> dict[str, Any]:
-    """Return what is kept of the folders of a stage."""
+    """Return what is kept of the drawn folders of a stage."""
     groups: dict[str, Counts] = {}
     kinds: dict[str, Counts] = {}
     widths: dict[str, list[float]] = {"V_ss": [], "times": []}
     for one in folders:
         for axis in one.axes:
             group = group_of(one, axis)
-            for table, key in ((groups, group), (kinds, one.kind)):
-                if table is groups or group in (SHOWN, "hidden", "given"):
-                    counts = table.setdefault(key, {}).setdefault(axis.word, [0, 0])
-                    counts[0] += 1
-                    counts[1] += axis.is_off
+            for table, key in ((groups, group), (kinds, one.kind if group in (SHOWN, "hidden") else "")):
+                counts = table.setdefault(key, {}).setdefault(axis.word, [0, 0])
+                counts[0] += 1
+                counts[1] += axis.is_off
             if group == RIGHT:
                 for number in axis.numbers:
                     widths["V_ss" if number.quantity == "V_ss" else "times"].append(number.half_width)
-    causes = [is_true for one in folders for _, is_true in one.causes]
-    sizes = [sum(one.name.startswith(f"{count} axes") for one in folders) for count in (2, 4)]
+    times = [[one.seconds for one in folders if one.count == count] for count in (2, 4)]
+    causes = [bool(is_true) for one in folders for _, is_true in one.causes]
     return {
         "stage": name,
-        "folders": sizes,
+        "folders": [*map(len, times)],
         "groups": groups,
         "kinds": kinds,
         "widths": {key: median(some) if some else None for key, some in widths.items()},
         "causes": [sum(causes), len(causes)],
-        "seconds": [
-            round(sum(one.seconds for one in folders if one.name.startswith(f"{count} axes")) / max(size, 1), 1)
-            for count, size in zip((2, 4), sizes, strict=True)
-        ],
+        "seconds": [mean(some) if some else None for some in times],
     }
-
-
-def is_drawn(one: Judged) -> bool:
-    """Return True for a vehicle of this gate, and False for a folder that was given."""
-    return one.kind in BY_NAME
 
 
 def keep(one: Mapping[str, Any], path: Path = STAGES) -> None:
@@ -161,7 +150,9 @@ def cases(folders: Iterable[Judged]) -> Table:
     """Return a row for each axis of some folders."""
     rows: Table = [("folder", "axis", "verdict", "tested", "inside", "largest error, half-widths", "causes", "s")]
     for one in folders:
-        causes = "; ".join(f"{text} ({'true' if is_true else 'false'})" for text, is_true in one.causes)
+        causes = "; ".join(
+            text + {None: "", True: " (true)", False: " (false)"}[is_true] for text, is_true in one.causes
+        )
         for n, axis in enumerate(one.axes):
             offs = [number.off for number in axis.numbers]
             inside = f"{sum(off <= 1.0 for off in offs)} of {len(offs)}"

@@ -57,7 +57,7 @@ class Number:
     @property
     def half_width(self) -> float:
         """The larger half of the interval, relative to the value."""
-        return max(abs(end / self.value - 1.0) for end in (self.low, self.high))
+        return max(abs(end / self.value - 1.0) for end in (self.low, self.high)) if self.value else inf
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class JudgedAxis:
     axis: str
     word: str
     """The verdict; `refused` where nothing was identified."""
-    distance: float
-    """How far the best fit of the law is from the truth, ln; NaN if nobody knows."""
+    distance: float | None
+    """How far the best fit of the law is from the truth, ln; None if nobody knows."""
     numbers: tuple[Number, ...]
 
     @property
@@ -83,9 +83,12 @@ class Judged:
 
     name: str
     kind: str
+    """The name of the kind of a drawn vehicle, or of the folder."""
+    count: int
+    """The number of axes of a drawn vehicle; 0 for a folder that was given."""
     axes: tuple[JudgedAxis, ...] = ()
-    causes: tuple[tuple[str, bool], ...] = ()
-    """What is told with a probability, as its kind and what has it, and whether it is true."""
+    causes: tuple[tuple[str, bool | None], ...] = ()
+    """What is told with a probability, as its kind and what has it, and whether it is true; None if nobody knows."""
     seconds: float = nan
     """The processor time of reading and identification, s."""
     error: str = ""
@@ -117,7 +120,7 @@ class _Said:
     seconds: float = nan
     error: str = ""
 
-    def judged(self, axis: str, distance: float, truth: Mapping[float, Sequence[float]]) -> JudgedAxis:
+    def judged(self, axis: str, distance: float | None, truth: Mapping[float, Sequence[float]]) -> JudgedAxis:
         """Return an axis with its tested answers, whose truth is given by the command."""
         some = [
             Number(command, quantity, true, *number)
@@ -154,6 +157,11 @@ def _causes(result: Identification) -> Iterator[str]:
             yield f"{one.kind} {one.words.get('of', '')}".strip()
 
 
+def name_of(seed: int, count: int) -> str:
+    """Return the name of a folder that is drawn."""
+    return f"{count} axes, seed {seed}"
+
+
 def judged(seed: int, count: int) -> Judged:
     """Draw the folder of a seed, identify it, and judge what is said."""
     drawn = draw(seed, count)
@@ -171,16 +179,17 @@ def judged(seed: int, count: int) -> Judged:
         tested = [command for command, keep in zip(commands, kept, strict=True) if keep]
         truth, distance = truth[:, kept], 0.0
         if drawn.kind.group != "law":
-            distance = float(np.max(np.abs(np.log(answers_of_fit(drawn, axis, tested) / truth))))
+            ratios = answers_of_fit(drawn, axis, tested) / truth
+            distance = float(np.max(np.nan_to_num(np.abs(np.log(ratios)), nan=1.0)))  # NaN: it moves the other way
         axes.append(said.judged(name, distance, dict(zip(tested, truth.T.tolist(), strict=True))))
     causes = tuple((cause, bool(re.fullmatch(drawn.kind.causes, cause))) for cause in said.causes)
-    return Judged(f"{count} axes, seed {seed}", drawn.kind.name, tuple(axes), causes, said.seconds, said.error)
+    return Judged(name_of(seed, count), drawn.kind.name, count, tuple(axes), causes, said.seconds, said.error)
 
 
 def judged_case(folder: Path) -> Judged:
     """Judge a folder that has `train` and `truth.json`: `answers` with V_ss, time and distance by `surge +30`.
 
-    Nobody knows which causes are true, so all that are told count as false. Raises OSError.
+    Raises OSError.
     """
     answers = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["answers"]
     said, axes = _said(folder / "train"), []
@@ -191,9 +200,9 @@ def judged_case(folder: Path) -> Judged:
             kept = are_tested(np.array([value[0] for value in own.values()]), np.array([*own]), speeds)
             tested = {command: own[command] for command, keep in zip(own, kept, strict=True) if keep}
             if tested:
-                axes.append(said.judged(name, nan, tested))
-    causes = tuple((cause, False) for cause in said.causes)
-    return Judged(folder.name, folder.name, tuple(axes), causes, said.seconds, said.error)
+                axes.append(said.judged(name, None, tested))
+    causes = tuple((cause, None) for cause in said.causes)
+    return Judged(folder.name, folder.name, 0, tuple(axes), causes, said.seconds, said.error)
 
 
 def are_tested(truth: Array, commands: Array, speeds: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

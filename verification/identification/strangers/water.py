@@ -228,7 +228,7 @@ def answers(water: Water, axis: int, commands: Array, clock: float) -> Array:
             rows.append(y)
             if k % block == block - 1:
                 before = rows[-block][axis]
-                if np.all((np.abs(y[axis] - before) < 1e-6 * water.body.top[axis]) | (np.abs(y[axis]) < least)):
+                if np.all((np.abs(y[axis] - before) < 1e-5 * water.body.top[axis]) | (np.abs(y[axis]) < least)):
                     break
         return np.array(rows)
 
