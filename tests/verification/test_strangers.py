@@ -278,5 +278,19 @@ def test_the_command_judges_what_it_has_not_judged(
     assert asked == [(7, 2), (8, 2), (9, 2)]
     assert [json.loads(line)["name"][-1] for line in output.read_text(encoding="utf-8").splitlines()] == ["7", "8", "9"]
     assert "*good* of right models" in capsys.readouterr().out
-    assert command.main(["-o", str(output), str(tmp_path)]) == 2
-    assert "has a truth.json" in capsys.readouterr().err
+
+
+def test_what_cannot_be_judged_is_told_in_one_line(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "none").mkdir()
+    (tmp_path / "case").mkdir()
+    (tmp_path / "case" / "truth.json").write_text('{"answers": {"surge +30": 1}}', encoding="utf-8")
+    (tmp_path / "other.jsonl").write_text('{"name": "mine"}\n', encoding="utf-8")
+    for words, reason in (
+        (["-o", str(tmp_path / "a.jsonl"), str(tmp_path / "none")], "neither it nor a folder in it has a truth.json"),
+        (["-o", str(tmp_path / "a.jsonl"), str(tmp_path / "case")], "truth.json: its answers must be like"),
+        (["-o", str(tmp_path / "other.jsonl")], "has other lines than this program writes"),
+    ):
+        assert command.main(words) == 2
+        lines = capsys.readouterr().err.splitlines()
+        assert len(lines) == 1
+        assert reason in lines[0]

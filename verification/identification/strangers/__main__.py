@@ -38,7 +38,11 @@ def _command(
     cases: Sequence[Path],
 ) -> None:
     """Judge the folders of seeds, or CASES, each with train/ and truth.json or with such folders."""
-    done = [read(line) for line in output.read_text(encoding="utf-8").splitlines()] if output.exists() else []
+    try:
+        done = [read(line) for line in output.read_text(encoding="utf-8").splitlines()] if output.exists() else []
+    except (TypeError, ValueError, KeyError):
+        raise click.UsageError(f"-o {output}: it exists, and has other lines than this program writes") from None
+    output.open("a", encoding="utf-8").close()  # before the work, in case it cannot be written
     names = {one.name for one in done}
     work: list[tuple[str, Callable[[], Judged]]] = [
         (path.name, partial(judged_case, path)) for case in cases for path in _with_truth(case)

@@ -19,6 +19,7 @@ import numpy as np
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.result import Identification
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import FileError
 from verification.identification.strangers.drawn import HEADERS, draw
 from verification.identification.strangers.fit import answers_of_fit
@@ -189,12 +190,19 @@ def judged(seed: int, count: int) -> Judged:
 def judged_case(folder: Path) -> Judged:
     """Judge a folder that has `train` and `truth.json`: `answers` with V_ss, time and distance by `surge +30`.
 
-    Raises OSError.
+    Raises DataFileError and OSError.
     """
-    answers = json.loads((folder / "truth.json").read_text(encoding="utf-8"))["answers"]
+    path = folder / "truth.json"
+    try:
+        answers = json.loads(path.read_text(encoding="utf-8"))["answers"]
+        by_axis = [
+            {_command(key): (*map(float, v),) for key, v in answers.items() if key.startswith(f"{name} ")}
+            for name in AXES
+        ]
+    except (TypeError, ValueError, KeyError, AttributeError):
+        raise DataFileError(f'{path}: its answers must be like {{"answers": {{"surge +30": [V_ss, s, m]}}}}') from None
     said, axes = _said(folder / "train"), []
-    for axis, name in enumerate(AXES):
-        own = {float(key.split()[1]) / 100.0: value for key, value in answers.items() if key.startswith(f"{name} ")}
+    for axis, (name, own) in enumerate(zip(AXES, by_axis, strict=True)):
         speeds = logged_speeds(folder / "train", axis)
         if own and len(speeds):
             kept = are_tested(np.array([value[0] for value in own.values()]), np.array([*own]), speeds)
@@ -203,6 +211,11 @@ def judged_case(folder: Path) -> Judged:
                 axes.append(said.judged(name, None, tested))
     causes = tuple((cause, None) for cause in said.causes)
     return Judged(folder.name, folder.name, 0, tuple(axes), causes, said.seconds, said.error)
+
+
+def _command(key: str) -> float:
+    """Return the command of an answer, such as 0.3 for `surge +30`."""
+    return float(key.split()[1]) / 100.0
 
 
 def are_tested(truth: Array, commands: Array, speeds: Array) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
