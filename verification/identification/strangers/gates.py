@@ -150,9 +150,8 @@ def cases(folders: Iterable[Judged]) -> Table:
     """Return a row for each axis of some folders."""
     rows: Table = [("folder", "axis", "verdict", "tested", "inside", "largest error, half-widths", "causes", "s")]
     for one in folders:
-        causes = "; ".join(
-            text + {None: "", True: " (true)", False: " (false)"}[is_true] for text, is_true in one.causes
-        )
+        told = {None: "", True: " (true)", False: " (false)"}
+        causes = "; ".join(text + told[is_true] for text, is_true in one.causes) or one.error
         for n, axis in enumerate(one.axes):
             offs = [number.off for number in axis.numbers]
             inside = f"{sum(off <= 1.0 for off in offs)} of {len(offs)}"
@@ -164,5 +163,5 @@ def cases(folders: Iterable[Judged]) -> Table:
             tail = (causes, f"{one.seconds:.0f}") if n == 0 else ("", "")
             rows.append((one.name if n == 0 else "", axis.axis, axis.word, tested, inside, words, *tail))
         if not one.axes:
-            rows.append((one.name, "", one.error or "nothing tested", "", "", "", causes, f"{one.seconds:.0f}"))
+            rows.append((one.name, "", "nothing tested", "", "", "", causes, f"{one.seconds:.0f}"))
     return rows
