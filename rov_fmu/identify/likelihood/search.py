@@ -368,7 +368,7 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
 
 
 def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
-    """Return the minimum of J with some hypotheses for all samples, from the end of a fit; None if a motion diverges."""
+    """Return the minimum of J with some hypotheses, from the end of another fit; None if a motion diverges."""
     model = model.applied(*starts)
     objective = model.objective()
     with suppress(DivergedError):
