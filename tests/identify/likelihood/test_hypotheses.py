@@ -685,6 +685,7 @@ def test_another_minimum_is_no_evidence_for_a_hypothesis(
         return Trial(starts, reversed_model, *nothing, score, 0.0, frozenset({DEAD} & {*starts}))
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: trial(starts, again))
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
     search = StructureSearch(trial({}, 0.0), _search)
     search.variants = [REVERSED, DEAD]
     search.now = search.tried[frozenset({REVERSED})] = trial({REVERSED: None}, 10.0)
