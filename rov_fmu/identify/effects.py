@@ -133,4 +133,5 @@ def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
         m, noise = some[0][0], table.noise(fit.best.z, name)
         count = sum(len(m.channel.values) for m, _ in some)
         outliers = float(np.mean(np.concatenate([is_far for _, is_far in some])))
-        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers)
+        wander = max(float(table.wander(fit.best.z, one, m.sensor)) for one in objective.logs)
+        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers, wander)

@@ -68,6 +68,8 @@ STOPPING = (
 _ASIDE = 0.1
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
 which gives it almost a third of its full speed. A symmetric pair leaves less, if its thrust astern is above 80 %."""
+_LEAST_WANDER = 0.005
+"""A wander of an estimator's velocity below this one is not told, m/s."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _SURE = 0.99
@@ -173,6 +175,14 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
             "better than 3 %"
         ),
+        "wander": (
+            "{axes}: the velocity of the estimator wanders by {size} (RMS) beside its position. The fit takes this for "
+            "an error of the estimator"
+        ),
+        "not told apart": (
+            "thrusters {of}: the logs do not tell whether one of them has lost force, because their commands are "
+            "always about the same. A log in which these differ tells it"
+        ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
         ),
@@ -255,6 +265,10 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for sensor in identification.sensors:
         if sensor.outliers > _MOST_OUTLIERS:
             findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
+        if sensor.wander > max(sensor.white, _LEAST_WANDER):
+            size = size_in_words(sensor.wander, sensor.unit)
+            findings.append(about("", "wander", sensor.axis.name, size=size))
+    findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:

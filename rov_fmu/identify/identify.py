@@ -115,6 +115,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
         structures=tuple(structures_of(fit)),
+        alike=fit.alike,
     )
     return told(result)
 

@@ -289,6 +289,8 @@ class SensorNoise:
     samples: int
     outliers: float = 0.0
     """The share of the samples that are far from their predictions."""
+    wander: float = 0.0
+    """The standard deviation of what wanders of the velocity of an estimator, which its position does not have."""
 
 
 @dataclass(frozen=True)
@@ -515,6 +517,8 @@ class Identification:
     """The mistakes that would explain a file better."""
     structures: tuple[Structure, ...] = ()
     """The hypotheses about the structure that won."""
+    alike: tuple[tuple[str, ...], ...] = ()
+    """Thrusters along one axis whose forces the logs do not tell apart."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
     """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()

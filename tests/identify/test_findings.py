@@ -144,6 +144,18 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         structured(HEALTH),
     ),
     (
+        "wander",
+        quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.03),)),
+        "the velocity of the estimator wanders by 0.030 m/s (RMS) beside its position",
+        quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.001),)),
+    ),
+    (
+        "not told apart",
+        quiet(alike=(("5", "6"),)),
+        "thrusters 5 and 6: the logs do not tell whether one of them has lost force",
+        quiet(),
+    ),
+    (
         "unlogged motion",
         turning("heading"),
         "yaw: no log shows how the vehicle moves ahead and sideways",

@@ -64,6 +64,8 @@ class Fit:
     """Fits with others, which the data do not exclude."""
     nearest: Starts = field(default_factory=dict)
     """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their numbers."""
+    alike: tuple[tuple[str, ...], ...] = ()
+    """Thrusters along one axis whose forces the data do not tell apart."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
     """The errors of predictions over 10 s along each axis."""
 
@@ -156,6 +158,7 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
         adopted,
         explained.rivals,
         explained.nearest,
+        explained.alike,
         misfits,
     )
 

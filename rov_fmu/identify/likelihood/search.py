@@ -17,8 +17,8 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import CONTRAST, HYPOTHESES, Model, Variant, contrasts, in_order
+from rov_fmu.identify.likelihood.filter import DivergedError, Record
+from rov_fmu.identify.likelihood.hypotheses import CONTRAST, HYPOTHESES, Model, Variant, contrasts, in_order, twins
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
@@ -100,7 +100,8 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     """
     found: dict[Axis, Misfit] = {}
     for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
+        begin = SETTLING + _late(record)
+        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
         places = [usual & (record.sensor == number) for number in range(len(one.measured))]
         motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in places]
         noise_of = (hypot(m.noise, objective.table.wander(best.z, one, m.sensor)) for m in one.measured)
@@ -108,7 +109,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         is_motion = not (one.is_momentary or (one.lost and not ahead))
         try:
             if is_motion:
-                run = objective.run(best.z, n, begin=SETTLING, span=AHEAD)
+                run = objective.run(best.z, n, begin=begin, span=AHEAD)
                 errors = run.innovations / np.array(least)[record.sensor]
             else:
                 run = objective.run(_without_slow_noise(objective.table, best.z), n)
@@ -121,6 +122,16 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
                 lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and change > 0.0 else 0.0
                 found[m.sensor.axis] = Misfit(R, lack).or_larger(found.get(m.sensor.axis, Misfit()))
     return found
+
+
+def _late(record: Record) -> float:
+    """Return how long after the first sample of a log all sensors have begun, s; 0 if this is most of the log.
+
+    A prediction that begins without velocities is worse than the model.
+    """
+    first = [record.time[record.sensor == n][:1] for n in range(len(record.sensors))]
+    late = float(np.concatenate(first).max() - record.time[0])
+    return late if late < 0.5 * (record.time[-1] - record.time[0]) else 0.0
 
 
 def worst(found: Mapping[Axis, Misfit]) -> float:
@@ -347,7 +358,9 @@ class Explained:
     rivals: tuple[Posterior, ...]
     """The fits with hypotheses that did not win, and whose odds are near even."""
     nearest: Starts
-    """The hypotheses that are more probable than the others that are known, but do not explain the errors over 10 s."""
+    """The hypotheses that are more probable than others, but do not explain the errors over 10 s."""
+    alike: tuple[tuple[str, ...], ...]
+    """Thrusters along one axis whose forces the data do not tell apart."""
 
 
 def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf) -> Trial | None:
@@ -446,7 +459,16 @@ class StructureSearch:
             for variant in in_order(now.starts)
         )
         posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
-        return Explained(now, tuple(adopted), tuple(posteriors), nearest)
+        return Explained(now, tuple(adopted), tuple(posteriors), nearest, tuple(self._alike()))
+
+    def _alike(self) -> Iterator[tuple[str, ...]]:
+        """Yield the groups of commanded thrusters along one axis that the data do not tell apart."""
+        known, logs = self.model.known, self.model.logs
+        unknown = [name for name, error in self.contrasts.items() if error >= CONTRAST]
+        names = {twin for name in unknown for twin in twins(known, logs, name)}
+        along = [known.layout.thrusters_along(axis) for axis in known.layout.bare_axes]
+        groups = (tuple(t.name for t in some if t.name in names) for some in along)
+        yield from dict.fromkeys(group for group in groups if len(group) > 1)
 
     def _explaining(self) -> tuple[Trial, Starts]:
         """Return the fit with those hypotheses that explain the errors over 10 s, and the others that had won.
@@ -512,16 +534,15 @@ class StructureSearch:
             one
             for one in some
             if (one.of or not HYPOTHESES[one.kind].has_times)
-            and (not HYPOTHESES[one.kind].is_contrast or self.told_apart.issuperset(one.of))
+            and (not HYPOTHESES[one.kind].is_contrast or all(self.contrasts.get(n, inf) < CONTRAST for n in one.of))
         ]
 
     @cached_property
-    def told_apart(self) -> frozenset[str]:
-        """The thrusters whose health the data tell."""
-        errors = dict[str, float]()
+    def contrasts(self) -> dict[str, float]:
+        """The standard error of the health of each thruster by the data alone; empty if a motion diverges."""
         with suppress(DivergedError):
-            errors = contrasts(self.model, place_of(self.plain.objective.table, self.plain.minimum.z))
-        return frozenset(name for name, error in errors.items() if error < CONTRAST)
+            return contrasts(self.model, place_of(self.plain.objective.table, self.plain.minimum.z))
+        return {}
 
     @property
     def _smaller(self) -> list[Starts]:
