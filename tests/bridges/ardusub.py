@@ -59,7 +59,10 @@ def _atof(text: str) -> float:
 
 @dataclass
 class ArduSub:
-    """ArduSub's depth hold, or its position hold if `place` is given, with the default gains."""
+    """ArduSub's depth hold, or its position hold if `place` is given, with the default gains unless `hold` has others.
+
+    The pulses of the motors are in `sent`.
+    """
 
     port: int
     rate: int = 400
@@ -79,13 +82,15 @@ class ArduSub:
     """The time that has passed by the time stamps of the replies, s."""
     last: float = 0.0
     history: list[dict[str, list[float]]] = field(default_factory=list)
+    sent: list[list[int]] = field(default_factory=list)
+    hold: Hold = field(default_factory=Hold)
 
     def __post_init__(self) -> None:
         self.socket = socket(AF_INET, SOCK_DGRAM)
         self.socket.connect(("127.0.0.1", self.port))
         self.socket.settimeout(self.timeout)
         self.at: dict[str, list[float]] = {}
-        self.hold = Hold(self.depth, self.heading)
+        self.hold.depth, self.hold.heading = self.depth, self.heading
         self.north, self.east = (Pid(1.0, 0.5, 0.0, 10.0, error_filter=5.0) for _ in range(2))  # from m/s to m/s2
 
     def close(self) -> None:
@@ -128,6 +133,7 @@ class ArduSub:
         forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
         for n, out in enumerate(self.hold.outputs(motion, forward, lateral, dt)):
             found[n] = int(1500 + 400 * out)
+        self.sent.append(found)
         return found
 
     def _vector(self, key: str) -> tuple[float, float, float]:
