@@ -483,7 +483,10 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
     "is neither good nor usable."
 )
 def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None:
-    """Write a vehicle for another simulator, or for a thruster manager. The default is the VideoRay Pro 4."""
+    """Write a vehicle for another simulator or a thruster manager, or its gains for ArduSub.
+
+    The default is the VideoRay Pro 4.
+    """
     _write_export(vehicle, to, output, **options)
 
 

@@ -1,4 +1,4 @@
-"""The command `rov-fmu export`: the files of a vehicle for other simulators and for thruster managers."""
+"""The command `rov-fmu export`: the files of a vehicle for other simulators, thruster managers and ArduSub."""
 
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -44,7 +44,7 @@ _UNSTABLE = (radians(10.0), radians(10.0), radians(10.0), 0.25)
 _CHATTER = 1.0
 """A demand that changes by more than this in a second at rest chatters. The gains that were flown have at most 0.1, and
 those of another vehicle 8, as in the flight of the real ArduSub."""
-_LOWER, _LEAST = 0.8, 0.1
+_LOWER, _LEAST = 0.8, 0.25
 """By what gains are lowered at a time, and the least share of the rule's."""
 _DRAWS = 8
 _LARGEST = 1e6

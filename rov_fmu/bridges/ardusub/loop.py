@@ -198,10 +198,11 @@ def fly(
     mixer, layout, count = Mixer(vehicle), vehicle.layout, len(others)
     names = [name for name in _RECORDED if name in layout.places]
     places = [_RECORDED.index(name) for name in names]
-    steppers = [Stepper(vehicle, {"z": 10.0, **one}, names) for one in others]
-    law, targets, failed = _Law(gains, count), np.array([[0.0], [0.0], [0.0], [10.0]]), np.zeros(count, bool)
-    now = np.zeros((len(_RECORDED), count))
+    start = {"z": 10.0} if "z" in layout.state else {}
+    steppers = [Stepper(vehicle, {**start, **one}, names) for one in others]
+    law, failed, now = _Law(gains, count), np.zeros(count, bool), np.zeros((len(_RECORDED), count))
     now[places] = np.transpose([stepper.recorded() for stepper in steppers])
+    targets = now[:4]
     for leg in legs:
         targets = targets + np.array([[leg.size * (leg.axis is axis)] for axis in ROWS])
         stick, steps = leg.size * (leg.axis is SURGE), round(leg.seconds * RATE)
