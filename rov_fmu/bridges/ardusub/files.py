@@ -20,7 +20,7 @@ from rov_fmu.tank.arrays import Array
 _USE = """
 # For {}. The ground station leaves out the names that the vehicle does not have:
 # ArduSub has PSC_POSZ, PSC_VELZ and PSC_ACCZ before 4.7, and PSC_D_POS, PSC_D_VEL and PSC_D_ACC from 4.7 on.
-# Fly these gains in the simulator first, and limit the thrust in the pool: docs/ardusub.md
+# Fly these gains in the simulator first, and limit the thrust in the pool: docs/gains.md
 """
 _COLUMNS = ("overshoot", "settled in s", "error at rest", "changes of commands per s")
 _SHOWN = {HEAVE: ("depth", 3, 100.0, "cm", 0.05), YAW: ("heading", 2, degrees(1.0), "deg", radians(2.0))}
