@@ -448,13 +448,16 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
 @click.option(
     "--to",
     required=True,
-    type=_Choice(["mujoco", "allocation", "sdf", "urdf"], {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco"}),
-    help="MuJoCo, the allocation of thrust, Gazebo (SDFormat), or ROS 2 (URDF).",
+    type=_Choice(
+        ["mujoco", "allocation", "ardusub-gains", "sdf", "urdf"],
+        {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco", "gains": "ardusub-gains"},
+    ),
+    help="MuJoCo, the allocation of thrust, the gains of ArduSub, Gazebo (SDFormat), or ROS 2 (URDF).",
 )
 @_output_option(
     metavar="PATH",
-    help="Folder (mujoco, allocation) or file (sdf, urdf) to write. The default is <identifier>_mujoco, "
-    "<identifier>_allocation, <identifier>.sdf or <identifier>.urdf.",
+    help="Folder (mujoco, allocation, ardusub-gains) or file (sdf, urdf) to write. The default is <identifier>_mujoco, "
+    "<identifier>_allocation, <identifier>_ardusub_gains, <identifier>.sdf or <identifier>.urdf.",
 )
 @click.option(
     "--draws",
@@ -468,6 +471,11 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
     metavar="N",
     help="Seed of the draws. The default is 0.",
 )
+@_file_option(
+    "--gains",
+    metavar="FILE.param",
+    help="Fly the gains in this file of parameters in place of the vehicle's own (ardusub-gains).",
+)
 @_world(help="Add a world with water, which Gazebo can run (sdf).")
 @_added_mass(help="Added mass in the link (engine DART, the default), or in the Hydrodynamics plugin (sdf).")
 @_force_option(
@@ -475,7 +483,10 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
     "is neither good nor usable."
 )
 def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None:
-    """Write a vehicle for another simulator, or for a thruster manager. The default is the VideoRay Pro 4."""
+    """Write a vehicle for another simulator or a thruster manager, or its gains for ArduSub.
+
+    The default is the VideoRay Pro 4.
+    """
     _write_export(vehicle, to, output, **options)
 
 
@@ -484,11 +495,13 @@ def _write_export(
 ) -> None:
     """Write a vehicle for another simulator, and print what is different there."""
     from rov_fmu.interface.export_command import Options, export
-    from rov_fmu.report.console import console, paragraph, print_end
+    from rov_fmu.report.console import console, paragraph, print_end, print_table
 
     exported = export(vehicle, to, output, Options(in_world=in_world, added_mass=added_mass, **options))
+    if exported.table:
+        print_table(exported.table)
     if exported.notes:
-        paragraph(console(), f"What is different {exported.place}:")
+        paragraph(console(), f"{exported.heading}:")
     for note in exported.notes:
         paragraph(console(), f"- {note}")
     for warning in exported.warnings:

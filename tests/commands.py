@@ -93,6 +93,7 @@ READING = {
     ("sitl", "vehicle"): "sitl videoray.toml",
     ("sdf", "vehicle"): "sdf videoray.toml",
     ("export", "vehicle"): "export --to sdf videoray.toml",
+    ("export", "gains"): "export videoray --to ardusub-gains --gains points.csv",
     ("prove", "fmu"): "prove videoray.fmu",
     ("prove", "key"): "prove videoray.fmu --key key.pub",
     ("study", "plan"): "study study.json",

@@ -61,8 +61,10 @@ LARGER_FOLDERS = {
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,
     "rov_fmu/tank": 13,
+    "rov_fmu/tank/readers": 13,
     "tests/identify": 13,
     "tests/tank": 13,
+    "tests/tank/readers": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
 }

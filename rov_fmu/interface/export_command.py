@@ -1,10 +1,11 @@
-"""The command `rov-fmu export`: the files of a vehicle for other simulators and for thruster managers."""
+"""The command `rov-fmu export`: the files of a vehicle for other simulators, thruster managers and ArduSub."""
 
 import sys
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from keyword import iskeyword
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,7 +20,16 @@ from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
-_ENDS = {"mujoco": "_mujoco", "allocation": "_allocation", "sdf": ".sdf", "urdf": ".urdf"}
+if TYPE_CHECKING:
+    from rich.table import Table
+
+_ENDS = {
+    "mujoco": "_mujoco",
+    "allocation": "_allocation",
+    "ardusub-gains": "_ardusub_gains",
+    "sdf": ".sdf",
+    "urdf": ".urdf",
+}
 """The end of the usual name of a folder or a file, after the identifier of the vehicle, by format."""
 _TAKEN = {"mujoco", "numpy", *sys.stdlib_module_names}
 """The names of modules that the folder for MuJoCo imports, directly or through others."""
@@ -37,6 +47,8 @@ class Options:
     draws: int | None = None
     """The number of sets of coefficients to draw for MuJoCo."""
     seed: int | None = None
+    gains: Path | None = None
+    """A file with parameters of ArduSub, whose gains are flown in place of the vehicle's own."""
     force: bool = False
     """True to replace files of others, and to draw also where an axis is not fit for use."""
 
@@ -47,16 +59,18 @@ class Exported:
 
     written: Mapping[Path, str]
     """The file or the folder that was written, with what it replaced."""
-    place: str = ""
-    """Where the notes hold: "in Gazebo"."""
-    notes: tuple[str, ...] = ()
+    heading: str = ""
+    """What the notes are about: "What is different in Gazebo"."""
+    notes: Sequence[str] = ()
     warnings: tuple[str, ...] = ()
     following: str = ""
     """The next command."""
+    table: "Table | None" = None
+    """What a flight showed."""
 
 
 def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exported:
-    """Write a vehicle in a format: mujoco, allocation, sdf, urdf.
+    """Write a vehicle in a format: mujoco, allocation, ardusub-gains, sdf, urdf.
 
     Raises FileError, InputError about an option or a vehicle that the format cannot have, and WriteError.
     """
@@ -64,19 +78,19 @@ def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exp
         raise InputError(f"--to {to}: leave out {mistake}")
     loaded = load_vehicle(vehicle)
     path, inputs = output or Path(f"{loaded.identifier}{_ENDS[to]}"), [vehicle, *loaded.files]
+    inputs += [options.gains] if options.gains else []
     if to in ("sdf", "urdf"):
         return _exported_file(loaded, to, path, inputs, options)
     if path.exists() and not path.is_dir():
         raise InputError(f"{path}: is a file, and --to {to} writes a folder")
-    files = _mujoco(loaded, path, options) if to == "mujoco" else allocation_files(loaded)
+    files, found = _CONTENTS[to](loaded, path, options)
     if not path.parent.is_dir():
         raise InputError(f"{path}: there is no folder {path.parent}")
     path.mkdir(exist_ok=True)
     check_targets([(path / name, "") for name in files], inputs, force=options.force)
-    written = write_whole(*(Output(path / name, text.encode()) for name, text in files.items()), force=options.force)
-    there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
-    replaced = listed(dict.fromkeys(filter(None, written.values())))
-    return Exported({path: replaced}, following=f"{there}python -m {path.name}" if to == "mujoco" else "")
+    contents = {name: file.encode() if isinstance(file, str) else file for name, file in files.items()}
+    written = write_whole(*(Output(path / name, file) for name, file in contents.items()), force=options.force)
+    return replace(found, written={path: listed(dict.fromkeys(filter(None, written.values())))})
 
 
 def _misplaced(to: str, options: Options) -> Iterator[str]:
@@ -87,11 +101,17 @@ def _misplaced(to: str, options: Options) -> Iterator[str]:
         yield "--added-mass, because only a model for Gazebo (sdf) has this choice"
     if to != "mujoco" and options.draws:
         yield "--draws, because only mujoco has a table of draws"
+    if to != "ardusub-gains" and options.gains:
+        yield "--gains, because only ardusub-gains flies them"
     if options.seed is not None and options.draws is None:
         yield "--seed, or give --draws as well"
 
 
-def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Mapping[str, str]:
+Contents = tuple[Mapping[str, str | bytes], Exported]
+"""The files of a folder by name, and what is printed."""
+
+
+def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Contents:
     if not path.name.isidentifier() or iskeyword(path.name) or path.name in _TAKEN:
         reason = "begin with a letter, have only letters, digits and _, and not be that of another module"
         raise InputError(f"{path}: programs import this folder, so its name must {reason}")
@@ -100,7 +120,25 @@ def _mujoco(vehicle: Vehicle, path: Path, options: Options) -> Mapping[str, str]
         drawn = vehicle.draws(options.draws, np.random.default_rng(options.seed or 0), forced=options.force)
     paragraphs = card(vehicle)
     columns = {name: column.tolist() for name, column in drawn.items()}
-    return mujoco_files(vehicle, path.name, {heading: paragraphs[heading] for heading in _OF_CARD}, columns)
+    files = mujoco_files(vehicle, path.name, {heading: paragraphs[heading] for heading in _OF_CARD}, columns)
+    there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
+    return files, Exported({}, following=f"{there}python -m {path.name}")
+
+
+def _ardusub_gains(vehicle: Vehicle, path: Path, options: Options) -> Contents:
+    from rov_fmu.bridges.ardusub.files import gains_files, table_of  # Matplotlib: few need it
+    from rov_fmu.bridges.ardusub.gains import tuned
+
+    found = tuned(vehicle, options.gains)
+    following = f"fly {path / 'gains.param'} in ArduSub's simulator, by rov-fmu sitl, and then in the pool"
+    return gains_files(found), Exported({}, "Note", found.notes, following=following, table=table_of(found))
+
+
+_CONTENTS: Mapping[str, Callable[[Vehicle, Path, Options], Contents]] = {
+    "mujoco": _mujoco,
+    "allocation": lambda vehicle, *_: (allocation_files(vehicle), Exported({})),
+    "ardusub-gains": _ardusub_gains,
+}
 
 
 def _exported_file(vehicle: Vehicle, to: str, path: Path, inputs: list[Path], options: Options) -> Exported:
@@ -115,4 +153,4 @@ def _exported_file(vehicle: Vehicle, to: str, path: Path, inputs: list[Path], op
     following = shell_words("gz", "sim", "-r", path) if options.in_world else ""
     if to == "sdf" and not following:
         following = "include it in a world, or give --world"
-    return Exported(written, "in Gazebo", model.notes, model.warnings, following)
+    return Exported(written, "What is different in Gazebo", model.notes, model.warnings, following)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from math import atan, cos, radians, sin
 from socket import AF_INET, SOCK_DGRAM, socket
 
-from verification.references.autopilot.ardusub import VECTORED_6DOF, Hold, Motion, Pid
+from verification.references.autopilot.ardusub import Hold, Motion, Pid
 
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
 KEYS |= {"voltage": 1, "current": 1}
@@ -67,7 +67,10 @@ def _atof(text: str) -> float:
 
 @dataclass
 class ArduSub:
-    """ArduSub's depth hold, or its position hold if `place` is given, with the default gains."""
+    """ArduSub's depth hold, or its position hold if `place` is given, with the default gains unless `hold` has others.
+
+    The pulses of the motors are in `sent`.
+    """
 
     port: int
     rate: int = 400
@@ -82,20 +85,20 @@ class ArduSub:
     timeout: float = 1.0
     """The time after which a packet without a reply is sent again, s."""
     channels: int = 16
-    motors: tuple[tuple[int, ...], ...] = VECTORED_6DOF
-    """The factors of each motor of the frame."""
     count: int = 0
     time: float = 0.0
     """The time that has passed by the time stamps of the replies, s."""
     last: float = 0.0
     history: list[dict[str, list[float]]] = field(default_factory=list)
+    sent: list[list[int]] = field(default_factory=list)
+    hold: Hold = field(default_factory=Hold)
 
     def __post_init__(self) -> None:
         self.socket = socket(AF_INET, SOCK_DGRAM)
         self.socket.connect(("127.0.0.1", self.port))
         self.socket.settimeout(self.timeout)
         self.at: dict[str, list[float]] = {}
-        self.hold = Hold(self.depth, self.heading, frame=self.motors)
+        self.hold.depth, self.hold.heading = self.depth, self.heading
         self.north, self.east = (Pid(1.0, 0.5, 0.0, 10.0, error_filter=5.0) for _ in range(2))  # from m/s to m/s2
 
     def close(self) -> None:
@@ -136,7 +139,8 @@ class ArduSub:
         motion = Motion(attitude, gyro, self.at["position"][2], self.at["velocity"][2], fall)
         forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
         outputs = self.hold.outputs(motion, forward, lateral, dt)
-        return started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels)
+        self.sent.append(started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels))
+        return self.sent[-1]
 
     def _vector(self, key: str) -> tuple[float, float, float]:
         x, y, z = self.at[key]

@@ -35,7 +35,7 @@ from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import numbered, pulsed, thruster
-from verification.references.autopilot.ardusub import VECTORED
+from verification.references.autopilot.ardusub import VECTORED, Hold
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -348,7 +348,7 @@ def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[in
 def test_the_frame_of_another_vehicle_is_noticed_in_flight() -> None:
     hints: list[str] = []
     with served(setup_of(z=1.0), hints.append) as (_, port):
-        autopilot = ArduSub(port, rate=200, motors=VECTORED)
+        autopilot = ArduSub(port, rate=200, hold=Hold(frame=VECTORED))
         autopilot.fly(START + 0.9)
         assert hints == []
         autopilot.fly(0.2)

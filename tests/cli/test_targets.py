@@ -237,7 +237,7 @@ def test_no_command_writes_over_what_it_reads_or_writes_itself(
     monkeypatch.chdir(reading)
     before = {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()}
     assert main(command.split()) == 2
-    assert re.search("would overwrite|the name must end with|is the suffix of", one_line(capsys))
+    assert re.search("would overwrite|the name must end with|is the suffix of|writes a folder", one_line(capsys))
     assert {path: path.read_bytes() for path in reading.rglob("*") if path.is_file()} == before
 
 

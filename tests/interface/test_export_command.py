@@ -27,6 +27,12 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--to", "sdf", "--draws", "3"], "--to sdf: leave out --draws, because only mujoco has a table of draws"),
         (["--to", "mujoco", "--seed", "3"], "--to mujoco: leave out --seed, or give --draws as well"),
         (
+            ["--to", "mujoco", "--gains", "a_file"],
+            "--to mujoco: leave out --gains, because only ardusub-gains flies them",
+        ),
+        (["--to", "ardusub-gains", "--gains", "none"], "none: there is no such file"),
+        (["--to", "ardusub-gains", "--gains", "a_file"], "a_file: has none of the gains, such as ATC_RAT_YAW_P"),
+        (
             ["--to", "mujoco", "-o", "my-rov"],
             "my-rov: programs import this folder, so its name must begin with a letter",
         ),
@@ -36,7 +42,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--to", "mujoco", "-o", "none/rov"], "none/rov: there is no folder none"),
         (
             ["--to", "mjcf"],
-            "Invalid value for '--to': 'mjcf' must be one of mujoco, allocation, sdf, urdf; did you mean mujoco?",
+            "Invalid value for '--to': 'mjcf' must be one of mujoco, allocation, ardusub-gains, sdf, urdf; did",
         ),
         (["--to", "mujoco", "--draws", "0"], "Invalid value for '--draws': '0' must be a whole number from 1 to 1e6"),
         (

@@ -11,7 +11,7 @@ from rov_fmu.io.messages import InputError, listed, only
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding, about
 
-_AXES = (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)
+DEMANDS = (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)
 _TORQUES = 3
 """The number of rotations among the axes, which come first."""
 _SIMPLE = ("..-.+.", "..+.+.", "+..-..", "-..-..", ".....+")
@@ -128,9 +128,9 @@ def misfits(
     frames += [f"{config_of(own)} fits the vehicle" for own in fits if own != frame]
     words = f": {', and '.join(frames)}" if frames else ""
     silent = [t for t in layout.thrusters if t.name in without_pulse]
-    factors = [motors[n - 1] if n <= len(motors) else "+" * len(_AXES) for n in extra.values()]
-    pushed = {axis for t in silent for axis in _AXES if abs(t.effect(axis)) > FAINT}
-    pulled = {axis for motor in factors for axis, factor in zip(_AXES, motor, strict=True) if factor != "."}
+    factors = [motors[n - 1] if n <= len(motors) else "+" * len(DEMANDS) for n in extra.values()]
+    pushed = {axis for t in silent for axis in DEMANDS if abs(t.effect(axis)) > FAINT}
+    pulled = {axis for motor in factors for axis, factor in zip(DEMANDS, motor, strict=True) if factor != "."}
     for kind, concerned, whose in (
         ("thrusters without pulse", pushed, listed(without_pulse)),
         ("motors without thruster", pulled, listed(extra)),
@@ -185,7 +185,7 @@ def _agreement(thruster: Thruster, motor: str) -> tuple[int, float]:
     Its force must have the signs of the motor's factors, and its torque must not have the opposite sign; otherwise both
     numbers are 0. ArduSub leaves some torques out of its factors.
     """
-    effects = [thruster.effect(axis) * (-1.0 if axis is HEAVE else 1.0) for axis in _AXES]
+    effects = [thruster.effect(axis) * (-1.0 if axis is HEAVE else 1.0) for axis in DEMANDS]
     for sign in (1.0, -1.0):
         seen = "".join("." if abs(e) <= FAINT else "+" if sign * e > 0.0 else "-" for e in effects)
         torques = [*zip(seen[:_TORQUES], motor, strict=False)]

@@ -2,12 +2,17 @@
 
 It follows ArduPilot's sources: `AP_Motors6DOF.cpp` (the factors of the frame `vectored_6dof`, and the mixing),
 `AC_AttitudeControl_Sub.h`, `AC_PosControl.cpp` and `AC_PID.cpp` (the cascades). It leaves out the filter that estimates
-the state, and the shaping of targets; `flights.py` flies it with noisy estimates, and writes logs.
+the state, and the shaping of targets; `flights.py` flies it with noisy estimates, and writes logs. `Hold.by` has other
+gains, and the filters of the sensors. It shares no code with `rov_fmu/bridges/ardusub/`, which makes such gains.
 `fmu_src/live/hold.js`, of the page that flies, is the same law in JavaScript, and the tests compare the two.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import copysign, pi, radians, sqrt
+from math import copysign, cos, pi, radians, sin, sqrt
+from typing import Any
+
+from typing_extensions import Self
 
 VECTORED_6DOF = (
     (0, 0, 1, 0, -1, 1),
@@ -51,6 +56,8 @@ class Pid:
     target_filter: float = 0.0
     error_filter: float = 0.0
     slope_filter: float = 0.0
+    forward: float = 0.0
+    """The gain of the target."""
     integral: float = 0.0
     slope: float = 0.0
     _last: tuple[float, float] | None = None
@@ -66,7 +73,28 @@ class Pid:
         self.slope += part_of(self.slope_filter, dt) * ((error - before) / dt - self.slope)
         self.integral = max(-self.most, min(self.most, self.integral + self.i * error * dt))
         self._last = wanted, error
-        return self.p * error + self.integral + self.d * self.slope
+        return self.p * error + self.integral + self.d * self.slope + self.forward * wanted
+
+
+@dataclass
+class Biquad:
+    """The low-pass filter of second order of a sensor, by the bilinear transform (Bristow-Johnson's cookbook)."""
+
+    frequency: float
+    """Hz, 0 for none."""
+    _past: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
+    """The last two inputs and outputs."""
+
+    def __call__(self, value: float, dt: float) -> float:
+        """Return the output after a step of dt seconds."""
+        if not self.frequency:
+            return value
+        turn = 2.0 * pi * self.frequency * dt
+        damping, b = sin(turn) / sqrt(2.0), 0.5 * (1.0 - cos(turn))
+        x1, x2, y1, y2 = self._past
+        y = (b * (value + 2.0 * x1 + x2) + 2.0 * cos(turn) * y1 - (1.0 - damping) * y2) / (1.0 + damping)
+        self._past = value, x1, y, y1
+        return y
 
 
 @dataclass(frozen=True)
@@ -101,17 +129,38 @@ class Hold:
     """From cm/s to cm/s2."""
     rise: Pid = field(default_factory=lambda: Pid(0.5, 0.1, 0.0, 100.0, error_filter=20.0))
     """From cm/s2 to throttle; 1000 is full throttle."""
+    angles: Vector = (6.0, 6.0, 6.0)
+    """The gains of the angles, ATC_ANG_*_P."""
+    depth_gain: float = 3.0
+    """PSC_POSZ_P."""
+    sensors: list[Biquad] = field(default_factory=lambda: [Biquad(0.0) for _ in range(4)])
+    """The filters of the rates and of the acceleration."""
+
+    @classmethod
+    def by(cls, gains: Mapping[str, float], **others: Any) -> Self:
+        """Return the law with some gains by ArduSub's names, and sensors that have filters of 20 Hz."""
+        hold = cls(**others)
+        turns = {"RLL": hold.roll, "PIT": hold.pitch, "YAW": hold.yaw}
+        for pid, name in [*((pid, f"ATC_RAT_{turn}") for turn, pid in turns.items()), (hold.rise, "PSC_ACCZ")]:
+            pid.p, pid.i, pid.d = (gains.get(f"{name}_{key}", getattr(pid, key.lower())) for key in "PID")
+        hold.rise.forward = gains.get("PSC_ACCZ_FF", 0.0)
+        hold.climb.p, hold.depth_gain = gains.get("PSC_VELZ_P", 8.0), gains.get("PSC_POSZ_P", 3.0)
+        roll, pitch, yaw = (gains.get(f"ATC_ANG_{turn}_P", 6.0) for turn in turns)
+        hold.angles, hold.sensors = (roll, pitch, yaw), [Biquad(20.0) for _ in range(4)]
+        return hold
 
     def outputs(self, motion: Motion, forward: float, lateral: float, dt: float) -> list[float]:
         """Return the outputs of the motors from -1 to 1, for sticks from -1 to 1 and a step of dt seconds."""
         phi, theta, psi = motion.attitude
         error = (self.heading - psi + pi) % (2 * pi) - pi
         most = radians(120.0)  # AC_ATTITUDE_ACCEL_Y_CONTROLLER_MAX_RADSS, which also limits the error
-        yaw_rate = sqrt_controller(max(-most / 6.0, min(most / 6.0, error)), 6.0, most)
-        wanted = (-6.0 * phi, -6.0 * theta, yaw_rate)  # the rates by ATC_ANG_*_P
+        of_roll, of_pitch, of_yaw = self.angles
+        yaw_rate = sqrt_controller(max(-most / of_yaw, min(most / of_yaw, error)), of_yaw, most)
+        wanted = (-of_roll * phi, -of_pitch * theta, yaw_rate)
+        rates = [sensor(rate, dt) for sensor, rate in zip(self.sensors, motion.rates, strict=False)]
         roll, pitch, yaw = (
             pid(target, rate, dt)
-            for pid, target, rate in zip((self.roll, self.pitch, self.yaw), wanted, motion.rates, strict=True)
+            for pid, target, rate in zip((self.roll, self.pitch, self.yaw), wanted, rates, strict=True)
         )
         throttle = self._throttle(motion, dt)
         turns = [roll * f[0] + pitch * f[1] + throttle * f[3] for f in self.frame]
@@ -122,9 +171,10 @@ class Hold:
         ]
 
     def _throttle(self, motion: Motion, dt: float) -> float:
-        """Return the throttle from -1 to 1: PSC_POSZ_P = 3, PILOT_ACCEL_Z = 100 cm/s2, and a filter of 2 Hz."""
-        target = sqrt_controller(100.0 * (motion.depth - self.depth), 3.0, 100.0)
+        """Return the throttle from -1 to 1: PILOT_ACCEL_Z = 100 cm/s2, and a filter of 2 Hz."""
+        target = sqrt_controller(100.0 * (motion.depth - self.depth), self.depth_gain, 100.0)
         acceleration = self.climb(target, -100.0 * motion.sinking, dt)
-        asked = max(-1.0, min(1.0, 2e-3 * self.rise(acceleration, -100.0 * motion.acceleration, dt)))
+        measured = self.sensors[3](motion.acceleration, dt)
+        asked = max(-1.0, min(1.0, 2e-3 * self.rise(acceleration, -100.0 * measured, dt)))
         self.throttle += part_of(2.0, dt) * (asked - self.throttle)
         return self.throttle

@@ -1,0 +1,1 @@
+"""The gains of ArduSub for a vehicle, and the loops that they close."""

@@ -1,0 +1,375 @@
+"""The gains of ArduSub: the rule by hand, what the real ArduSub showed, and flights by the stand-in over the protocol.
+
+The figures of the real ArduSub are those of flights in ALT_HOLD of its simulator, with steps of depth and heading.
+"""
+
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from math import radians
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from rov_fmu.bridges.ardusub.files import gains_files, table_of
+from rov_fmu.bridges.ardusub.gains import Tuned, read_gains, tuned
+from rov_fmu.bridges.ardusub.loop import FIRMWARE, ROWS, Leg, fly
+from rov_fmu.c.simulation import Array
+from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.io.messages import FileError, InputError
+from rov_fmu.vehicle.description import Provenance
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.bridges.ardusub import ArduSub
+from tests.bridges.test_sitl import served, setup_of
+from tests.vehicles import FINNED
+from verification.references.autopilot.ardusub import VECTORED, VECTORED_6DOF, Hold
+
+SIX, HEAVY, VIDEORAY = (load_vehicle(SHIPPED[name]) for name in ("bluerov2", "bluerov2_heavy", "videoray"))
+UNPLACED = tuple(
+    replace(one, name=name, position=None) for one, name in zip(SIX.layout.thrusters, "abcdef", strict=True)
+)
+"""The thrusters of the BlueROV2 without their places, and without the names of motors."""
+STEPS = (Leg(SURGE, 0.0, 0.1), Leg(HEAVE, 0.5, 3.0), Leg(YAW, radians(30.0), 1.5))
+AHEAD = (Leg(SURGE, 0.0, 0.1), Leg(YAW, 0.2, 3.5), Leg(SURGE, 0.5, 3.5))
+_THRUST = ("a_t_t200", "b_t_t200", "a_t_t200_reverse", "b_t_t200_reverse", "c_0_t200", "T_t200")
+GREBE = SIX.with_(
+    **dict(zip(_THRUST, (36.0, 17.0, 30.5, 13.0, 0.065, 0.11), strict=True)),
+    **{"m_rov": 13.1, "m_a_w": 19.0, "a_d_w": 92.0, "b_d_w": 11.0},
+    **{"I_r": 0.23, "m_a_r": 0.12, "a_d_r": 1.15, "b_d_r": 0.22},
+)
+"""A vehicle like one that the real ArduSub flew, with more lag and a wider dead band than the BlueROV2."""
+IDENTIFIED = SIX.with_(
+    **dict(zip(_THRUST, (39.64, 16.77, 30.81, 14.43, 0.0649, 0.0824), strict=True)),
+    **{"beta_w": 0.776, "a_d_w": 90.0, "b_d_w": 11.0, "beta_r": 0.749, "a_d_r": 1.05, "b_d_r": 0.2},
+)
+"""What `identify` made of a flight of that vehicle by the real ArduSub, from the numbers of a BlueROV2."""
+FLOWN = {
+    "bluerov2_heavy": (HEAVY, {"PSC_ACCZ_P": 1.2, "PSC_ACCZ_I": 1.56, "ATC_RAT_YAW_P": 0.814, "ATC_RAT_YAW_I": 0.122}),
+    "grebe": (GREBE, {"PSC_ACCZ_P": 3.22, "PSC_ACCZ_I": 4.18, "PSC_ACCZ_FF": 0.805, "ATC_RAT_YAW_P": 0.543}),
+    "identified": (
+        IDENTIFIED,
+        {"PSC_ACCZ_P": 3.22, "PSC_ACCZ_FF": 0.805, "ATC_RAT_YAW_P": 0.543, "ATC_ANG_YAW_P": 4.2},
+    ),
+}
+"""Vehicles with some of the gains with which the real ArduSub flew them, or the vehicle that they are like."""
+
+
+@pytest.fixture
+def without_flight(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains.fly", lambda *_: iter(()))
+
+
+@pytest.fixture
+def ahead(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains.LEGS", AHEAD)
+
+
+def values_of(found: Tuned) -> dict[str, float]:
+    return {name: value for name, (value, _) in found.gains.items()}
+
+
+# ---- The rule --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.usefixtures("without_flight")
+@pytest.mark.parametrize("name", FLOWN)
+def test_the_gains_are_within_30_percent_of_those_that_the_real_ardusub_flew(name: str) -> None:
+    vehicle, flown = FLOWN[name]
+    found = values_of(tuned(vehicle))
+    assert {gain: found[gain] for gain in flown} == pytest.approx(flown, rel=0.3)
+    assert (found["PSC_POSZ_P"], found["PSC_VELZ_P"]) == (2.0, 8.0)
+    assert {*found} == {gain for gain in FIRMWARE for axis in vehicle.layout.bare_axes if ROWS.get(axis, "-") in gain}
+
+
+@pytest.mark.usefixtures("without_flight")
+def test_the_rule_by_hand() -> None:
+    """Four thrusters with an arm of 0.1888 m, two ahead and two astern, make 5.4556 N.m at 30 %; J is 0.28 kg.m2."""
+    found = values_of(tuned(SIX.with_(T_t200=0.2)))
+    p = 14.0 * 0.28 / (5.4556 / 0.3)
+    expected = {"ATC_RAT_YAW_P": p, "ATC_RAT_YAW_I": 0.15 * p, "ATC_RAT_YAW_D": 0.03 * p, "ATC_ANG_YAW_P": 2.8}
+    assert {name: found[name] for name in expected} == pytest.approx(expected, rel=1e-4)
+    p = 0.8 * 26.07 / (0.2 * 16.0643 / 0.3)
+    assert [found[f"PSC_ACCZ_{key}"] for key in ("P", "I", "D", "FF")] == pytest.approx(
+        [p, 1.3 * p, 0.0, 0.25 * p], rel=1e-4
+    )
+
+
+@pytest.mark.usefixtures("without_flight")
+def test_the_scale_of_an_assumed_thrust_cancels() -> None:
+    """A log without a measured force gives thrust, mass and inertia in the same unknown unit."""
+    scaled = [*_THRUST[:4], "m_rov", "I_p", "I_q", "I_r", *(f"m_a_{velocity}" for velocity in "uvwpqr")]
+    other = HEAVY.with_(**{name: 1.7 * HEAVY[name] for name in scaled})
+    assert values_of(tuned(other)) == pytest.approx(values_of(tuned(HEAVY)), rel=1e-12)
+
+
+def judged(word: str) -> Vehicle:
+    """Return the BlueROV2 with a verdict of yaw, and a good one of the other axes."""
+    words = dict.fromkeys((axis.name for axis in SIX.layout.bare_axes), "good") | {"yaw": word}
+    verdicts = tuple(f"{axis}: {word}." for axis, word in words.items() if word)
+    return replace(SIX, provenance=Provenance(tool="T", method="T", inputs={}, verdicts=verdicts))
+
+
+def without_lag() -> Vehicle:
+    return SIX.with_(SIX.layout.with_keys(lambda part, key: key in part.keys and key != "T"))
+
+
+NO_LAG = "the gains are the firmware's, because curve {} has no lag T, which limits how fast the loop may be"
+VERDICT = "the gains are the firmware's, because the verdict is {}"
+SENTENCES: dict[str, tuple[Callable[[], Vehicle], dict[str, str]]] = {
+    "good": (lambda: judged("usable"), {}),
+    "do not use": (lambda: judged("do not use"), {"yaw": VERDICT.format("do not use")}),
+    "not identified": (lambda: judged("not identified"), {"yaw": VERDICT.format("not identified")}),
+    "without a verdict": (lambda: judged(""), {"yaw": VERDICT.format("not identified")}),
+    "without a lag": (without_lag, dict.fromkeys(("yaw", "heave"), NO_LAG.format("t200"))),
+    "the VideoRay": (lambda: VIDEORAY, {"yaw": NO_LAG.format("rear"), "heave": NO_LAG.format("top")}),
+    "thrusters that are off": (
+        lambda: SIX.with_(c_0_t200=0.4),
+        dict.fromkeys(("yaw", "heave"), "the gains are the firmware's, because a demand of 30 % gives no thrust"),
+    ),
+}
+
+
+@pytest.mark.usefixtures("without_flight")
+@pytest.mark.parametrize("name", SENTENCES)
+def test_an_axis_without_what_the_rule_needs_has_the_firmwares_gains_and_a_sentence(name: str) -> None:
+    vehicle, sentences = SENTENCES[name]
+    found = tuned(vehicle())
+    assert sorted(found.notes) == sorted(f"{axis}: {words}" for axis, words in sentences.items())
+    kept = {
+        axis.name: all(found.gains[n][0] == FIRMWARE[n] for n in FIRMWARE if of in n and n in found.gains)
+        for axis, of in ROWS.items()
+    }
+    assert {axis: kept[axis] for axis in ("yaw", "heave")} == {axis: axis in sentences for axis in ("yaw", "heave")}
+
+
+@pytest.mark.usefixtures("without_flight")
+def test_a_thrust_table_gives_the_gains_of_its_curve(tmp_path: Path) -> None:
+    """The table has the points of the curve every 2 %, and the rule needs the one at 30 %."""
+    curve = SIX.layout.curves[0]
+    rows = [f"{c},{SIX.curve_force(curve, c / 100.0)!r}" for c in range(-100, 101, 2)]
+    (tmp_path / "t.csv").write_text("\n".join(["command [%],thrust [N]", *rows, ""]), encoding="utf-8")
+    text = SHIPPED["bluerov2"].read_text(encoding="utf-8")
+    text = re.sub(r"\n(electric_current|a_t|b_t|a_t_reverse|b_t_reverse|c_0) = .*", "", text)
+    text = re.sub(r"\n(data|pictures) = .*", "", text).replace('"T200 at 16 V"', '"T200"\ntable = "t.csv"')
+    (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
+    found = tuned(load_vehicle(tmp_path / "rov.toml"))
+    assert values_of(found) == pytest.approx(values_of(tuned(SIX)), rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"fins": FINNED.layout.fins}, "no frame of ArduSub has a motor for each of u_1, u_2, .*u_plane, and no other"),
+        (
+            {"thrusters": SIX.layout.thrusters[:5]},
+            "no frame of ArduSub has a motor for each of u_1, .* and u_5, and no",
+        ),
+        ({"thrusters": UNPLACED}, "which motors of vectored drive which thrusters is open: write the positions"),
+    ],
+)
+def test_a_vehicle_that_no_frame_of_ardusub_drives_is_one_line(changed: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=f"^bluerov2: {message}[^\n]*$"):
+        tuned(replace(SIX, layout=replace(SIX.layout, **changed)))
+
+
+@pytest.mark.parametrize("axes", [(HEAVE,), (YAW,), (SURGE, HEAVE)])
+def test_a_vehicle_has_the_gains_and_the_legs_of_its_axes(
+    axes: tuple[Axis, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The other gains are those of the whole vehicle: the rule takes each axis for itself."""
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains._flaws", lambda _: {})
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains.LEGS", tuple(replace(leg, seconds=0.05) for leg in STEPS))
+    forms = tuple(form for form in SIX.layout.axes if form.axis in axes)
+    found, whole = tuned(SIX.with_(replace(SIX.layout, axes=forms))), values_of(tuned(SIX))
+    assert values_of(found) == {n: x for n, x in whole.items() if any(ROWS.get(axis, "-") in n for axis in axes)}
+    assert [leg.leg.axis for leg in found.legs] == [SURGE, *(leg.axis for leg in STEPS[1:] if leg.axis in axes)]
+    assert str(gains_files(found)["steps.csv"]).count("\n") == len(found.legs)
+
+
+# ---- The check -------------------------------------------------------------------------------------------------------
+
+
+def chatter(vehicle: Vehicle, gains: Mapping[str, float]) -> Array:
+    """Return the changes of the demands of ArduSub in the last second: of a turn, and ahead."""
+    legs = [*fly(vehicle, gains, AHEAD)][1:]
+    return np.array([np.abs(np.diff(leg.demands[-400:, 2, 0])).sum() for leg in legs])
+
+
+@pytest.mark.usefixtures("without_flight")
+def test_gains_that_are_too_high_chatter_ahead_and_hardly_in_a_turn_as_with_the_real_ardusub() -> None:
+    """It flew a vehicle with a lag of 0.11 s with the gains of another one, 2.1 times its own: 6 changes of the command
+    a second ahead, and 0.7 in steps."""
+    gains = values_of(tuned(GREBE))
+    others = gains | {name: 2.1 * gains[name] for name in gains if "RAT_YAW" in name}
+    assert (chatter(GREBE, gains) < [1.5, 0.2]).all()
+    turn, straight = chatter(GREBE, others)
+    assert straight > 4.0 > 2.0 * turn
+
+
+@pytest.mark.usefixtures("ahead")
+def test_gains_are_lowered_until_nothing_chatters_for_all_that_the_estimates_allow(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A lag of 0.05 s asks for 25/s, and with one of 0.25 s, which its interval allows, the loop chatters."""
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains._DRAWS", 1)
+    sure = replace(GREBE.with_(T_t200=0.05), intervals={"m_rov": (13.0, 13.2)})
+    unsure = replace(sure, intervals={"T_t200": (0.001, 1.2)})
+    certain, lowered = tuned(sure), tuned(unsure)
+    assert not certain.notes
+    (note,) = lowered.notes
+    share = float(note.removeprefix("yaw: the gains are ").partition("%")[0]) / 100.0
+    assert 0.25 < share < 0.9
+    ratios = {name: value / values_of(certain)[name] for name, value in values_of(lowered).items() if value}
+    assert ratios == pytest.approx({name: share if "YAW" in name else 1.0 for name in ratios}, abs=0.005)
+
+
+@pytest.mark.usefixtures("ahead")
+@pytest.mark.parametrize(("factor", "head", "message"), [
+    (0.5, "grebe8", None),
+    (4.0, "grebe8", "has the gains of grebe8; on bluerov2 yaw chatters (its demand changes by "),
+    (4.0, "bluerov2", "on bluerov2 yaw chatters (its demand changes by "),
+    (1e5, "", "on bluerov2 yaw "),
+])  # fmt: skip
+def test_the_gains_of_another_vehicle_are_told_and_those_that_chatter_refused(
+    factor: float, head: str, message: str | None, tmp_path: Path
+) -> None:
+    path = tmp_path / "own.param"
+    lines = [f"# The gains of ArduSub for {head}, frame vectored"] if head else []
+    path.write_text("\n".join([*lines, f"ATC_RAT_YAW_P {0.55 * factor}", "RC1_MIN,1100", "ATC_ANG_YAW_P 5"]), "utf-8")
+    if message is None:
+        found = tuned(GREBE, path)
+        assert found.notes == [f"{path}: has the gains of grebe8; the vehicle is bluerov2"]
+        assert found.gains["ATC_RAT_YAW_P"] == (0.275, "as given")
+    else:
+        with pytest.raises(FileError, match=f"^{re.escape(f'{path}: {message}')}[^\n]*$"):
+            tuned(GREBE, path)
+
+
+# ---- The stand-in ----------------------------------------------------------------------------------------------------
+
+
+def by_the_stand_in(vehicle: Vehicle, gains: Mapping[str, float], legs: tuple[Leg, ...]) -> list[Array]:
+    """Fly steps with the stand-in, through the protocol of `sitl`. Return depths and headings less their targets."""
+    frame, errors = VECTORED_6DOF if len(vehicle.layout.thrusters) == len(VECTORED_6DOF) else VECTORED, []
+    with served(setup_of(vehicle, z=10.0)) as (_, port):
+        autopilot = ArduSub(port, depth=10.0, hold=Hold.by(gains, frame=frame))
+        for leg in legs:
+            autopilot.hold.depth += leg.size * (leg.axis is HEAVE)
+            autopilot.hold.heading += leg.size * (leg.axis is YAW)
+            begin = len(autopilot.history)
+            autopilot.fly(leg.seconds)
+            at = [[one["position"][2], one["attitude"][2]] for one in autopilot.history[begin:]]
+            errors.append(np.array(at) - [autopilot.hold.depth, autopilot.hold.heading])
+        autopilot.close()
+    return errors
+
+
+@pytest.mark.parametrize("name", ["bluerov2_heavy", "identified"])
+def test_the_stand_in_flies_the_gains_as_the_loop_does_and_better_than_the_firmwares(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both are written of their own: they agree within 1 cm and 1 degree. Those of an identified vehicle fly the true
+    one."""
+    monkeypatch.setattr("rov_fmu.bridges.ardusub.gains.fly", lambda *_: iter(()))
+    gains, vehicle = values_of(tuned(FLOWN[name][0])), GREBE if name == "identified" else FLOWN[name][0]
+    own = by_the_stand_in(vehicle, gains, STEPS)
+    for leg, errors in zip(fly(vehicle, gains, STEPS), own, strict=True):
+        assert leg.errors[:, 3, 0] == pytest.approx(errors[:, 0], abs=0.01)
+        assert leg.errors[:, 2, 0] == pytest.approx(errors[:, 1], abs=radians(1.0))
+    usual = [leg.errors[:, [3, 2], 0] for leg in fly(vehicle, {}, STEPS)]
+    for n, row, within in ((1, 0, 0.05), (2, 1, radians(2.0))):
+        assert own[n][:, row].max() < min(within, 0.6 * usual[n][:, row].max())
+        assert np.abs(own[n][-100:, row]).max() < within < np.abs(usual[n][-100:, row]).max()
+
+
+# ---- The files -------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def flown() -> Tuned:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(
+            "rov_fmu.bridges.ardusub.gains.LEGS", (Leg(SURGE, 0.0, 0.1), Leg(YAW, 0.5, 0.5), Leg(SURGE, 0.5, 0.5))
+        )
+        return tuned(replace(HEAVY, name="A\nB # C"))
+
+
+def test_the_parameters_have_the_form_and_the_names_that_ground_stations_read(flown: Tuned, tmp_path: Path) -> None:
+    """MAVProxy skips lines that begin with # and reads two words of others; QGroundControl reads the five columns of
+    system, component, name, value and type, 9 for a float."""
+    files = gains_files(flown)
+    for name, columns in (("gains.param", 2), ("gains.params", 5)):
+        text = files[name]
+        assert isinstance(text, str)
+        rows = [re.split(r"\t" if columns == 5 else " ", line) for line in text.splitlines() if line and line[0] != "#"]
+        assert {len(row) for row in rows} == {columns}
+        assert columns == 2 or {(row[0], row[1], row[4]) for row in rows} == {("1", "1", "9")}
+        written = {row[2] if columns == 5 else row[0]: float(row[3] if columns == 5 else row[1]) for row in rows}
+        usual = {name: value for name, value in written.items() if name in FIRMWARE}
+        assert usual == pytest.approx(values_of(flown), rel=1e-3)
+        assert written.keys() - usual.keys() == {
+            *(f"PSC_D_ACC_{key}" for key in ("P", "I", "D", "FF")),
+            "PSC_D_POS_P",
+            "PSC_D_VEL_P",
+        }
+        assert written["PSC_D_ACC_P"] == pytest.approx(0.1 * usual["PSC_ACCZ_P"], rel=1e-3)
+        assert written["PSC_D_POS_P"] == usual["PSC_POSZ_P"]
+        reasons = {line.partition(":")[0] for line in text.splitlines() if line.startswith("# ")}
+        assert {f"# {name}" for name in usual} <= reasons
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        gains, owner = read_gains(path)
+        assert gains == pytest.approx(usual)
+        assert owner == "bluerov2_heavy"
+        new = re.sub(r"(?m)^.*PSC_(?:POS|VEL|ACC)Z_.*\n", "", text)
+        path.write_text(new, encoding="utf-8")
+        assert read_gains(path)[0] == pytest.approx(usual, rel=1e-3), "a file with the names from 4.7 on only"
+
+
+def test_the_table_and_the_picture_show_the_same_legs(flown: Tuned) -> None:
+    files = gains_files(flown)
+    legs = ["heading +29 deg", "50% ahead: depth", "50% ahead: heading"]
+    lines = str(files["steps.csv"]).splitlines()
+    assert [line.split(",")[0] for line in lines] == ["leg", *legs]
+    assert {line.count(",") for line in lines} == {9}
+    assert [*table_of(flown).columns[0].cells] == legs
+    picture = files["steps.png"]
+    assert isinstance(picture, bytes)
+    assert picture[:4] == b"\x89PNG"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("RC1_MIN 1100\n", "has none of the gains, such as ATC_RAT_YAW_P"),
+        ("\n# x\nATC_RAT_YAW_P 1 2\n", "line 3: must be a parameter and its value, and is 'ATC_RAT_YAW_P 1 2'"),
+        ("ATC_RAT_YAW_P x", "line 1: ATC_RAT_YAW_P = 'x': must be a number from 0 to 1e+06"),
+        ("ATC_RAT_YAW_P -1", "line 1: ATC_RAT_YAW_P = '-1': must be a number from 0 to 1e+06"),
+        ("PSC_D_ACC_P,nan", "line 1: PSC_ACCZ_P = 'nan': must be a number from 0 to 1e+06"),
+        ("x" * 1_000_001, "is too large, with 1 MB: at most 1 MB are read"),
+    ],
+)
+def test_a_mistake_in_given_gains_is_one_line(text: str, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "own.param"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match=f"^{re.escape(f'{path}: {message}')}$"):
+        tuned(SIX, path)
+
+
+@pytest.mark.usefixtures("ahead")
+def test_the_command_writes_a_folder_and_tells_the_next_step(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "videoray", "--to", "ardusub-gains"]) == 0
+    out = capsys.readouterr().out
+    assert f"- yaw: {NO_LAG.format('rear')}" in out
+    assert "A flight with the firmware's gains" in out
+    assert "Next: fly videoray_ardusub_gains/gains.param in ArduSub's simulator" in out
+    folder = tmp_path / "videoray_ardusub_gains"
+    assert {path.name for path in folder.iterdir()} == {"gains.param", "gains.params", "steps.csv", "steps.png"}
+    assert "# yaw: the gains are the firmware's" in (folder / "gains.param").read_text(encoding="utf-8")
