@@ -452,7 +452,7 @@ def extrapolated(identification: Identification) -> list[str]:
     """Return sentences about answers to commands that were not tested, and about the voltage of all answers, if the
     thrust depends on it."""
     tested = [
-        f"{one.axis.name} from {-one.tested[0]:.0%} to {one.tested[1]:.0%}"
+        f"{one.axis.name} from {0.0 - one.tested[0]:.0%} to {one.tested[1]:.0%}"
         for one in identification.axes
         if any(is_extrapolated(answer.command, one.tested) for answer in one.answers)
     ]

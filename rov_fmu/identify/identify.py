@@ -93,7 +93,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
     if not tests.description.tables.validity:
-        ends = {one.axis.name: (-round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
+        ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
         of_file = replace(of_file, tested=ends)
     of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
