@@ -25,6 +25,8 @@ KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
 _UNUSUAL = 2.5
 """An effect is unusual if it is more than so many deviations of its prior from its usual size."""
+_NOTHING = 0.001
+"""The share of the thrust or of the velocity below which a slow process without strong evidence is none."""
 
 _MOVING = 3.0
 """A quantity moves if its change is larger than so many standard deviations of its sensor's noise."""
@@ -179,6 +181,11 @@ class Effect:
     """The smallest value that the sampling shows."""
 
     @property
+    def rounded_evidence(self) -> float:
+        """The evidence to a tenth. A fit repeats no more of it, and what is 0 in theory is 0."""
+        return round(self.evidence, 1) + 0.0  # makes 0 of -0
+
+    @property
     def is_unusual(self) -> bool:
         """True if it is so large that something else may act in its place."""
         return self.kept and self.beyond > _UNUSUAL
@@ -229,6 +236,11 @@ class Disturbance(Effect):
     def slow(self) -> Process:
         """The slow process that it is."""
         return SLOW[self.kind]
+
+    @property
+    def size(self) -> float:
+        """Its value, or 0 where the data show nothing: the value is then a rest that the fit happens to end with."""
+        return self.value if self.kept or self.share >= _NOTHING else 0.0
 
     @property
     def changes_thrust(self) -> bool:

@@ -7,7 +7,7 @@ _EXACT = 1e-9
 """The width of an interval relative to its value up to which the value is exact, and the width is rounding."""
 _WIDTH_IN_UNITS = 3.0
 """The least width of a written interval in units of the last digit. The width is then known to a third."""
-_NEAR_ZERO = 1e-6
+_NEAR_ZERO = 0.01
 """The value relative to the width of an interval around 0 below which it is written as 0."""
 
 
@@ -16,7 +16,7 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
 
     36.98 from 36.974 to 37.004 becomes 36.98, 36.97, 37.00: all three have the same decimals, and the interval is at
     least three units of the last one wide. Where this would leave less than two digits of the value, each number has
-    two significant digits of its own, and a value that is tiny beside an interval around 0 becomes 0. Rounding keeps
+    two significant digits of its own, and a value that is small beside an interval around 0 becomes 0. Rounding keeps
     the order of numbers, so an interval that contains its value is never written as one that does not. Where there is
     no interval, or one that is as narrow as rounding, the value has the given number of significant digits. The ends
     are empty where there is no interval.

@@ -12,7 +12,8 @@ from rov_fmu.io.numbers import with_interval
     [
         (36.98, (36.974, 37.004), ("36.98", "36.97", "37.00")),
         (12345.0, (12201.0, 12500.0), ("12340", "12200", "12500")),
-        (-0.004, (-1.2, 1.2), ("-0.0040", "-1.2", "1.2")),
+        (-0.04, (-1.2, 1.2), ("-0.040", "-1.2", "1.2")),
+        (-0.004, (-1.2, 1.2), ("0", "-1.2", "1.2")),
         (5.8e-12, (-0.35, 0.35), ("0", "-0.35", "0.35")),
         (2.5, None, ("2.500", "", "")),
         (1234567.0, None, ("1.235e+6", "", "")),
@@ -41,5 +42,5 @@ def test_no_written_interval_excludes_its_value_or_hides_its_width(value: float,
     middle, *ends = (float(text) for text in with_interval(value, (low, high)))
     assert ends[0] <= middle <= ends[1]
     assert 0.5 * (high - low) <= ends[1] - ends[0] <= 1.5 * (high - low)
-    if abs(value) > 1e-6 * (high - low):
+    if abs(value) > 0.01 * (high - low):
         assert abs(middle / value - 1.0) < 0.051, "the value keeps two digits"

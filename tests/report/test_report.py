@@ -28,6 +28,7 @@ from tests.report.pages import (
     check_breaks_long_words,
     check_is_whole,
     check_refers_to_itself_alone,
+    rows,
     text_of,
     unfolded,
 )
@@ -112,6 +113,36 @@ def test_text_of_the_files_is_escaped() -> None:
     root = html.fromstring(report_page(odd))
     assert root.findtext(".//h1") == odd.vehicle.name
     assert len(list(root.iter("script"))) == 1
+
+
+@pytest.mark.usefixtures("without_plots")
+def test_what_is_0_in_theory_has_no_digits_and_no_order() -> None:
+    """On another processor, the evidence of what no data reach, and the size of what is not there, round elsewhere."""
+    told = []
+    for rest in (4.4e-16, -1.6e-15, 0.00083, -0.04):
+        first, *effects = example().effects
+        slow, other = example().disturbances
+        nothing = replace(slow, value=abs(rest), share=5e-4, evidence=-rest)
+        page = report_page(
+            replace(
+                example(),
+                effects=(
+                    replace(first, evidence=370.42),
+                    *(replace(e, evidence=rest * n) for n, e in enumerate(effects)),
+                ),
+                disturbances=(nothing, other, replace(nothing, evidence=6.1)),
+            )
+        )
+        shown = {row[0]: row for row in rows(page) if row[-1] in ("reported", "not shown by the data")}
+        assert [(name, row[-2]) for name, row in shown.items()] == [
+            ("Lag of the thrusters", "370.4"),
+            ("Current to the north", "0.0"),
+            ("Constant load", "0.0"),
+        ]
+        told.append([(row[2], row[5], row[7]) for row in rows(page) if row[0] in ("Slow force", "Change of thrust")])
+    assert {one[2] for one in told} == {("0 N", "–", "0.0")}
+    assert {one[0][2] for one in told} == {"6.1"}
+    assert {one[0][0] for one in told} != {"0 N"}, "strong evidence is for a size, however small"
 
 
 def test_thrusters_that_also_drive_another_axis_are_told_only_where_they_do() -> None:
