@@ -114,10 +114,10 @@ def _ends(values: Any) -> str:
 
 
 @contextmanager
-def _without_plots() -> Iterator[None]:
+def _without_plots(*more: str) -> Iterator[None]:
     """Replace the plots of pages by what they show, pictures by nothing, and the day by 23 November 2026."""
     with ExitStack() as patches:
-        for module in ("report.report", "report.inspection_page", "report.page.fmu_page", "study.results.plots"):
+        for module in ("report.report", "report.inspection_page", "report.page.fmu_page", *more):
             patches.enter_context(patch(f"rov_fmu.{module}.inline_svg", _plot))
         patches.enter_context(patch("rov_fmu.report.page.fmu_page.pictures", lambda _: {}))
         patches.enter_context(patch.dict(os.environ, SOURCE_DATE_EPOCH="1795392000"))
@@ -180,7 +180,7 @@ def _study(folder: Path) -> str:
     from rov_fmu.study.results.summary import print_summary
     from rov_fmu.study.run.cluster import Spent
 
-    with TemporaryDirectory() as temporary, _without_plots():
+    with TemporaryDirectory() as temporary, _without_plots("study.results.plots"):
         results = Results(shutil.copytree(folder, Path(temporary, folder.name)))
         summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
         page = _text(study_page(results))

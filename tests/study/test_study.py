@@ -368,7 +368,7 @@ _VERSION = "a worker cannot run the study. It needs the same version of rov-fmu[
     ("patched", "error", "told"),
     [
         ("do_runs", ValueError("wrong"), StudyError("the workers are lost: wrong")),
-        ("do_runs", ValueError(), StudyError("the workers are lost: ValueError")),
+        ("do_runs", ValueError(), StudyError("the workers are lost: no reason is known")),
         ("do_runs", CancelledError(), StudyError("the connection to the scheduler is lost. Finished runs are kept")),
         ("Client.submit", KeyError("ours"), KeyError("ours")),
         ("Client.register_plugin", TypeError("old"), StudyError(f"{_VERSION}: old")),

@@ -293,19 +293,20 @@ def _truth(value: _Value) -> np.bool_:
     return np.bool_(value)
 
 
-def _array(value: _Value) -> _Value:
+def elements(value: _Value) -> _Value:
+    """Return an array. Raises TypeError for a single number."""
     if not isinstance(value, np.ndarray):
         raise TypeError("a single number has no elements")
     return value
 
 
 def _slice(array: _Value, *ends: _Value) -> _Value:
-    return _array(array)[slice(*(None if end is None else _whole_number(end) for end in ends))]
+    return elements(array)[slice(*(None if end is None else _whole_number(end) for end in ends))]
 
 
 def _index(array: _Value, index: _Value) -> _Value:
     """Return the part of an array that has an index: a whole number, an array of these, or an array of Booleans."""
-    array = _array(array)
+    array = elements(array)
     if isinstance(index, np.ndarray) and index.dtype.kind == "b":
         return array[index]
     whole: Any = index.astype(np.intp) if isinstance(index, np.ndarray) else _whole_number(index)

@@ -10,7 +10,16 @@ import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
 from rov_fmu.io.messages import brief, reason_of
-from rov_fmu.study.plan.expression import BY_NAME, CONSTANTS, FUNCTIONS, TIME, BeyondError, Expression, Function
+from rov_fmu.study.plan.expression import (
+    BY_NAME,
+    CONSTANTS,
+    FUNCTIONS,
+    TIME,
+    BeyondError,
+    Expression,
+    Function,
+    elements,
+)
 
 Array = npt.NDArray[np.float64]
 _STEADY = 0.1
@@ -47,11 +56,11 @@ class Responses:
 
     def final(self, y: Array) -> float:
         """Return the last y."""
-        return float(y[-1])
+        return float(elements(y)[-1])
 
     def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
         """Return the steady y: its mean over the last tenth of the time from `start` to `end`."""
-        return float(y[self._window(start, end)[1]].mean())
+        return float(elements(y)[self._window(start, end)[1]].mean())
 
     def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
         """Return the time from `start` until 1 - 1/e of the change to the steady value; NaN without a change."""
@@ -102,7 +111,7 @@ class Responses:
     def _change(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
         """Return y scaled to 0 at the start and 1 when steady, or NaN if these are the same, and the times."""
         window, steady = self._window(start, end)
-        part = y[window]
+        part = elements(y)[window]
         whole = y[steady].mean() - part[0]
         return (part - part[0]) / (whole or nan), self._times[window]
 
