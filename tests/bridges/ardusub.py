@@ -21,9 +21,9 @@ START = 1.8
 """The time during which ArduSub 4.7 starts, s."""
 
 
-def started(time: float, pulses: list[int], channels: int = 16) -> list[int]:
+def started(time: float, pulses: list[int], channels: int = 16, start: float = START) -> list[int]:
     """What ArduSub sends: 1500 us to servos 1 to 8 while it starts, and then nothing to servos without a function."""
-    sent = [1500] * 8 if time < START else pulses
+    sent = [1500] * 8 if time < start else pulses
     return [*sent, *[0] * (channels - len(sent))]
 
 
@@ -85,6 +85,8 @@ class ArduSub:
     timeout: float = 1.0
     """The time after which a packet without a reply is sent again, s."""
     channels: int = 16
+    start: float = START
+    """The time during which it starts, s; 0 for one that has started before."""
     count: int = 0
     time: float = 0.0
     """The time that has passed by the time stamps of the replies, s."""
@@ -130,8 +132,8 @@ class ArduSub:
 
     def pulses(self) -> list[int]:
         """The outputs of the motors, µs."""
-        if self.time < START:
-            return started(self.time, [], self.channels)
+        if not self.at or self.time < self.start:
+            return started(0.0, [], self.channels)
         dt = 1.0 / self.rate
         (phi, theta, _), (ax, ay, az) = self.at["attitude"], self.at["accel_body"]
         fall = -sin(theta) * ax + sin(phi) * cos(theta) * ay + cos(phi) * cos(theta) * az + 9.80665
@@ -139,7 +141,7 @@ class ArduSub:
         motion = Motion(attitude, gyro, self.at["position"][2], self.at["velocity"][2], fall)
         forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
         outputs = self.hold.outputs(motion, forward, lateral, dt)
-        self.sent.append(started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels))
+        self.sent.append(started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels, self.start))
         return self.sent[-1]
 
     def _vector(self, key: str) -> tuple[float, float, float]:

@@ -256,7 +256,7 @@ def by_the_stand_in(vehicle: Vehicle, gains: Mapping[str, float], legs: tuple[Le
     """Fly steps with the stand-in, through the protocol of `sitl`. Return depths and headings less their targets."""
     frame, errors = VECTORED_6DOF if len(vehicle.layout.thrusters) == len(VECTORED_6DOF) else VECTORED, []
     with served(setup_of(vehicle, z=10.0)) as (_, port):
-        autopilot = ArduSub(port, depth=10.0, hold=Hold.by(gains, frame=frame))
+        autopilot = ArduSub(port, depth=10.0, start=0.0, hold=Hold.by(gains, frame=frame))
         for leg in legs:
             autopilot.hold.depth += leg.size * (leg.axis is HEAVE)
             autopilot.hold.heading += leg.size * (leg.axis is YAW)
@@ -350,7 +350,7 @@ def test_the_table_and_the_picture_show_the_same_legs(flown: Tuned) -> None:
         ("ATC_RAT_YAW_P x", "line 1: ATC_RAT_YAW_P = 'x': must be a number from 0 to 1e+06"),
         ("ATC_RAT_YAW_P -1", "line 1: ATC_RAT_YAW_P = '-1': must be a number from 0 to 1e+06"),
         ("PSC_D_ACC_P,nan", "line 1: PSC_ACCZ_P = 'nan': must be a number from 0 to 1e+06"),
-        ("x" * 1_000_001, "is too large, with 1 MB: at most 1 MB are read"),
+        ("x" * 1_000_001, "has 1,000,001 bytes; at most 1,000,000 are read"),
     ],
 )
 def test_a_mistake_in_given_gains_is_one_line(text: str, message: str, tmp_path: Path) -> None:
