@@ -175,7 +175,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
             "better than 3 %"
         ),
-        "wander": (
+        "estimator": (
             "{axes}: the velocity of the estimator wanders by {size} (RMS) beside its position. The fit takes this for "
             "an error of the estimator"
         ),
@@ -267,7 +267,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
         if sensor.wander > max(sensor.white, _LEAST_WANDER):
             size = size_in_words(sensor.wander, sensor.unit)
-            findings.append(about("", "wander", sensor.axis.name, size=size))
+            findings.append(about("", "estimator", sensor.axis.name, size=size))
     findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     findings += filter(None, map(_structure, identification.structures))

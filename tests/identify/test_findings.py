@@ -144,7 +144,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         structured(HEALTH),
     ),
     (
-        "wander",
+        "estimator",
         quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.03),)),
         "the velocity of the estimator wanders by 0.030 m/s (RMS) beside its position",
         quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.001),)),

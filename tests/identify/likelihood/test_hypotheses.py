@@ -628,7 +628,8 @@ def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_
     )
     plain, dead = trial({}, 0.0, before), trial({DEAD: 0.0}, 100.0, after)
     search = StructureSearch(plain, _search)
-    search.variants, search.now, search.tried[frozenset({DEAD})] = [], dead, dead
+    search.variants, search.contrasts, search.now = [], {}, dead
+    search.tried[frozenset({DEAD})] = dead
     found = search.explained()
     assert [one.variant for one in found.adopted] == names
     assert found.nearest == ({} if names else {DEAD: 0.0})
@@ -650,7 +651,7 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", trial)
     search = StructureSearch(trial(reversed_model, {}), _search)
-    search.variants = [REVERSED, DEAD]
+    search.variants, search.contrasts = [REVERSED, DEAD], {}
     search.now = trial(reversed_model, dict.fromkeys([DEAD, REVERSED]))
     search.tried[frozenset(search.now.starts)] = search.now
     found = search.explained()
@@ -687,7 +688,7 @@ def test_another_minimum_is_no_evidence_for_a_hypothesis(
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: trial(starts, again))
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
     search = StructureSearch(trial({}, 0.0), _search)
-    search.variants = [REVERSED, DEAD]
+    search.variants, search.contrasts = [REVERSED, DEAD], {}
     search.now = search.tried[frozenset({REVERSED})] = trial({REVERSED: None}, 10.0)
     both = search.tried[frozenset({REVERSED, DEAD})] = trial({REVERSED: None, DEAD: 1.0}, 40.0)
     rounds = iter([[both]])
