@@ -15,7 +15,7 @@ from tests.equation.steps import in_engine, in_python
 from tests.fmi import ERROR, OK
 from tests.fmi2 import Fmu
 from tests.often import often
-from tests.vehicles import Values, at_rest, still
+from tests.vehicles import at_rest, still
 
 _DRAG = [("a_d_u", "b_d_u"), ("a_d_r", "b_d_r")]
 
