@@ -83,8 +83,8 @@ _WARNINGS = {
     "jumps": "{files}: {count:#jump} of the {quantity}, as by a reset: {jumps}",
     "damaged log": "{files}: the log is damaged in places. The parts that could be read are used",
     "cut": (
-        "{files}: the file ends amid its messages, as after a loss of power. The {read} s before that are read, and "
-        "what was recorded later is missing"
+        "{files}: the file ends amid its messages, as after a loss of power. {read} read, and what was recorded later "
+        "is missing"
     ),
     "several vehicles": (
         "{files}: the log has the vehicles {vehicles}. {vehicle} is used; `vehicle` in [logs] of rov.toml names another"

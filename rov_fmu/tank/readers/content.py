@@ -57,7 +57,8 @@ class Content:
         """Add a finding that the file ends before its end mark, with the time that could be read."""
         times = [topic.time for piece in self.pieces for topic in piece.topics if len(topic.time)]
         read = max((time[-1] for time in times), default=0.0) - min((time[0] for time in times), default=0.0)
-        self.findings.append(about(self.file, "cut", read=f"{read:.4g}"))
+        words = f"The {read:.4g} s before that are" if read else "What is before that is"
+        self.findings.append(about(self.file, "cut", read=words))
 
     def split_by_clock(self) -> None:
         """Split the log where a clock was set, and leave out and count the messages with times that none has shown.
