@@ -30,11 +30,12 @@ from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting_frames
 from rov_fmu.vehicle.json_schema import json_schema
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
+from verification.identification.strangers import gates
 
 Table = list[tuple[str, ...]]
 _NAMES = (
     *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "api.md", "vehicles.md"),
-    *("identify-formats.md", "identify-method.md", "ardusub.md"),
+    *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
 DRAWN = {name: load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy")}
@@ -57,6 +58,9 @@ def tables() -> dict[str, Table]:
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
+    kept = gates.stages()
+    found |= {"gates": gates.gates(kept), "strangers": gates.by_kind(kept[-1:])}
+    found["hidden"] = gates.by_kind(kept[-1:], hidden=True)
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
@@ -133,14 +137,11 @@ def _messages() -> Table:
     """Return the messages that are recognised, by what they measure."""
     words = {catalogue.EULER: "roll, pitch, heading", catalogue.QUATERNION: "roll, pitch, heading"}
     words |= {catalogue.POSITION: "depth, distance", catalogue.VELOCITY: "velocities", catalogue.RATES: "rates of turn"}
-    words |= {"heading": words[catalogue.EULER]}
-    for vector in (catalogue.VELOCITY, catalogue.RATES):
-        words |= dict.fromkeys(catalogue.VECTORS[vector], words[vector])
     found: dict[str, dict[str, None]] = {"commands of thrusters": {}}
     for output in catalogue.OUTPUTS:
         found["commands of thrusters"][f"`{_plain(output.kind)}`"] = None
     for message in catalogue.MESSAGES:
-        field = "" if message.gives in words else f".{message.fields[0]}"
+        field = f".{message.fields[0]}" if message.gives in catalogue.QUANTITIES else ""
         found.setdefault(words.get(message.gives, message.gives), {})[f"`{_plain(message.kind)}{field}`"] = None
     rows = ((name, ", ".join(messages)) for name, messages in found.items())
     return [("measured", "messages, preferred ones first"), *rows]

@@ -1,0 +1,167 @@
+"""The table of gates: counts of what was said of many folders, a row for each stage of the product."""
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from statistics import mean, median
+from typing import Any
+
+from verification.identification.strangers.judge import NEAR, Judged, JudgedAxis
+from verification.identification.strangers.kinds import AS_MODELLED, BY_NAME, STRANGERS
+
+STAGES = Path(__file__).with_name("stages.jsonl")
+"""A line for each stage that is kept."""
+WORDS = ("good", "usable", "do not use")
+RIGHT, FAULTY, NEAR_FIT, SHOWN = (
+    "right models",
+    "right models with a fault",
+    "strangers within 5 % of the fit",
+    "strangers",
+)
+GROUPS = (RIGHT, FAULTY, NEAR_FIT, SHOWN)
+Table = list[tuple[str, ...]]
+Counts = dict[str, list[int]]
+"""By verdict: the number of axes, and of those with a wrong answer."""
+
+
+def group_of(one: Judged, axis: JudgedAxis) -> str:
+    """Return the group in which an axis of a drawn vehicle counts: one of GROUPS, or `hidden`."""
+    kind = BY_NAME[one.kind]
+    if kind.group == "law":
+        return RIGHT if kind is AS_MODELLED else FAULTY
+    if axis.distance is not None and axis.distance <= NEAR:
+        return NEAR_FIT
+    return SHOWN if kind.group == "stranger" else "hidden"
+
+
+def stage(name: str, folders: Sequence[Judged]) -> dict[str, Any]:
+    """Return what is kept of the drawn folders of a stage."""
+    groups: dict[str, Counts] = {}
+    kinds: dict[str, Counts] = {}
+    widths: dict[str, list[float]] = {"V_ss": [], "times": []}
+    for one in folders:
+        for axis in one.axes:
+            group = group_of(one, axis)
+            for table, key in ((groups, group), (kinds, one.kind if group in (SHOWN, "hidden") else "")):
+                counts = table.setdefault(key, {}).setdefault(axis.word, [0, 0])
+                counts[0] += 1
+                counts[1] += axis.is_off
+            if group == RIGHT:
+                for number in axis.numbers:
+                    widths["V_ss" if number.quantity == "V_ss" else "times"].append(number.half_width)
+    times = [[one.seconds for one in folders if one.count == count] for count in (2, 4)]
+    causes = [bool(is_true) for one in folders for _, is_true in one.causes]
+    return {
+        "stage": name,
+        "folders": [*map(len, times)],
+        "groups": groups,
+        "kinds": kinds,
+        "widths": {key: median(some) if some else None for key, some in widths.items()},
+        "causes": [sum(causes), len(causes)],
+        "seconds": [mean(some) if some else None for some in times],
+    }
+
+
+def keep(one: Mapping[str, Any], path: Path = STAGES) -> None:
+    """Keep a stage in the place of one with the same name."""
+    lines = {each["stage"]: json.dumps(each) for each in [*stages(path), one]}
+    path.write_text("".join(f"{line}\n" for line in lines.values()), encoding="utf-8")
+
+
+def stages(path: Path = STAGES) -> list[dict[str, Any]]:
+    """Return the stages that are kept."""
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+
+
+# ---- Tables ----------------------------------------------------------------------------------------------------------
+
+
+def _sum(some: Iterable[Counts], *words: str) -> tuple[int, int]:
+    """Return the axes with these verdicts, and those of them with a wrong answer."""
+    found = [counts[word] for counts in some for word in words if word in counts]
+    return sum(n for n, _ in found), sum(off for _, off in found)
+
+
+def _share(part: int, all_: int) -> str:
+    return f"{part} of {all_}" + (f" ({100.0 * part / all_:.0f} %)" if all_ else "")
+
+
+def _percent(value: float | None) -> str:
+    return "" if value is None else f"±{100.0 * value:.1f} %"
+
+
+def gates(some: Sequence[Mapping[str, Any]]) -> Table:
+    """Return the gates of some stages, a column for each."""
+    rows: Table = [("", "wanted", *(one["stage"] for one in some))]
+
+    def add(words: str, wanted: str, *cells: str) -> None:
+        rows.append((words, wanted, *cells))
+
+    def off(one: Mapping[str, Any], word: str) -> str:
+        n, wrong = _sum((one["groups"].get(group, {}) for group in GROUPS), word)
+        return _share(wrong, n)
+
+    def are_good(one: Mapping[str, Any], *groups: str) -> str:
+        own = [one["groups"].get(group, {}) for group in groups]
+        return _share(_sum(own, "good")[0], _sum(own, *{word for counts in own for word in counts})[0])
+
+    def worst(one: Mapping[str, Any]) -> str:
+        off = {kind: _sum([one["kinds"].get(kind, {})], *WORDS[:2]) for kind in (kind.name for kind in STRANGERS)}
+        shown = {kind: counts for kind, counts in off.items() if BY_NAME[kind].group == "stranger" and counts[1]}
+        if not shown:
+            return "none"
+        kind, (n, wrong) = max(shown.items(), key=lambda item: (item[1][1] / item[1][0], item[1][0]))
+        return f"{kind}: {_share(wrong, n)}"
+
+    add("*good* axes with a wrong answer", "at most 3 %", *(off(one, "good") for one in some))
+    add("*usable* axes with a wrong answer", "at most 6 %", *(off(one, "usable") for one in some))
+    add("the worst kind, *good* and *usable*", "at most 15 %", *map(worst, some))
+    add(f"*good* of {RIGHT}", "at least 85 %", *(are_good(one, RIGHT) for one in some))
+    add(f"*good* of {NEAR_FIT}", "at least 85 %", *(are_good(one, NEAR_FIT) for one in some))
+    add(f"V_ss of {RIGHT}, median", "at most ±4 %", *(_percent(one["widths"]["V_ss"]) for one in some))
+    add("their times and distances", "at most ±6 %", *(_percent(one["widths"]["times"]) for one in some))
+    add("true causes of those told with a probability", "98 %", *(_share(*one["causes"]) for one in some))
+    seconds = (
+        " and ".join(f"{s:.0f} s" for s, n in zip(one["seconds"], one["folders"], strict=True) if n) for one in some
+    )
+    add("processor time, mean of two and of four axes", "1.2 times", *seconds)
+    add("folders with two and with four axes", "160 and 40", *(" and ".join(map(str, one["folders"])) for one in some))
+    return rows
+
+
+def by_kind(some: Sequence[Mapping[str, Any]], *, hidden: bool = False) -> Table:
+    """Return how many axes of each kind got each verdict, and how many of them have a wrong answer."""
+    heads = [f"{one['stage']}: {word}" for one in some for word in WORDS]
+    rows: Table = [("", "what it does", *heads)]
+    kinds = [kind for kind in STRANGERS if (kind.group == "hidden") == hidden]
+    named = [] if hidden else [(group, "", "groups", group) for group in GROUPS]
+    for name, what, table, key in [*named, *((kind.name, kind.what, "kinds", kind.name) for kind in kinds)]:
+        cells = [_cell(one[table].get(key, {}), word) for one in some for word in WORDS]
+        rows.append((name, what, *cells))
+    return rows
+
+
+def _cell(counts: Counts, word: str) -> str:
+    n, off = _sum([counts], word)
+    return f"{n}, {off} off" if off else str(n) if n else ""
+
+
+def cases(folders: Iterable[Judged]) -> Table:
+    """Return a row for each axis of some folders."""
+    rows: Table = [("folder", "axis", "verdict", "tested", "inside", "largest error, half-widths", "causes", "s")]
+    for one in folders:
+        told = {None: "", True: " (true)", False: " (false)"}
+        causes = "; ".join(text + told[is_true] for text, is_true in one.causes) or one.error
+        for n, axis in enumerate(one.axes):
+            offs = [number.off for number in axis.numbers]
+            inside = f"{sum(off <= 1.0 for off in offs)} of {len(offs)}"
+            largest = max(axis.numbers, key=lambda number: number.off, default=None)
+            words = f"{largest.off:.1f} ({largest.quantity} at {100.0 * largest.command:+.0f} %)" if largest else ""
+            commands = [number.command for number in axis.numbers]
+            ends = min([0.0, *commands]), max([0.0, *commands])
+            tested = f"{100.0 * ends[0]:.0f} to {100.0 * ends[1]:.0f} %"
+            tail = (causes, f"{one.seconds:.0f}") if n == 0 else ("", "")
+            rows.append((one.name if n == 0 else "", axis.axis, axis.word, tested, inside, words, *tail))
+        if not one.axes:
+            rows.append((one.name, "", "nothing tested", "", "", "", causes, f"{one.seconds:.0f}"))
+    return rows
