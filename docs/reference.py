@@ -137,11 +137,14 @@ def _messages() -> Table:
     """Return the messages that are recognised, by what they measure."""
     words = {catalogue.EULER: "roll, pitch, heading", catalogue.QUATERNION: "roll, pitch, heading"}
     words |= {catalogue.POSITION: "depth, distance", catalogue.VELOCITY: "velocities", catalogue.RATES: "rates of turn"}
+    words |= {"heading": words[catalogue.EULER]}
+    for vector in (catalogue.VELOCITY, catalogue.RATES):
+        words |= dict.fromkeys(catalogue.VECTORS[vector], words[vector])
     found: dict[str, dict[str, None]] = {"commands of thrusters": {}}
     for output in catalogue.OUTPUTS:
         found["commands of thrusters"][f"`{_plain(output.kind)}`"] = None
     for message in catalogue.MESSAGES:
-        field = f".{message.fields[0]}" if message.gives in catalogue.QUANTITIES else ""
+        field = "" if message.gives in words else f".{message.fields[0]}"
         found.setdefault(words.get(message.gives, message.gives), {})[f"`{_plain(message.kind)}{field}`"] = None
     rows = ((name, ", ".join(messages)) for name, messages in found.items())
     return [("measured", "messages, preferred ones first"), *rows]
