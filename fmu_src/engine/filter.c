@@ -84,6 +84,7 @@ typedef struct {
     const double *start, *error; /* the states at the first sample, and their standard deviations; N_X numbers each */
     const int *active;           /* for each state, whether it has a covariance; N_X numbers */
     ptrdiff_t tilts;             /* the times at which the roll and pitch of a vehicle that has neither state are known, or 0 */
+    ptrdiff_t wanders;           /* 1 if the horizontal drift is an error of the velocities, which the positions do not have */
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
@@ -435,7 +436,7 @@ static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N
             if (tilts) {
                 *position = over_ground(f, x, R[i], i);
             }
-            *position += x[DRIFT + i];
+            *position += f->log->wanders && i < 2 ? (real)0.0 : x[DRIFT + i];
         }
     }
     if (tilts && f->where->heading >= 0) {

@@ -113,6 +113,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         **dict(tests.description.tables.vehicle or ()),
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
+        tested=validity.tested if validity else {},
         alternatives={},
         data=None,
         limits=tests.description.limits,

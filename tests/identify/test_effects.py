@@ -308,7 +308,7 @@ def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Pat
         assert contains(kept["sensor lag"].interval, lag)
         beta = next(one for one in heave.known if one.name == "beta_w")
         assert beta.interval
-        assert beta.interval[1] / beta.interval[0] < 1.05
+        assert beta.interval[1] / beta.interval[0] < 1.08  # 1 % of a speed and 1 % of a time are always unknown
 
 
 @pytest.mark.long

@@ -71,8 +71,8 @@ def test_intervals_contain_the_truth_whatever_the_size_of_a_load(load: float, se
     covered = []
     for seed in range(seeds):
         fit, vehicle, truth = drawn(tmp_path / str(seed), load, 0.02, seed)
-        for answer in assess.answers(fit.posteriors, HEAVE, vehicle, strongest=0.5):
-            if answer.command in assess.COMMANDS:
+        for answer in assess.answers(fit.posteriors, HEAVE, vehicle, (0.5, 0.5)):
+            if abs(answer.command) < 1.0:
                 V, Tau = truth.response(HEAVE, answer.command)
                 for number, (_, (low, high)) in ((V, answer.steady), (Tau, answer.rise)):
                     covered.append(low <= number <= high)
@@ -90,7 +90,7 @@ def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
     widths = []
     for tests, one in ((short, fit), (half, fit_all(*begin(half)))):
         vehicle = identified_vehicle(tests, one)[0]
-        answers = (assess.answers(one.posteriors, axis, vehicle, strongest=0.3) for axis in (HEAVE, YAW))
+        answers = (assess.answers(one.posteriors, axis, vehicle, (0.3, 0.3)) for axis in (HEAVE, YAW))
         ends = [[answer.steady[1] for answer in of if answer.command in (-0.3, 0.3, 0.5)] for of in answers]
         widths.append(np.diff(ends)[..., 0])
     ratios = widths[1] / widths[0]

@@ -49,11 +49,12 @@ def test_the_shipped_file_is_one_that_its_tests_allow(refit: Identification, tmp
     """The files say the same but for their numbers, and the shipped coefficients and answers are in the intervals.
 
     An earlier version made the file that ships, and this file stays: its curves are the nearest quadratic ones to
-    curves of free shapes, and today's are fitted. Its ranges are in words, because its FMU keeps its variables.
+    curves of free shapes, and today's are fitted. Its ranges are in words, because its FMU keeps its variables, and its
+    verdicts do not say for which commands they hold.
     """
     path = tmp_path / "refit.toml"
     write_vehicle(refit.vehicle, path)
-    ranges = r"^\[validity\.identified\]\n(.+\n)+\n|^tested = \[\n(    .+\n)+\]\n"
+    ranges = r"^\[validity\.(?:identified|tested)\]\n(.+\n)+\n|^(?:tested|verdicts) = \[\n(    .+\n)+\]\n"
     numbers = rf"{ranges}|, correlation = .*(?= }}$)|^# rov-fmu identify .*$|-?\d[\d.]*|^tool = .*$"
     made, shipped = (re.sub(numbers, "", p.read_text(encoding="utf-8"), flags=re.M) for p in (path, REFIT))
     assert made == shipped

@@ -71,8 +71,9 @@ def _exact(objective: Objective, absent: frozenset[int], near: Minimum) -> Minim
 
 def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
     """Yield the places of effects in the order in which they are left out, for a normal posterior after a rise of J."""
-    z, C, parameters = posterior.z, posterior.covariance, enumerate(posterior.table.parameters)
-    null = {n: p.null for n, p in parameters if p.is_effect and n not in posterior.absent}
+    z, C, parameters = posterior.z, posterior.covariance, posterior.table.parameters
+    may_go = (n for n, p in enumerate(parameters) if p.is_effect and not p.of_kind.is_of_structure)
+    null = {n: parameters[n].null for n in may_go if n not in posterior.absent}
     while null:
         rises = {n: (z[n] - end) ** 2 / max(C[n, n], 1e-300) for n, end in null.items()}
         least = min(rises, key=lambda n: rises[n])

@@ -48,9 +48,14 @@ class Sensor:
     """False for a velocity through the water."""
 
     @property
+    def is_horizontal(self) -> bool:
+        """True for a velocity or a position over ground, ahead or to starboard, or north or east."""
+        return self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+
+    @property
     def is_horizontal_velocity(self) -> bool:
         """True for a velocity over ground ahead or to starboard."""
-        return self.is_velocity and self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+        return self.is_velocity and self.is_horizontal
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,9 @@ class Record:
     """The standard deviations of all states of the vehicle that the sensors concern."""
     tilt: Array = field(default_factory=lambda: np.zeros((3, 0)))
     """3 x k: times (s), and the measured roll and pitch (rad) of a vehicle that has neither axis; k = 0 or k >= 2."""
+    wanders: bool = False
+    """True if the slow horizontal velocity is an error of the sensors of velocity, which those of position do not have.
+    """
     beside: Array | None = None
     """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
     change along straight lines from row to row."""
@@ -154,7 +162,7 @@ class _Record(ctypes.Structure):
         *((name, ctypes.c_ssize_t) for name in ("samples", "rows", "sensors")),
         *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told", "anew")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
-        ("tilts", ctypes.c_ssize_t),
+        *((name, ctypes.c_ssize_t) for name in ("tilts", "wanders")),
         *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
         *((name, ctypes.c_double) for name in ("longest", "changing", "share")),
     ]
@@ -364,7 +372,8 @@ class Filter:
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
         lines = None if beside is None else beside.ctypes.data
         kept: list[object] = [*arrays, *tilt, beside]
-        return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], lines, *self._steps), kept
+        tilts = len(tilt[0]), record.wanders
+        return _Record(*sizes, *pointers[0], *tilts, *pointers[1], lines, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
         """Return the kind and the place of a sensor, as filter.c wants them."""

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import inf, log
 from typing import Any, Literal
 
+import numpy as np
+
 from rov_fmu.equation.catalogue import CURVE, REVERSE
 from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.identify.likelihood.prior import Prior
@@ -21,6 +23,7 @@ USUAL_EXPONENT = 1.5
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
 INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "logging width", "white noise"
+WANDER = "wander"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
@@ -80,6 +83,10 @@ class Coordinate:
     """False for noise and slow processes, which change the covariance of the filter and not its mean."""
     unit: str = "1"
 
+    def number(self, z: Any) -> Any:
+        """Return the number that a coordinate stands for."""
+        return np.exp(z) if self.is_log else self.offset + self.factor * z
+
 
 @dataclass(frozen=True)
 class Kind(Coordinate):
@@ -120,10 +127,14 @@ class Kind(Coordinate):
     """True for the size of a slow or short process."""
     slow: Process | None = None
     """The slow process whose size it is."""
+    is_of_sensor: bool = False
+    """True for a slow process that is an error of a sensor, and no disturbance of the motion."""
     hides_structure: bool = False
     """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
     least_unseen: float = 0.0
     """Its least size where unseen data are predicted."""
+    is_of_structure: bool = False
+    """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
     is_of_water: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
@@ -400,6 +411,17 @@ KINDS = {
         0.2,
         least_unseen=0.03,  # batteries and water differ from day to day
     ),
+    "wander": _slow(
+        Deviation(
+            "wander", 2.5, "ln of the size of the wander of an estimator's velocity", "1 mm/s, within a factor of 12"
+        ),
+        Process(8.0, "Wander of the velocity", "velocity", "", ""),
+        0.001,
+        1e-7,
+        0.3,
+        unit="m/s",
+        is_of_sensor=True,
+    ),
     "slow velocity": _slow(
         Deviation(
             "slow_velocity", 2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"
@@ -426,6 +448,7 @@ KINDS = {
         low=0.0,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "command limit": Kind(
         None,
@@ -436,6 +459,7 @@ KINDS = {
         low=0.1,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "slew limit": Kind(
         None,
@@ -447,6 +471,7 @@ KINDS = {
         high=20.0,
         null=0.0,
         unit="s",
+        is_of_structure=True,
     ),
     "voltage drop": Kind(
         None,
@@ -457,6 +482,7 @@ KINDS = {
         low=0.0,
         high=0.8,
         null=0.0,
+        is_of_structure=True,
     ),
     "white noise": Kind(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
@@ -472,8 +498,8 @@ KINDS = {
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative
 to white noise."""
-SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow}
-"""The slow processes, by the kinds of their sizes."""
+SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow and not kind.is_of_sensor}
+"""The slow processes that disturb the motion, by the kinds of their sizes."""
 EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is

@@ -23,7 +23,7 @@ from rov_fmu.identify.likelihood.kinds import (
     OFFSET,
     PLACED,
     PRIORS,
-    SLOW,
+    WANDER,
     WHITE,
     WIDTH,
     Coordinate,
@@ -82,10 +82,6 @@ class Parameter(Coordinate):
     def of_kind(self) -> Kind:
         """What all parameters of its kind are."""
         return KINDS[self.kind]
-
-    def number(self, z: Any) -> Any:
-        """Return the number that a coordinate stands for."""
-        return np.exp(z) if self.is_log else self.offset + self.factor * z
 
     @property
     def step(self) -> float:
@@ -245,9 +241,13 @@ class Table:
             units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
 
         def slow(kind: str, of: str = "", unit: Any = 1.0) -> Slow:
-            return Slow(unit * self.get(z, kind, of), SLOW[kind].time_constant)
+            process = KINDS[kind].slow
+            assert process
+            return Slow(unit * self.get(z, kind, of), process.time_constant)
 
-        along = slow("slow velocity", HORIZONTAL) if one.has_positions or one.has_velocities else Slow()
+        along = Slow()
+        if one.has_positions or one.has_velocities:
+            along = slow(WANDER if one.record.wanders else "slow velocity", HORIZONTAL)
         down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
         noises = [self.noise(z, m.channel.quantity.name) for m in one.measured]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
@@ -276,6 +276,11 @@ class Table:
         white = self.get(z, WHITE, quantity)
         coloured = white * self.get(z, "coloured noise", quantity)
         return white, coloured, self.get(z, "correlation time", quantity, default=1.0)
+
+    def wander(self, z: Array, one: SampledLog, sensor: Sensor) -> Any:
+        """Return the standard deviation of what wanders of a sensor's values in a log; 0 unless it is an estimator's
+        velocity."""
+        return self.get(z, WANDER, HORIZONTAL) if one.record.wanders and sensor.is_horizontal_velocity else 0.0
 
     def row_noise(self, z: Array, name: str) -> Any:
         """Return the relative noise of the rows of a table."""
@@ -513,8 +518,11 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
         yield make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
         yield make("slow velocity", HEAVE.name)
-    if any(one.has_positions or one.has_velocities for one in logs):
+    horizontal = {one.record.wanders for one in logs if one.has_positions or one.has_velocities}
+    if False in horizontal:
         yield make("slow velocity", HORIZONTAL)
+    if True in horizontal:
+        yield make(WANDER, HORIZONTAL)
     noises = grouped((m.channel.quantity.name, m.noise) for one in logs for m in one.measured)
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():

@@ -14,7 +14,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.result import USUAL, Interval
+from rov_fmu.identify.result import Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
 
@@ -75,7 +75,7 @@ class Posterior:
                 of[name] = min([of.get(name, _WORST), *along])
         parameters = self.table.parameters
         errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
-        factors = np.sqrt(1.0 + np.where(errors > USUAL, _ALIKE * (errors**2 - 1.0), 0.0))
+        factors = np.sqrt(1.0 + _ALIKE * np.maximum(errors**2 - 1.0, 0.0))
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
