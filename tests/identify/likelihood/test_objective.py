@@ -68,7 +68,7 @@ def names(parameters: Sequence[Parameter]) -> list[str]:
 def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
     objective: Objective, place: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The motion does not depend on it, and what derivatives lose at a kink is much: here by steps that are far too long.
+    """The motion does not depend on it, and derivatives lose much at a kink. Here, their steps are far too long.
 
     An assumed thrust would otherwise be told within 1 % by a log that is nearly exact.
     """
