@@ -1,6 +1,7 @@
 """The same vehicle file gives the same FMU to the byte, also in another folder or with another Python."""
 
 import hashlib
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.cli.test_wheel import CONSTRAINTS, built, interpreter, pinned_environment
-from tests.commands import ROOT
+from tests.commands import BARE, ROOT
 from tests.conftest import Made
 from verification.fresh_environment import environment
 
@@ -35,6 +36,16 @@ def pinned(made_once: Made, tmp_path_factory: pytest.TempPathFactory) -> dict[st
     """Return the hashes of builds by this Python from the checkout, with the versions of constraints.txt."""
     python, folder = pinned_environment(made_once, tmp_path_factory).python, tmp_path_factory.mktemp("checkout")
     return {flavour: _built(folder, flavour, python, _CHECKOUT) for flavour in _BUILDS}
+
+
+def test_the_order_of_sets_changes_no_byte(tmp_path: Path) -> None:
+    """Python puts texts in a set in another order in each process."""
+    command = [sys.executable, "-m", "rov_fmu", "build", str(BARE), "--platform", "host", "-o", "rov.fmu", "--force"]
+    made = set()
+    for seed in "12":
+        subprocess.run(command, check=True, cwd=tmp_path, env=os.environ | {"PYTHONHASHSEED": seed})
+        made.add((tmp_path / "rov.fmu").read_bytes())
+    assert len(made) == 1
 
 
 @pytest.mark.parametrize(

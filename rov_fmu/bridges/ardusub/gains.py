@@ -83,16 +83,14 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     shares = dict.fromkeys(axes, 1.0)
     others, load = _variations(vehicle), mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0
     is_usual = np.arange(len(others)) == 1
+
+    def gains_along(axis: Axis) -> dict[str, tuple[float, str]]:
+        if not why[axis]:
+            return _rule(vehicle, mixer, axis, shares[axis])
+        return {name: (usual.get(name, FIRMWARE[name]), why[axis]) for name in FIRMWARE if ROWS[axis] in name}
+
     while True:
-        gains = {
-            name: gain
-            for axis in axes
-            for name, gain in (
-                {name: (usual.get(name, FIRMWARE[name]), why[axis]) for name in FIRMWARE if ROWS[axis] in name}
-                if why[axis]
-                else _rule(vehicle, mixer, axis, shares[axis])
-            ).items()
-        }
+        gains = {name: gain for axis in axes for name, gain in gains_along(axis).items()}
         flying = {name: np.where(is_usual, FIRMWARE[name], value) for name, (value, _) in gains.items()}
         flown = [*fly(vehicle, flying, [leg for leg in LEGS if leg.axis in (SURGE, *axes)], others, load)]
         flaws = {axis: words for axis, words in _flaws(flown).items() if given or not why.get(axis, "no axis")}

@@ -43,7 +43,7 @@ _LONG = 3.0
 _DAY, _HALF_DAY, _HOUR, _MINUTE = 86400.0, 43200.0, 3600.0, 60.0
 _EPOCH = datetime(1970, 1, 1).toordinal()
 _FIND = re.compile(CLOCK, re.IGNORECASE)
-_TITLES = {"time", "timestamp", "t", "date"}
+_TITLES = ("time", "timestamp", "t", "date")
 
 
 def rules_of_page() -> dict[str, Any]:
@@ -71,7 +71,7 @@ def time_columns(rows: Sequence[Sequence[str]], renamed: Mapping[str, str]) -> d
             title: meanings(words_in(title)) for title, cell in zip(titles, cells, strict=True) if _FIND.search(cell)
         }
         times = sorted(
-            (own for own in words if _TITLES.intersection(words[own])), key=lambda own: words[own] != ["time"]
+            (own for own in words if set(_TITLES).intersection(words[own])), key=lambda own: words[own] != ["time"]
         )
         found |= dict.fromkeys(times[:1], "time [s]")
     if not any(map(KnownColumns({"date": DATE}).has, titles)):
