@@ -138,6 +138,21 @@ class Data:
         keys = ("innovations", "variances", "slopes", "log_slopes")
         return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
 
+    def leading(self, scale: Array) -> int | None:
+        """Return the parameter of these data that changes most along a direction (p), if any does."""
+        most = max(self.places, key=lambda k: abs(scale[k]), default=None)
+        return most if most is not None and scale[most] else None
+
+    def separate(self, scale: Array) -> None:
+        """Take the derivatives with respect to a direction, which the leading parameter has, apart into its own."""
+        leading = self.leading(scale)
+        if leading is None:
+            return
+        column, share = self.places.index(leading), scale[[*self.places]] / scale[leading]
+        share[column] = 0.0
+        for slopes in (self.slopes, self.log_slopes):
+            slopes[:, column] -= slopes @ share
+
     @property
     def normalised(self) -> Array:
         return self.innovations / np.sqrt(self.variances)
@@ -373,8 +388,11 @@ class Objective:
         with respect to the noise are of earlier data, if these are given. All contain the changes of the gains of the
         filter. Without these, the common scale of all forces, which the motion does not tell, would look determined,
         and where the model does not explain a log, half of a gradient would have the wrong sign.
+
+        This scale would also look determined by the errors of differences, which are large at a kink of the motion.
+        One of its parameters therefore moves together with all others, and its own derivatives are what is left.
         """
-        parameters = self.table.parameters
+        parameters, scale = self.table.parameters, self.table.scale_of_forces(z)
         found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
             places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
@@ -388,8 +406,10 @@ class Objective:
                     found[n].log_slopes[:, column] = of_noise[n].log_slopes[:, column]
             for first in range(0, len(columns), _TOGETHER):
                 some = columns[first : first + _TOGETHER]
-                work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
+                work.append(partial(self.differentiate, z, n, some, run, found[n], scale, exact=exact))
         in_threads(work)
+        for one in found:
+            one.separate(scale)
         if self.rows:
             found.append(self._rows_data(z))
         return found
@@ -401,19 +421,24 @@ class Objective:
         columns: Sequence[int],
         run: Run,
         into: Data,
+        scale: Array,
         *,
         exact: bool,
     ) -> None:
         """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
         The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
-        sides.
+        sides. Those of the leading parameter of a common scale are with respect to this scale.
         """
         parameters = [self.table.parameters[into.places[column]] for column in columns]
         moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        sets = self.table.of_log(changed(z, moves), self.logs[n])
+        moved = changed(z, moves)
+        for column, (k, step) in enumerate(moves):
+            if k == into.leading(scale):
+                moved[:, column] = z + step * scale / scale[k]
+        sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
         for column, own in zip(columns, parameters, strict=True):
             k = into.places[column]

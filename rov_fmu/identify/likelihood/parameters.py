@@ -127,6 +127,12 @@ class Table:
         """Return a number of each parameter, such as its `mean`, or `of_kind.is_size`."""
         return np.array([*map(attrgetter(key), self.parameters)])
 
+    def scale_of_forces(self, z: Array) -> Array:
+        """Return the direction, p, along which thrust, drag, load and inertia grow alike. The motion stays the same."""
+        power = self.each("of_kind.force_power")
+        from_null = z - np.array([p.null or 0.0 for p in self.parameters])
+        return np.where(self.each("is_log"), power, power * from_null)
+
     def place(self, kind: str, of: str = "", part: str = "") -> int | None:
         """Return the index of a parameter, or None."""
         return self._places.get((kind, of, part))

@@ -43,12 +43,21 @@ class Posterior:
 
     @classmethod
     def of(cls, table: Table, z: Array, information: Array, absent: Collection[int] = ()) -> "Posterior":
-        """Return the posterior for the second derivatives of J."""
+        """Return the posterior for the second derivatives of J.
+
+        The common scale of all forces, of which the motion tells nothing, is a coordinate of its own in place of one of
+        its parameters. What the priors tell of it would be lost in rounding beside what exact data tell of each.
+        """
         free = [n for n in range(len(z)) if n not in absent]
-        H = information[np.ix_(free, free)] / 2.0
-        scale = np.sqrt(np.diag(H))  # parameters differ by many orders of magnitude
-        values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-        root = vectors / np.sqrt(np.maximum(values, _LEAST)) / scale[:, None]
+        forces = table.scale_of_forces(z)[free]
+        basis = np.eye(len(free))
+        if forces.any():
+            most = np.argmax(np.abs(forces))
+            basis[:, most] = forces / forces[most]
+        H = basis.T @ information[np.ix_(free, free)] @ basis / 2.0
+        sizes = np.sqrt(np.diag(H))  # parameters differ by many orders of magnitude
+        values, vectors = np.linalg.eigh(H / np.outer(sizes, sizes))
+        root = basis @ (vectors / np.sqrt(np.maximum(values, _LEAST)) / sizes[:, None])
         covariance = np.zeros_like(information)
         covariance[np.ix_(free, free)] = root @ root.T
         return cls(table, z, covariance, frozenset(absent))
