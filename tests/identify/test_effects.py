@@ -304,7 +304,7 @@ def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
     u, speeds = 0.0, list[float]()
 
     def drag(v: float) -> float:
-        return 38.0 * abs(v) * v / max(abs(2.0 * v), 1e-9) ** 0.5 + 4.0 * v
+        return 38.0 * abs(v) * v / float(np.sqrt(max(abs(2.0 * v), 1e-9))) + 4.0 * v
 
     for c in HELD:
         rate = partial(lambda _, x, c: [(78.0 * c * abs(c) - drag(x[0])) / 31.0], c=c)

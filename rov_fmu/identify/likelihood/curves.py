@@ -214,7 +214,7 @@ class Motions:
         return not (np.any(self.power) or np.any(self.power_astern))
 
     def _power(self, side: Array) -> Array:
-        return np.where(side < 0.0, self.power_astern, self.power)
+        return np.asarray(np.where(side < 0.0, self.power_astern, self.power))
 
     def response(self) -> tuple[Array, Array]:
         """Return V_ss, and Tau of (17), from rest."""

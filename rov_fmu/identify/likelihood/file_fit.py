@@ -44,8 +44,8 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     """
     absent = _without_evidence(Posterior.of(objective.table, best.z, best.information))
     if absent:
-        best = _exact(objective, absent, best)
-    least, is_exact = best, True
+        (best,) = refits(objective, best, [objective.whole], [absent])
+    least, is_exact = best, not absent
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
         order = [*_weakest(posterior, least.value - best.value)]

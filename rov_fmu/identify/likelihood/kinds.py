@@ -339,8 +339,8 @@ KINDS = {
         adapts=True,
     ),
     POWER: Kind(
-        Deviation("drag_power", 0.3, "the power of the quadratic drag, less 2", "measured drag has 1.5 to 2.5"),
-        "power of the quadratic drag, less 2",
+        Deviation("drag_power", 0.3, "the excess of the power of drag over 2", "measured drag has 1.5 to 2.5"),
+        "excess of the power of drag over 2",
         _NEAREST,
         told_by=("log", "steady"),
         of_axis=_power(),
@@ -352,8 +352,8 @@ KINDS = {
         needs_evidence=True,
     ),
     POWER_ASTERN: Kind(
-        Deviation("drag_power_astern", 0.2, "the power of the quadratic drag astern, less that ahead", "as of drag"),
-        "power of the quadratic drag astern, less that ahead",
+        Deviation("drag_power_astern", 0.2, "the excess of the power of drag astern over that ahead", "as of drag"),
+        "excess of the power of drag astern over that ahead",
         _NEAREST,
         keys=("a_d_reverse", "b_d_reverse"),
         told_by=("log", "astern"),

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from math import exp
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -107,7 +107,8 @@ def test_a_motion_with_another_power_of_drag(command: float, power: float) -> No
     k, typical = extended(VIDEORAY, F_0_w=0.1, a_d_w_reverse=14.0), 0.3
     own, other = np.array([power, 0.5 * power]), np.zeros(2)
     powers = {"heave": (own, other, typical) if command > 0.0 else (other, own, typical)}
-    rovs = Vehicle(k.layout, {name: np.full(2, value) for name, value in k.coefficients.items()})
+    many: dict[str, Any] = {name: np.full(2, value) for name, value in k.coefficients.items()}
+    rovs = Vehicle(k.layout, many)
     motions, rest = (Shapes({}, powers=powers).motions(rovs, HEAVE, np.array([c])) for c in (command, 0.0))
     V, Tau = motions.response()
     (speed, _), (time, _), (way, _) = V[0], Tau[0], rest.stopping_distance(V, 0.1)[0]

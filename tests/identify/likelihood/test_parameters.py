@@ -155,11 +155,13 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     sideways = of("slow velocity", "horizontal")
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
-    for p, axis in ((one, HEAVE), (other, SURGE)):
-        ((q, astern, V),) = p.powers
-        assert (q, astern - q) == pytest.approx([of(f"power of drag{end}", axis.name) for end in ("", " astern")])
-        a, b = (base[axis.coefficient(key)] for key in ("a_d", "b_d"))
-        assert a * V * V + b * V == pytest.approx(0.25 * table.full[axis.name]), "a quarter of full thrust"
+    for p, tested in ((one, HEAVE), (other, SURGE)):
+        ((q, astern, typical),) = p.powers
+        more = [of(f"power of drag{end}", tested.name) for end in ("", " astern")]
+        assert np.array([q, astern - q]) == pytest.approx(more)
+        quadratic, linear = (base[tested.coefficient(key)] for key in ("a_d", "b_d"))
+        quarter = 0.25 * table.full[tested.name]
+        assert quadratic * typical**2 + linear * typical == pytest.approx(quarter), "of full thrust"
     assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "to the north")]
 
 
