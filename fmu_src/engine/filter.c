@@ -3,7 +3,7 @@
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *
  *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
- *     a |v|^(1 + q) v                      in place of the quadratic drag a |v| v of an axis, with |v| relative to a typical velocity;
+ *     a |v| v |v/V|^q                      the drag of an axis in place of a |v| v, with a typical velocity V;
  *                                          q may differ astern
  *     force_i, g, drift_i                  a slow force and a short one along each axis, a slow change of all thrust, and a slow velocity
  *                                          over ground: Ornstein-Uhlenbeck processes, each with a size and a time constant
@@ -103,7 +103,7 @@ typedef struct {
     real lag[MOST_SENSORS];                 /* the time constant of each sensor, s */
     real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
-    real power[2][N_AXES], typical[N_AXES]; /* ahead and astern, drag a |v| v of an axis is a |v| v |v / typical|^power instead */
+    real power[2][N_AXES], typical[N_AXES]; /* of drag a |v| v |v / typical|^power, ahead and astern */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
                                                  the time between two rows */
 } parameters;

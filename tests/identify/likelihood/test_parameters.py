@@ -156,9 +156,9 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
     for p, tested in ((one, HEAVE), (other, SURGE)):
-        ((q, astern, typical),) = p.powers
+        ((q, back, typical),) = p.powers
         more = [of(f"power of drag{end}", tested.name) for end in ("", " astern")]
-        assert np.array([q, astern - q]) == pytest.approx(more)
+        assert np.array([q, back - q]) == pytest.approx(more)
         quadratic, linear = (base[tested.coefficient(key)] for key in ("a_d", "b_d"))
         quarter = 0.25 * table.full[tested.name]
         assert quadratic * typical**2 + linear * typical == pytest.approx(quarter), "of full thrust"
