@@ -306,13 +306,13 @@ def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
     def drag(v: float) -> float:
         return 38.0 * abs(v) * v / float(np.sqrt(max(abs(2.0 * v), 1e-9))) + 4.0 * v
 
-    for c in HELD:
+    for c in HELD[:9]:
         rate = partial(lambda _, x, c: [(78.0 * c * abs(c) - drag(x[0])) / 31.0], c=c)
         held = solve_ivp(rate, (0.0, 4.0), [u], "DOP853", t_eval=np.linspace(0.0, 4.0, 21), rtol=1e-9, atol=1e-9).y[0]
         speeds += held[:-1].tolist()
         u = float(held[-1])
     measured = np.array(speeds) + 0.01 * np.random.default_rng(1).standard_normal(len(speeds))
-    columns = {"time [s]": 0.2 * np.arange(300), "command [1]": np.repeat(HELD, 20), "velocity [m/s]": measured}
+    columns = {"time [s]": 0.2 * np.arange(180), "command [1]": np.repeat(HELD[:9], 20), "velocity [m/s]": measured}
     mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
     result = identified(tmp_path, f"{HEAD}[known]\n{mass}{THRUST}", columns, "log_surge.csv")
     (surge,) = result.axes
