@@ -1,6 +1,6 @@
 """The answers about each axis that an owner asks for: how fast it goes, how soon, and how far until it stops."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -31,8 +31,6 @@ EXACT = 0.01
 ROCKING = 0.03
 """Nor is a V_ss to better than 3 % where the vehicle may have rocked unseen, which raises its drag by 3 to 7 %."""
 _STOPPED = 0.1
-_REACHED = 0.98
-"""The quantile of the speeds that tells what a log tests: what lasts shorter is no test."""
 _GRID = np.linspace(0.0, 1.0, 101)
 """The commands among which the one is found that holds a speed."""
 _DRAWS = 256
@@ -52,18 +50,13 @@ def tested_commands(objective: Objective, z: Array) -> dict[Axis, Tested]:
         if not isinstance(row.subject, Curve) and row.quantity == "V_ss":
             ends[row.subject][row.command > 0.0] = max(ends[row.subject][row.command > 0.0], abs(row.command))
     for n, one in enumerate(objective.logs):
-        velocities = dict(
-            zip(objective.filters[n].vehicle_states, objective.run(z, n, with_states=True).states.T, strict=False)
-        )
         commands = dict(zip(one.layout.inputs, objective.table.followed(z, one).T, strict=True))
         of_thrusters = {t.name: commands[f"u_{t.name}"] for t in one.layout.thrusters}
-        for axis in {m.sensor.axis for m in one.measured}:
+        for axis, speeds in objective.reached(z, n).items():
             push = push_along(one.layout, axis, of_thrusters)
-            for is_ahead, sign in enumerate((-1.0, 1.0)):
-                speeds = sign * velocities[axis.velocity]
-                if np.any(speeds > 0.0):
+            for is_ahead, (sign, reached) in enumerate(zip((-1.0, 1.0), speeds, strict=True)):
+                if reached:
                     held = sign * shapes.motions(vehicle, axis, sign * _GRID).response()[0]
-                    reached = np.quantile(speeds[speeds > 0.0], _REACHED)
                     tested = np.interp(reached, np.maximum.accumulate(np.nan_to_num(held)), _GRID)
                     ends[axis][is_ahead] = max(ends[axis][is_ahead], min(float(tested), float(np.max(sign * push))))
     return {axis: (astern, ahead) for axis, (astern, ahead) in ends.items()}
@@ -101,9 +94,9 @@ def _responses_of(
             return responses
         times = modelled([TableRow("", axis, "Tau", c, 1.0, 1.0) for c in commands], vehicle, shapes)
         return np.concatenate([responses, times[:, None]], axis=1)
-    full = shapes.motions(vehicle, axis, np.ones(1)).of
-    push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
-    return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
+    full, C = shapes.motions(vehicle, axis, np.ones(1)), rest.of["C"]
+    push = np.reshape(pushes, (-1, *[1] * (C.ndim - 1)))
+    return _responses(replace(full, of={**full.of, "C": C + push * (full.of["C"] - C)}), rest)
 
 
 def logarithms(
@@ -136,6 +129,7 @@ def answers(
     pushes: Sequence[float] = (),
     fits: Sequence[Posterior] = (),
     least: float = EXACT,
+    speeds: Mapping[str, float] | None = None,
 ) -> tuple[Answer, ...]:
     """Return how fast, how long and how far the vehicle goes, for some commands of an axis.
 
@@ -145,6 +139,9 @@ def answers(
     answers of those of `fits`, which lack a part of the data, that disagree with the last posterior: the difference of
     a fit to all data and of one to a part has the variance by which theirs differ (Hausman 1978,
     doi:10.2307/1913827).
+
+    Where drag has another power, the file has the nearest quadratic one up to the largest tested speeds, `speeds`. By
+    how much it changes an answer is an error to either side: no law is exact.
 
     The lag and the time without it share what the tests tell about their sum, so the interval of the time with the lag
     is its own. Thrusters beside logs with a wrench have none: no test shows their lag.
@@ -167,7 +164,11 @@ def answers(
         variances += beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
-        ends += [middle - half, middle + half]
+        quadratic = logarithms(
+            posterior.table.of_file(posterior.z, speeds or {}), axis, commands, pushes, with_lag=with_lag
+        )
+        misfit = np.abs(quadratic(posterior.z[:, None]).reshape(own.shape) - middle)
+        ends += [middle - half, middle + half, own - misfit, own + misfit]
     for fit in fits:
         other = fitted(fit.z[:, None]).reshape(own.shape)
         lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)

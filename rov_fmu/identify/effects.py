@@ -33,8 +33,9 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         value, interval = _number(fit, n)
         posterior = fit.posterior if n in file.absent else file
         name = p.of_kind.words + (f" {p.part}" if p.part else "") + _beside_base(file.table, p)
-        is_usual = p.log is not None or p.of_kind.is_of_structure
-        beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / p.deviation
+        is_right = any(axis.name == p.of and one.ratio < 1.0 for axis, one in fit.structure.items())
+        is_usual = p.log is not None or p.of_kind.is_of_structure or (p.of_kind.is_usual_if_right and is_right)
+        beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
         evidence, least = odds.get((p.kind, p.of), posterior.evidence(n)), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
 

@@ -145,7 +145,7 @@ def _axis(
         commands = assess.commands_of_answers(tested_own)
         pushes = [push(c) for c in commands] if push else []
         posteriors = (*fit.rivals, *fit.posteriors)
-        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, fits, least)
+        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, fits, least, fit.speeds)
         answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]

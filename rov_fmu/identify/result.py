@@ -25,8 +25,6 @@ Tested = tuple[float, float]
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
-_UNUSUAL = 2.5
-"""An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 _NOTHING = 0.001
 """The share of the thrust or of the velocity below which a slow process without strong evidence is none."""
 
@@ -180,7 +178,7 @@ class Effect:
     evidence: float
     """2 ln of the Bayes factor of the model with it against the model without it."""
     beyond: float = 0.0
-    """How many deviations of its prior it is from the usual size; 0 for what a single log has."""
+    """How far it is from the usual size, relative to where it is unusual; 0 for what a single log has."""
     least: float = -inf
     """The smallest value that the sampling shows."""
 
@@ -192,7 +190,7 @@ class Effect:
     @property
     def is_unusual(self) -> bool:
         """True if it is so large that something else may act in its place."""
-        return self.kept and self.beyond > _UNUSUAL
+        return self.kept and self.beyond > 1.0
 
     @property
     def kept(self) -> bool:

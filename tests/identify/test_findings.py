@@ -233,7 +233,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "unusual effect",
         quiet(effects=(SLOW,)),
         "the time constant of the thrusters of 0.60 s (0.50 to 0.70) is unusual. Something else may act in its place",
-        quiet(effects=(replace(SLOW, beyond=2.4),)),
+        quiet(effects=(replace(SLOW, beyond=0.96),)),
     ),
     (
         "change of thrust",

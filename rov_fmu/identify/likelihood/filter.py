@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rov_fmu.c.compile import FILTER_FILE, FILTER_LANES_FILE
 from rov_fmu.c.library import load_library
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.kinds import Action
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -121,6 +121,9 @@ class Parameters:
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
     lags: tuple[Number | None, ...] = ()
     """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
+    powers: tuple[tuple[Number, Number, float], ...] = ()
+    """By axis: q ahead and astern, and V, of the drag a |v| v |v/V|^q in place of the quadratic one. Empty: all are
+    quadratic."""
     offset: Number = 0.0
     """How much later than its row a command acts, s."""
     width: Number = 0.0
@@ -320,6 +323,7 @@ class Filter:
         axes = [form.axis.name for form in self.layout.axes]
         for first, names in ((0, self.vehicle_states), (self.force, axes), (self.short, axes)):
             units[first : first + len(names)] = [parameters.units.get(name, 1.0) for name in names]
+        powers = parameters.powers or ((0.0, 0.0, 1.0),) * len(axes)
         columns = [
             *at,
             *(one.size for one in slow),
@@ -328,6 +332,7 @@ class Filter:
             *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
             *(part for lever in levers for part in lever),
             *units,
+            *(number for column in zip(*powers, strict=True) for number in column),
             *(parameters.offset, parameters.width),
         ]
         found = np.empty((parameters.count, len(columns)))
@@ -400,8 +405,10 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
         return [places[name] if name in among else -1 for name in names]
 
     axes = layout.bare_axes
+    drags = [[form.coefficient(key) for key in ("a_d", f"a_d{REVERSE}")] for form in layout.axes]
     return [
         *of([axis.external for axis in axes], layout.inputs),
+        *(max(place, 0) for column in zip(*drags, strict=True) for place in of(column, places)),
         *(-1 if axis.is_rotation else axis.place for axis in axes),
         *(axis.place if axis.is_rotation else -1 for axis in axes),
         *of(_CURRENT, layout.inputs),

@@ -31,6 +31,7 @@ from rov_fmu.identify.likelihood.search import (
 )
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, QUICK, Minimum, evidence, evidence_at, minimise, scaled
 from rov_fmu.identify.result import KEPT
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 
@@ -78,6 +79,15 @@ class Fit:
     def most_followed(self) -> float:
         """The strongest command that the thrusters follow."""
         return min(float(self.file.posterior.table.limit(self.file.posterior.z)), 1.0)
+
+    @cached_property
+    def speeds(self) -> dict[str, float]:
+        """The largest speed along each axis that logs and steady tables test, by its name, m/s or rad/s."""
+        logs = (self.objective.reached(self.best.z, n) for n in range(len(self.objective.logs)))
+        some = [(axis.name, max(ends)) for reached in logs for axis, ends in reached.items()]
+        steady = (row for row in self.objective.rows if row.quantity == "V_ss")
+        some += [(row.subject.name, abs(row.measured)) for row in steady]
+        return {name: max(speeds) for name, speeds in grouped(some).items()}
 
     @cached_property
     def command_range(self) -> tuple[float, float]:

@@ -43,6 +43,8 @@ Samples = tuple[Array, Array]
 """Innovations and their variances."""
 _TOGETHER = 8
 """The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
+_REACHED = 0.98
+"""The quantile of the speeds that tells what a log tests: what lasts shorter is no test."""
 _LEAST_DELAY = 1e-9
 """A lag that differs from none, s."""
 OUTLYING = 3.0
@@ -259,6 +261,20 @@ class Objective:
         """
         parameters = (table or self.table).of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
+
+    def reached(self, z: Array, number: int) -> dict[Axis, tuple[float, float]]:
+        """Return the largest speeds astern and ahead along the axes that a log measures; 0 without any.
+
+        They are those reached for long enough, so that the log tests them.
+        """
+        states = self.run(z, number, with_states=True).states.T
+        velocities = dict(zip(self.filters[number].vehicle_states, states, strict=False))
+
+        def largest(speeds: Array) -> float:
+            return float(np.quantile(speeds[speeds > 0.0], _REACHED)) if np.any(speeds > 0.0) else 0.0
+
+        measured = {m.sensor.axis: velocities[m.sensor.axis.velocity] for m in self.logs[number].measured}
+        return {axis: (largest(-v), largest(v)) for axis, v in measured.items()}
 
     def changes(
         self, z: Array, n: int, places: Sequence[int], steps: Array, run: Run, begin: float, span: float

@@ -114,6 +114,14 @@ class Posterior:
         after, before = ((self.z[place] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
         return float(after - before + 2.0 * log(error / p.deviation))
 
+    def without(self, place: int) -> "Posterior":
+        """Return the posterior given that an effect is absent."""
+        column, null = self.covariance[:, place], self.table.parameters[place].null
+        assert null is not None
+        share = column / max(column[place], 1e-300)
+        z, covariance = self.z - share * (self.z[place] - null), self.covariance - np.outer(share, column)
+        return replace(self, z=z, covariance=covariance, absent=self.absent | {place})
+
     def slopes(self, function: Callable[[Array], Array]) -> Array:
         """Return the derivatives of m numbers of the vehicle with respect to the p coordinates, m x p.
 

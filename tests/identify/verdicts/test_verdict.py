@@ -77,7 +77,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
         ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
-        ({"effects": [replace(SLOW, beyond=2.4)]}, "good", ""),
+        ({"effects": [replace(SLOW, beyond=0.96)]}, "good", ""),
         ({"is_assumed": True}, "usable", "The mass and the thrusters are assumed."),
         ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
         (
