@@ -14,11 +14,11 @@ from tests.commands import REFIT, TESTS
 from tests.identify.conftest import Identified
 
 HELD_OUT = {
-    ("surge", "V_ss"): 0.0985,
-    ("heave", "V_ss"): 0.0674,
-    ("heave", "Tau"): 0.0651,
-    ("yaw", "V_ss"): 0.1777,
-    ("yaw", "Tau"): 0.1274,
+    ("surge", "V_ss"): 0.0828,
+    ("heave", "V_ss"): 0.0709,
+    ("heave", "Tau"): 0.0665,
+    ("yaw", "V_ss"): 0.1940,
+    ("yaw", "Tau"): 0.1595,
 }
 """The largest RMS relative errors of predictions by a fit without the rows of the same thrust: as measured, plus 3 %.
 
