@@ -3,6 +3,8 @@
  * The model is a stochastic differential equation around the vehicle's equation of motion:
  *
  *     x' = f(x, exp(g) thrust, force)      the states of the vehicle
+ *     a |v| v |v/V|^q                      the drag of an axis in place of a |v| v, with a typical velocity V;
+ *                                          q may differ astern
  *     force_i, g, drift_i                  a slow force and a short one along each axis, a slow change of all thrust, and a slow velocity
  *                                          over ground: Ornstein-Uhlenbeck processes, each with a size and a time constant
  *     v = h(x, drift)                      what a sensor would measure at once; h knows its place
@@ -64,6 +66,7 @@ enum { STATE, OVER_GROUND, ANGLE };
 /* Where the filter finds what it needs in the layout. A place is -1 where the vehicle has no such variable. */
 typedef struct {
     int external[N_AXES];    /* the inputs of force or torque along each axis */
+    int drag[2][N_AXES];     /* the coefficients of the quadratic drag along each axis, ahead and astern */
     int direction[N_AXES];   /* 0 for a velocity ahead, 1 to starboard, 2 down, -1 for a turn */
     int turn[N_AXES];        /* 0 for roll, 1 for pitch, 2 for yaw, -1 for a velocity along an axis */
     int current[N_DRIFTS];   /* the inputs of the current: north, east, down */
@@ -84,6 +87,7 @@ typedef struct {
     const double *start, *error; /* the states at the first sample, and their standard deviations; N_X numbers each */
     const int *active;           /* for each state, whether it has a covariance; N_X numbers */
     ptrdiff_t tilts;             /* the times at which the roll and pitch of a vehicle that has neither state are known, or 0 */
+    ptrdiff_t wanders;           /* 1 if the horizontal drift is an error of the velocities, which the positions do not have */
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
@@ -99,6 +103,7 @@ typedef struct {
     real lag[MOST_SENSORS];                 /* the time constant of each sensor, s */
     real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
+    real power[2][N_AXES], typical[N_AXES]; /* of drag a |v| v |v / typical|^power, ahead and astern */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
                                                  the time between two rows */
 } parameters;
@@ -403,6 +408,22 @@ static void scale_health(const filter *f, const real x[N_X])
 }
 #endif
 
+#if LANES == 1
+static real logarithm(real x)
+{
+    return log(x);
+}
+#endif
+
+/* Return the force along an axis by which its drag differs from a quadratic one. */
+static real beside_quadratic(const filter *f, int i, real v)
+{
+    const real size = fabs(v), relative = fmax(size / f->set->typical[i], TINY);
+    const real a = v < 0.0 ? f->set->at[f->where->drag[1][i]] : f->set->at[f->where->drag[0][i]];
+    const real power = v < 0.0 ? f->set->power[1][i] : f->set->power[0][i];
+    return a * size * v * (1.0 - exp(power * logarithm(relative)));
+}
+
 /* Compute the rates of the vehicle's states under the thrust in q, whose other numbers change. */
 static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N_STATES])
 {
@@ -414,6 +435,9 @@ static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N
 #endif
     for (int i = 0; i < N_AXES; i++) {
         at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i] + x[SHORT + i];
+        if (ANY(f->set->power[0][i] != 0.0) || ANY(f->set->power[1][i] != 0.0)) {
+            at[f->where->external[i]] += beside_quadratic(f, i, x[i]);
+        }
     }
     if (tilts) { /* the load along heave is a net weight, which stays vertical */
         rotation(f, x, R);
@@ -435,7 +459,7 @@ static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N
             if (tilts) {
                 *position = over_ground(f, x, R[i], i);
             }
-            *position += x[DRIFT + i];
+            *position += f->log->wanders && i < 2 ? (real)0.0 : x[DRIFT + i];
         }
     }
     if (tilts && f->where->heading >= 0) {

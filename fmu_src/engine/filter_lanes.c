@@ -49,6 +49,21 @@ static real lanes_exp(real x)
     return x > 700.0 ? (real)HUGE_VAL : sum;
 }
 
+/* Return ln(x) for a normal x > 0: that of a power of 2, and the series of the inverse hyperbolic tangent. */
+static real logarithm(real x)
+{
+    typedef long long integers __attribute__((ext_vector_type(LANES)));
+    const integers bits = __builtin_bit_cast(integers, x);
+    const integers power = (bits - 0x3fe6a09e667f3bcdLL) >> 52; /* from the root of 1/2 on */
+    const real m = __builtin_bit_cast(real, bits - (power << 52)), count = __builtin_convertvector(power, real);
+    const real t = (m - 1.0) / (m + 1.0), s = t * t;
+    real sum = 0.0;
+    for (int n = 21; n > 0; n -= 2) {
+        sum = 1.0 / n + s * sum;
+    }
+    return count * 6.93147180369123816490e-01 + (count * 1.90821492927058770002e-10 + 2.0 * t * sum);
+}
+
 /* Return the angle of a vector: the series of the arctangent is used up to a sixteenth of a turn. */
 static real lanes_angle(real y, real x)
 {

@@ -178,10 +178,15 @@ def _steps(vehicle: Vehicle) -> Iterator[_Experiment]:
     A vehicle that is tuned takes each step with its tuning and without, so that the tunable parameters have an effect.
     """
     is_tuned = any(vehicle[name] != 1.0 for name in vehicle.layout.tuning)
-    percent = round(100.0 * min(1.0, vehicle.command_range[1]), 6)
     for axis in filter(vehicle.layout.signs, vehicle.layout.bare_axes):
+        percent = round(100.0 * _strongest(vehicle, axis), 6)
         for name, model in {"tuned": vehicle, "untuned": vehicle.untuned}.items() if is_tuned else [("", vehicle)]:
             yield _step(model, axis, percent, name)
+
+
+def _strongest(vehicle: Vehicle, axis: Axis) -> float:
+    """Return the strongest tested command ahead, or that of all thrusters where no test of the axis drives it ahead."""
+    return vehicle.tested_along(axis)[1] or vehicle.command_range[1]
 
 
 def _step(vehicle: Vehicle, axis: Axis, percent: float, tuning: str) -> _Experiment:
@@ -249,7 +254,7 @@ def _manoeuvre(vehicle: Vehicle) -> _Experiment:
         fractions = dict.fromkeys(layout.commands, 0.0)
         for axis in filter(layout.has, shares):
             for name, sign in layout.signs(axis).items():
-                fractions[name] = round(fractions[name] + shares[axis] * sign * vehicle.command_range[1], 6)
+                fractions[name] = round(fractions[name] + shares[axis] * sign * _strongest(vehicle, axis), 6)
         commands = {name: layout.command_of(max(-1.0, min(1.0, x))) for name, x in fractions.items()}
         others = {name: declaration for name, declaration in layout.inputs.items() if name not in commands}
         phases.append(

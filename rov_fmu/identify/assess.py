@@ -1,6 +1,6 @@
 """The answers about each axis that an owner asks for: how fast it goes, how soon, and how far until it stops."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -8,31 +8,70 @@ import numpy as np
 from scipy.stats.qmc import Sobol
 
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
-from rov_fmu.identify.likelihood.objective import TableRow, modelled
+from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import Answer
+from rov_fmu.identify.likelihood.records import push_along
+from rov_fmu.identify.result import LEAST_TESTED, Answer, Tested, are_alike
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
 
-COMMANDS = (0.3, -0.3, 0.5, -0.5)
-"""The commands whose answers the verdict needs."""
-ANSWERED = (*COMMANDS, 1.0, -1.0)
-"""The commands of all answers."""
+COMMANDS = (0.3, -0.3, 0.5, -0.5, 1.0, -1.0)
+"""The commands of the answers. The strongest tested ones are added."""
 _EXPONENT = 0.15
 """The standard deviation of ln V_ss per ln of a command beyond those of the tests: thrust and drag grow with powers
 of the command and the velocity that are known to about a tenth each."""
 _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
 EXACT = 0.01
-"""No answer is claimed to better than 1 %."""
+"""No answer is claimed to better than 1 %, also if nothing that determines it is fitted."""
 ROCKING = 0.03
 """Nor is a V_ss to better than 3 % where the vehicle may have rocked unseen, which raises its drag by 3 to 7 %."""
 _STOPPED = 0.1
+_GRID = np.linspace(0.0, 1.0, 101)
+"""The commands among which the one is found that holds a speed."""
 _DRAWS = 256
 """The number of vehicles that are drawn from the estimates of a vehicle file."""
+
+
+def tested_commands(objective: Objective, z: Array) -> dict[Axis, Tested]:
+    """Return the strongest command along each axis, astern and ahead, that logs and steady tables of this axis test.
+
+    That of a table is its command. That of a log is the command which holds the speed that the vehicle reached for long
+    enough, but at most the strongest one that its thrusters got. Tables of thrust, other axes and single thrusters do
+    not count.
+    """
+    vehicle, shapes = objective.table.model(z)
+    ends = {axis: [0.0, 0.0] for axis in vehicle.layout.bare_axes}
+    for row in objective.rows:
+        if not isinstance(row.subject, Curve) and row.quantity == "V_ss":
+            ends[row.subject][row.command > 0.0] = max(ends[row.subject][row.command > 0.0], abs(row.command))
+    for n, one in enumerate(objective.logs):
+        commands = dict(zip(one.layout.inputs, objective.table.followed(z, one).T, strict=True))
+        of_thrusters = {t.name: commands[f"u_{t.name}"] for t in one.layout.thrusters}
+        for axis, speeds in objective.reached(z, n).items():
+            push = push_along(one.layout, axis, of_thrusters)
+            for is_ahead, (sign, reached) in enumerate(zip((-1.0, 1.0), speeds, strict=True)):
+                if reached:
+                    held = sign * shapes.motions(vehicle, axis, sign * _GRID).response()[0]
+                    tested = np.interp(reached, np.maximum.accumulate(np.nan_to_num(held)), _GRID)
+                    ends[axis][is_ahead] = max(ends[axis][is_ahead], min(float(tested), float(np.max(sign * push))))
+    return {axis: (astern, ahead) for axis, (astern, ahead) in ends.items()}
+
+
+def strongest_of(tested: Tested, command: float) -> float:
+    """Return the strongest tested command in the direction of a command; without any, that in the other direction."""
+    own = tested[command > 0.0]
+    return max(own if own >= LEAST_TESTED else max(tested), LEAST_TESTED)
+
+
+def commands_of_answers(tested: Tested) -> list[float]:
+    """Return the usual commands, and the strongest tested ones that differ from them, in whole percent."""
+    strongest = [round(sign * end, 2) for sign, end in zip((-1.0, 1.0), tested, strict=True) if end >= LEAST_TESTED]
+    return [*COMMANDS, *(c for c in strongest if not any(are_alike(c, usual) for usual in COMMANDS))]
 
 
 def _responses_of(
@@ -55,15 +94,15 @@ def _responses_of(
             return responses
         times = modelled([TableRow("", axis, "Tau", c, 1.0, 1.0) for c in commands], vehicle, shapes)
         return np.concatenate([responses, times[:, None]], axis=1)
-    full = shapes.motions(vehicle, axis, np.ones(1)).of
-    push = np.reshape(pushes, (-1, *[1] * (full["C"].ndim - 1)))
-    return _responses(Motions({**full, "C": rest.of["C"] + push * (full["C"] - rest.of["C"])}), rest)
+    full, C = shapes.motions(vehicle, axis, np.ones(1)), rest.of["C"]
+    push = np.reshape(pushes, (-1, *[1] * (C.ndim - 1)))
+    return _responses(replace(full, of={**full.of, "C": C + push * (full.of["C"] - C)}), rest)
 
 
 def logarithms(
     table: Table,
     axis: Axis,
-    commands: Sequence[float] = ANSWERED,
+    commands: Sequence[float],
     pushes: Sequence[float] = (),
     *,
     with_lag: bool = False,
@@ -85,33 +124,39 @@ def answers(
     posteriors: Sequence[Posterior],
     axis: Axis,
     vehicle: Vehicle,
+    tested: Tested,
+    commands: Sequence[float] = COMMANDS,
     pushes: Sequence[float] = (),
-    strongest: float = 1.0,
     fits: Sequence[Posterior] = (),
     least: float = EXACT,
+    speeds: Mapping[str, float] | None = None,
 ) -> tuple[Answer, ...]:
-    """Return how fast, how long and how far the vehicle goes, for the usual commands of an axis.
+    """Return how fast, how long and how far the vehicle goes, for some commands of an axis.
 
-    `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit. The values are
-    those of the vehicle file, and each interval contains those of all posteriors; that of V_ss is never narrower than
-    `least`. They are wider for commands beyond the strongest one of the tests, and contain the answers of those of
-    `fits`, which lack a part of the data, that disagree with the last posterior: the difference of a fit to all data
-    and of one to a part has the variance by which theirs differ (Hausman 1978, doi:10.2307/1913827).
+    `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit, and `tested` is
+    in this unit. The values are those of the vehicle file, and each interval contains those of all posteriors; that of
+    V_ss is never narrower than `least`. They are wider for commands beyond the strongest tested one, and contain the
+    answers of those of `fits`, which lack a part of the data, that disagree with the last posterior: the difference of
+    a fit to all data and of one to a part has the variance by which theirs differ (Hausman 1978,
+    doi:10.2307/1913827).
+
+    Where drag has another power, the file has the nearest quadratic one up to the largest tested speeds, `speeds`. By
+    how much it changes an answer is an error to either side: no law is exact.
 
     The lag and the time without it share what the tests tell about their sum, so the interval of the time with the lag
     is its own. Thrusters beside logs with a wrench have none: no test shows their lag.
     """
     curves = {vehicle.layout.curve_of[t.name] for t in vehicle.layout.thrusters_along(axis)}
     with_lag = not pushes and any(curve.has_lag for curve in curves)
-    sizes = np.abs(pushes or ANSWERED)
-    of_file = _responses_of(vehicle, NO_SHAPES, axis, ANSWERED, pushes, with_lag=with_lag)
+    of_file = _responses_of(vehicle, NO_SHAPES, axis, commands, pushes, with_lag=with_lag)
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
     narrowest = np.array([least, EXACT, EXACT, EXACT])[: own.shape[1]]
-    beyond = (_EXPONENT * np.log(np.maximum(sizes / strongest, 1.0))) ** 2
+    ratios = [abs(push) / strongest_of(tested, push) for push in pushes or commands]
+    beyond = (_EXPONENT * np.log(np.maximum(ratios, 1.0))) ** 2
     ends = [own - narrowest, own + narrowest]
     for posterior in posteriors:
-        fitted = logarithms(posterior.table, axis, pushes=pushes, with_lag=with_lag)
+        fitted = logarithms(posterior.table, axis, commands, pushes, with_lag=with_lag)
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
             slopes = posterior.slopes(fitted)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
@@ -119,29 +164,42 @@ def answers(
         variances += beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
         middle = fitted(posterior.z[:, None]).reshape(own.shape)
-        ends += [middle - half, middle + half]
+        quadratic = logarithms(
+            posterior.table.of_file(posterior.z, speeds or {}), axis, commands, pushes, with_lag=with_lag
+        )
+        misfit = np.abs(quadratic(posterior.z[:, None]).reshape(own.shape) - middle)
+        ends += [middle - half, middle + half, own - misfit, own + misfit]
     for fit in fits:
         other = fitted(fit.z[:, None]).reshape(own.shape)
         lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
         ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
-    return _finite(axis, of_file, low, high)
+    return _finite(axis, commands, of_file, low, high)
 
 
-def pushes_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> tuple[float, ...]:
-    """Return how hard the usual commands of the thrusters push along an axis, relative to the full force of a wrench.
+def push_of_thrusters(wrench: Vehicle, own: Vehicle, axis: Axis) -> Callable[[float], float] | None:
+    """Return how hard a command of the thrusters pushes along an axis, relative to the full force of a wrench.
 
-    It is empty unless the logs have a wrench, whose full command is its largest force, and the vehicle has thrusters.
+    It is None unless the logs have a wrench, whose full command is its largest force, and the vehicle has thrusters.
     """
     if not (wrench.layout.has_wrench and own.layout.thrusters):
-        return ()
+        return None
 
     def push(vehicle: Vehicle, command: float) -> float:
         at_rest, pushed = NO_SHAPES.motions(vehicle, axis, np.array([0.0, command])).of["C"].tolist()
         return float(pushed - at_rest)
 
-    return tuple(push(own, command) / push(wrench, 1.0) for command in ANSWERED)
+    return lambda command: push(own, command) / push(wrench, 1.0)
+
+
+def commands_that_push(push: Callable[[float], float], tested: Tested) -> Tested:
+    """Return the commands of the thrusters that push as hard as the strongest tested ones of a wrench."""
+    astern, ahead = (
+        float(np.interp(end, np.maximum.accumulate([sign * push(sign * c) for c in _GRID.tolist()]), _GRID))
+        for sign, end in zip((-1.0, 1.0), tested, strict=True)
+    )
+    return astern, ahead
 
 
 def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
@@ -154,18 +212,18 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     drawn = np.vstack([[vehicle[name] for name in known.names], drawn])
     rovs = replace(vehicle, coefficients={**vehicle.coefficients, **dict(zip(known.names, drawn.T, strict=True))})
-    responses = _responses_of(rovs, NO_SHAPES, axis, ANSWERED).reshape(len(ANSWERED), 3, -1)
+    responses = _responses_of(rovs, NO_SHAPES, axis, COMMANDS).reshape(len(COMMANDS), 3, -1)
     values = responses[..., 0]
     low, high = values, values
     if known.names:
         low, high = np.quantile(responses[..., 1:], (0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL), axis=-1)
-    return _finite(axis, values, low, high)
+    return _finite(axis, COMMANDS, values, low, high)
 
 
-def _finite(axis: Axis, values: Array, low: Array, high: Array) -> tuple[Answer, ...]:
-    """Return the answers that are finite, for the usual commands: c x 3 or 4 values and the ends of their intervals."""
+def _finite(axis: Axis, commands: Sequence[float], values: Array, low: Array, high: Array) -> tuple[Answer, ...]:
+    """Return the answers that are finite, for c commands: c x 3 or 4 values and the ends of their intervals."""
     finite = []
-    for command, numbers in zip(ANSWERED, np.stack([values, low, high], axis=-1).tolist(), strict=True):
+    for command, numbers in zip(commands, np.stack([values, low, high], axis=-1).tolist(), strict=True):
         steady, rise, stop, *lagged = ((value, (least, most)) for value, least, most in numbers)
         if steady[0] and isfinite(steady[0]) and isfinite(rise[0]):
             finite.append(Answer(axis, command, steady, rise, stop, *lagged))

@@ -2,19 +2,19 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, pi
+from math import inf, nan, pi
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import Variant, probability
-from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OFFSET, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
 from rov_fmu.identify.likelihood.posterior import around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
-from rov_fmu.identify.result import Effect, Logging, SensorNoise, Structure
+from rov_fmu.identify.result import Effect, Estimate, Logging, SensorNoise, Structure
 from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
@@ -22,19 +22,31 @@ _OUTLIER = 6.0
 
 
 def effects_of(fit: Fit) -> Iterator[Effect]:
-    """Yield all optional effects with their evidence, beside those that are kept."""
-    file = fit.file.posterior
+    """Yield all optional effects with their evidence, beside those that are kept.
+
+    That of a hypothesis about the structure, which is no effect of unusual size, is that with which it won.
+    """
+    file, odds = fit.file.posterior, {one.variant.parameter: one.odds for one in fit.adopted}
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
-        posteriors, kind = (fit.posterior,) if n in file.absent else fit.posteriors, p.of_kind
-        numbers = [p.number(one.ends(n)) for one in posteriors]
-        numbers = [(np.exp(one) if kind.is_ratio else one).tolist() for one in numbers]
-        posterior, value, interval = posteriors[0], numbers[0][0], hull(*((low, high) for _, low, high in numbers))
-        name = kind.words + (f" {p.part}" if p.part else "") + _beside_base(file.table, p)
-        beyond = abs(posterior.z[n] - p.mean) / p.deviation if p.log is None else 0.0
-        evidence, least = posterior.evidence(n), _shortest(fit, p)
+        value, interval = _number(fit, n)
+        posterior = fit.posterior if n in file.absent else file
+        name = p.of_kind.words + (f" {p.part}" if p.part else "") + _beside_base(file.table, p)
+        is_right = any(axis.name == p.of and one.ratio < 1.0 for axis, one in fit.structure.items())
+        is_usual = p.log is not None or p.of_kind.is_of_structure or (p.of_kind.is_usual_if_right and is_right)
+        beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
+        evidence, least = odds.get((p.kind, p.of), posterior.evidence(n)), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
+
+
+def _number(fit: Fit, n: int) -> Estimate:
+    """Return the number of a parameter within its bounds: that of the file, and an interval that holds for all fits."""
+    p = fit.posterior.table.parameters[n]
+    posteriors = (fit.posterior,) if n in fit.file.posterior.absent else fit.posteriors
+    numbers = [p.number(np.clip(one.ends(n), p.low, p.high)) for one in posteriors]
+    numbers = [(np.exp(one) if p.of_kind.is_ratio else one).tolist() for one in numbers]
+    return numbers[0][0], hull(*((low, high) for _, low, high in numbers))
 
 
 def _beside_base(table: Table, p: Parameter) -> str:
@@ -48,14 +60,20 @@ def _beside_base(table: Table, p: Parameter) -> str:
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:
-    """Yield the hypotheses about the structure that won, with the numbers of their parameters."""
-    posterior, objective = fit.posterior, fit.objective
+    """Yield the hypotheses about the structure that won, with the numbers of their parameters, and those that come
+    nearest where the model lacks something."""
+    table, objective = fit.posterior.table, fit.objective
     for one in fit.adopted:
-        structure, place = _named(fit, one.variant, one.odds), posterior.table.place(*one.variant.parameter)
+        structure, place = _named(fit, one.variant, one.odds), table.place(*one.variant.parameter)
         if place is not None:
-            p = posterior.table.parameters[place]
-            value, low, high = p.number(np.clip(posterior.ends(place), p.low, p.high)).tolist()
-            structure = replace(structure, value=value, interval=(low, high), unit=p.unit)
+            value, interval = _number(fit, place)
+            structure = replace(structure, value=value, interval=interval, unit=table.parameters[place].unit)
+        yield structure
+    for variant, z in fit.nearest.items():
+        structure = replace(_named(fit, variant, 0.0), probability=nan)
+        if z is not None:
+            kind = KINDS[variant.kind]
+            structure = replace(structure, value=float(kind.number(z)), unit=kind.unit)
         yield structure
     if files := tuple(one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)):
         yield _named(fit, Variant("momentary commands", files), inf)
@@ -116,4 +134,5 @@ def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
         m, noise = some[0][0], table.noise(fit.best.z, name)
         count = sum(len(m.channel.values) for m, _ in some)
         outliers = float(np.mean(np.concatenate([is_far for _, is_far in some])))
-        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers)
+        wander = max(float(table.wander(fit.best.z, one, m.sensor)) for one in objective.logs)
+        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers, wander)

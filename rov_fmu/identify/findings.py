@@ -5,7 +5,7 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import floor, inf, isfinite, log, log10
+from math import floor, inf, isfinite, isnan, log, log10
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from rov_fmu.identify.result import (
     DISAGREEMENT,
     LEAST_TESTED,
     MOST_UNKNOWN,
+    USUAL,
     Answer,
     AxisResult,
     Coefficient,
@@ -31,6 +32,7 @@ from rov_fmu.identify.result import (
     Prediction,
     Structure,
     half_width,
+    is_extrapolated,
     is_known,
     relative_error,
 )
@@ -66,6 +68,8 @@ STOPPING = (
 _ASIDE = 0.1
 """A command of an axis also drives another one if it pushes it with more than this share of the full thrust along it,
 which gives it almost a third of its full speed. A symmetric pair leaves less, if its thrust astern is above 80 %."""
+_LEAST_WANDER = 0.005
+"""A wander of an estimator's velocity below this one is not told, m/s."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _SURE = 0.99
@@ -101,6 +105,14 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
+        "unlogged motion": (
+            "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
+            "moment), and is the likely cause. Turn on the spot in a log of its own, or log the velocity"
+        ),
+        "nearest": (
+            "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It "
+            "does not explain the errors, and the model is without it"
+        ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
         "explained disturbance": "{what} in {files}{since}. It follows {cause}{remedy}",
@@ -162,6 +174,14 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "rocking": (
             "{axes}: no log shows roll and pitch. Rocking raises drag by 3 to 7 %, so that no V_ss is claimed to "
             "better than 3 %"
+        ),
+        "estimator": (
+            "{axes}: the velocity of the estimator wanders by {size} (RMS) beside its position. The fit takes this for "
+            "an error of the estimator"
+        ),
+        "not told apart": (
+            "thrusters {of}: the logs do not tell whether one of them has lost force, because their commands are "
+            "always about the same. A log in which these differ tells it"
         ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
@@ -227,6 +247,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             findings.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
             findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
+        if result.structure > USUAL and _turns_unseen(identification, result):
+            findings.append(Finding("unlogged motion", result.axis.name))
         if may_rock(identification.folder, result.axis):
             findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -243,6 +265,10 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     for sensor in identification.sensors:
         if sensor.outliers > _MOST_OUTLIERS:
             findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
+        if sensor.wander > max(sensor.white, _LEAST_WANDER):
+            size = size_in_words(sensor.wander, sensor.unit)
+            findings.append(about("", "estimator", sensor.axis.name, size=size))
+    findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
@@ -423,17 +449,22 @@ def driven_aside(identification: Identification) -> list[str]:
 
 
 def extrapolated(identification: Identification) -> list[str]:
-    """Return sentences about answers to full command, and to commands in a direction, of which there was no test, and
-    about the voltage of all answers, if the thrust depends on it."""
-    low, high = identification.vehicle.command_range
-    full = f"The tests had commands of {low:.0%} to {high:.0%}, so the speed at {SHARES[-1]:.0%} is extrapolated."
+    """Return sentences about answers to commands that were not tested, and about the voltage of all answers, if the
+    thrust depends on it."""
+    tested = [
+        f"{one.axis.name} from {0.0 - one.tested[0]:.0%} to {one.tested[1]:.0%}"
+        for one in identification.axes
+        if any(is_extrapolated(answer.command, one.tested) for answer in one.answers)
+    ]
     untested = [
         f"{direction} ({one.axis.name})"
         for one in identification.axes
         for direction, strongest in zip((one.axis.negative, one.axis.positive), one.tested, strict=True)
         if strongest < LEAST_TESTED
     ]
-    lines = [full] if SHARES[-1] > high else []
+    lines = (
+        [f"The tests had commands of {listed(tested)}. Numbers for stronger ones are extrapolated."] if tested else []
+    )
     if (voltage := identification.vehicle.layout.voltage) is not None:
         lines.insert(0, f"The numbers are for a supply of {voltage:g} V.")
     if untested:
@@ -556,6 +587,13 @@ def may_rock(folder: Folder, axis: Axis) -> bool:
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 
+def _turns_unseen(identification: Identification, result: AxisResult) -> bool:
+    """Return True if yaw is tested in dives, and none of them shows a motion ahead or sideways."""
+    dives = [log for log in identification.folder.logs if log.axis is None]
+    shown = {channel.quantity.axis for log in dives for channel in log.channels if not channel.unused}
+    return result.axis is YAW and bool(dives) and not {SURGE, SWAY} & shown
+
+
 def assumed_scale(identification: Identification, unit: str = "N") -> str:
     """Return the words that belong beside a number in a unit if its scale is that of an assumed thrust, or an empty
     text. No motion determines the scale of forces and masses."""
@@ -647,8 +685,11 @@ def _structure(one: Structure) -> Finding | None:
     if (kind := KINDS.get(one.kind)) and abs(one.value - (kind.null or 0.0)) < HYPOTHESES[one.kind].least:
         return None
     value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
+    words = {"of": one.of, "value": value, **dict(one.words)}
+    if isnan(one.probability):
+        return Finding("nearest", words={"nearest": HYPOTHESES[one.kind].sentence.format(odds="", **words)})
     odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
-    return Finding(one.kind, words={"of": one.of, "value": value, "odds": odds, **dict(one.words)})
+    return Finding(one.kind, words={**words, "odds": odds})
 
 
 def _logging(one: Logging) -> Finding | None:

@@ -54,7 +54,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     """
     file = fit.file.posterior
     layout = _layout(tests, fit)
-    values = {name: float(value) for name, value in file.table.coefficients(file.z).items()}
+    values = {name: float(value) for name, value in _in_file(file, fit, file.z).items()}
     rov = Vehicle(layout, {name: values.get(name, tests.base.get(name, 1.0)) for name in layout.coefficients})
     known = {name: q for name, q in tests.known.items() if name in layout.coefficients}
     changed = _changed(file, rov)
@@ -113,6 +113,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         **dict(tests.description.tables.vehicle or ()),
         sources=sources,
         command_range=validity.command_range if validity else fit.command_range,
+        tested=validity.tested if validity else {},
         alternatives={},
         data=None,
         limits=tests.description.limits,
@@ -156,11 +157,12 @@ def written(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
     """Return the vehicle with meaningful digits, after a check that its file, when it is read, is the fit.
 
     Rounding keeps each value within its interval, and J, which very exact data change with the seventh digit. Both J
-    are computed with the same steps of the filter, because those on the way to the minimum may have been others. Raises
-    RuntimeError: this program is wrong then.
+    are computed with the same steps of the filter, because those on the way to the minimum may have been others. The
+    drag is that of the file. Raises RuntimeError: this program is wrong then.
     """
     top = Path(commonpath([folder.resolve(), *(path.resolve().parent for path in vehicle.files)]))
     objective, least = copy(fit.file.objective), fit.file.minimum
+    objective.table = objective.table.of_file(least.z, fit.speeds)
     of_fit = objective.value(least.z, objective.runs(least.z, least.runs))
     for digits in _DIGITS:
         short = _rounded(vehicle, digits)
@@ -216,7 +218,7 @@ _SOURCE = "Identified from the tests, as the method says"
 def _in_file(posterior: Posterior, fit: Fit, z: Array) -> dict[str, Any]:
     """Return the coefficients of a vehicle file for the coordinates of the parameters."""
     coefficients = posterior.table.coefficients(z)
-    for one in _quadratics(posterior, fit, z):
+    for one in (*_quadratics(posterior, fit, z), *posterior.table.nearest_drags(z, fit.speeds)):
         coefficients |= one.coefficients
     return coefficients | {name: posterior.table.base[name] for name in posterior.table.exact}
 
@@ -254,11 +256,13 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
 
     The forces of a measured curve that bends differ from those of the file by a misfit, which is uncertain, too. The
     covariance of a_t and b_t contains it: the mean variance of the forces grows by the mean square of the misfit. The
-    scale of the forces of other curves is an assumption, whose error is much larger than their misfit.
+    scale of the forces of other curves is an assumption, whose error is much larger than their misfit. So does that of
+    a_d and b_d with the misfit of drag with another power.
     """
 
     def measured(z: Array) -> list[Quadratic]:
-        some = (one for one in _quadratics(posterior, fit, z) if one.curve.name in fit.known.measured_curves)
+        some = [one for one in _quadratics(posterior, fit, z) if one.of in fit.known.measured_curves]
+        some += posterior.table.nearest_drags(z, fit.speeds)
         return [one for one in some if {*one.coefficients} <= {*names}]
 
     def values(z: Array) -> Array:

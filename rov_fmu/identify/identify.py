@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -30,6 +30,7 @@ from rov_fmu.identify.result import (
     Identification,
     Prediction,
     Slip,
+    Tested,
 )
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
@@ -82,14 +83,18 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     values = held_out_rows(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests)
-    axes = []
+    axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
     for n, axis in enumerate(known.fitted):
         on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
-        pushes = assess.pushes_of_thrusters(vehicle, of_file, axis)
-        one = _axis(tests, fit, vehicle, coefficients, axis, out, predicted, slow, wrong, values, effects, pushes)
+        push = assess.push_of_thrusters(vehicle, of_file, axis)
+        of_axis = axis, tested[axis], push
+        one = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)
         if against and against.layout.has(axis):
             one = replace(one, compared=assess.answers_of_file(against, axis))
         axes.append(one)
+    if not tests.description.tables.validity:
+        ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
+        of_file = replace(of_file, tested=ends)
     of_file = written(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     result = Identification(
@@ -110,6 +115,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
         structures=tuple(structures_of(fit)),
+        alike=fit.alike,
     )
     return told(result)
 
@@ -120,21 +126,26 @@ def _axis(
     vehicle: Vehicle,
     coefficients: Mapping[str, Coefficient],
     axis: Axis,
+    tested: Tested,
+    push: Callable[[float], float] | None,
     out: Sequence[HeldOut],
     predicted: Sequence[Prediction],
     slow: Sequence[Disturbance],
     wrong: Sequence[Slip],
     values: Values,
     effects: Sequence[Effect],
-    pushes: Sequence[float],
 ) -> AxisResult:
     is_told = _is_thrust_told(tests, vehicle, axis)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
+    tested_own = assess.commands_that_push(push, tested) if push else tested
     if is_told and is_steady:
-        every = assess.answers((*fit.rivals, *fit.posteriors), axis, vehicle, pushes, fit.command_range[1], fits, least)
+        commands = assess.commands_of_answers(tested_own)
+        pushes = [push(c) for c in commands] if push else []
+        posteriors = (*fit.rivals, *fit.posteriors)
+        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, fits, least, fit.speeds)
         answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
@@ -146,12 +157,12 @@ def _axis(
     result = AxisResult(
         axis=axis,
         answers=answers,
-        tested=fit.tested(axis),
+        tested=tested_own,
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
         points=(*steady, *times),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
-        structure=fit.structure.get(axis, 0.0),
+        structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
         disturbances=[d for d in slow if d.concerns(axis)],
         effects=acting,
         slips=[s for s in wrong if s.file in files],

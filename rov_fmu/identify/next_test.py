@@ -9,7 +9,7 @@ import numpy as np
 
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.assess import COMMANDS, EXACT
+from rov_fmu.identify.assess import EXACT
 from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
@@ -18,6 +18,8 @@ from rov_fmu.identify.result import Answer, NextTest, half_width
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 
+_COMMANDS = (0.3, -0.3, 0.5, -0.5)
+"""The commands whose speeds a test should tell."""
 _STRENGTHS = (0.2, 0.4, 0.6, 0.8, 1.0)
 _HOLD, _REST = 8.0, 4.0
 """How long a command is held, and the rest after it, s."""
@@ -42,15 +44,15 @@ def next_test(
         return shapes.motions(vehicle, axis, np.array(commands))
 
     def logarithms(z: Array) -> Array:
-        return np.log(np.abs(motions(z, COMMANDS).response()[0]))
+        return np.log(np.abs(motions(z, _COMMANDS).response()[0]))
 
-    speeds, _ = motions(posterior.z, COMMANDS).response()
+    speeds, _ = motions(posterior.z, _COMMANDS).response()
     if number is None or not (np.isfinite(speeds).all() and speeds.all()):
         return None
     slopes = posterior.slopes(logarithms)
     known = _widths(slopes, posterior.covariance)
     shown = {a.command: half_width(a.steady) for a in answers}
-    now = np.array([shown.get(c, one) for c, one in zip(COMMANDS, known, strict=True)])
+    now = np.array([shown.get(c, one) for c, one in zip(_COMMANDS, known, strict=True)])
     rest = np.maximum(now**2 - known**2, 0.0)
     worst = int(np.argmax(now))
     values, vectors = np.linalg.eigh(posterior.covariance / np.outer(posterior.errors, posterior.errors))
@@ -68,7 +70,7 @@ def next_test(
         covariance = root @ np.linalg.solve(np.eye(len(root)) + 0.5 * root.T @ more @ root, root.T)
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
         then = np.sqrt(_widths(slopes, covariance) ** 2 + rest)
-        target = f"the speed at {COMMANDS[worst]:.0%}"
+        target = f"the speed at {_COMMANDS[worst]:.0%}"
         tests.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
     return min(tests, key=lambda test: test.then, default=None)
 

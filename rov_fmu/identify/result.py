@@ -20,11 +20,11 @@ from rov_fmu.vehicle.vehicle import Vehicle
 Interval = tuple[float, float]
 Estimate = tuple[float, Interval]
 """A number with its 95 % interval."""
+Tested = tuple[float, float]
+"""The strongest command along an axis, astern and ahead, that the tests show for long enough; 0 without one."""
 
 KEPT = 6.0
 """The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
-_UNUSUAL = 2.5
-"""An effect is unusual if it is more than so many deviations of its prior from its usual size."""
 _NOTHING = 0.001
 """The share of the thrust or of the velocity below which a slow process without strong evidence is none."""
 
@@ -36,11 +36,13 @@ MOST_UNKNOWN = 0.05
 this share of the thrust and of the velocity: what is unknown acts differently elsewhere."""
 LEAST_TESTED = 0.05
 """A direction of an axis is tested by commands from this one."""
+_ABOUT = 1.05
+"""Commands that differ by less than this factor are not told apart."""
 LEAST_NOISE = 0.01
 """The noise of a sensor counts as at least this share of the motion that it shows."""
-USUAL, ALARM = 1.5, 3.0
-"""The largest error of predictions over 10 s that a right structure usually has, relative to the noise, and that from
-which the structure is clearly wrong."""
+USUAL, ALARM, WRONG = 1.5, 3.0, 5.0
+"""The largest error of predictions over 10 s that a right structure usually has, relative to the noise, that from which
+the structure is clearly wrong, and that from which no answer is worth much."""
 DISAGREEMENT = 40.0
 """The difference of J between two starts from which they led to different vehicles; J is twice a log likelihood."""
 
@@ -176,7 +178,7 @@ class Effect:
     evidence: float
     """2 ln of the Bayes factor of the model with it against the model without it."""
     beyond: float = 0.0
-    """How many deviations of its prior it is from the usual size; 0 for what a single log has."""
+    """How far it is from the usual size, relative to where it is unusual; 0 for what a single log has."""
     least: float = -inf
     """The smallest value that the sampling shows."""
 
@@ -188,7 +190,7 @@ class Effect:
     @property
     def is_unusual(self) -> bool:
         """True if it is so large that something else may act in its place."""
-        return self.kept and self.beyond > _UNUSUAL
+        return self.kept and self.beyond > 1.0
 
     @property
     def kept(self) -> bool:
@@ -198,14 +200,15 @@ class Effect:
 
 @dataclass(frozen=True)
 class Structure:
-    """A hypothesis about the structure of the model that won, so that it is part of the model."""
+    """A hypothesis about the structure that is more probable than the others, and usually part of the model."""
 
     kind: str
     """Its key in HYPOTHESES (likelihood/hypotheses.py)."""
     of: str
     """The thrusters or files in words; empty where it is about all of them."""
     probability: float
-    """Against the model without it."""
+    """Against the model without it; NaN for one that comes nearest, and does not explain what the model lacks. The
+    model is then without it."""
     value: float = nan
     """The number of its parameter; NaN if it has none."""
     interval: Interval = (nan, nan)
@@ -296,6 +299,8 @@ class SensorNoise:
     samples: int
     outliers: float = 0.0
     """The share of the samples that are far from their predictions."""
+    wander: float = 0.0
+    """The standard deviation of what wanders of the velocity of an estimator, which its position does not have."""
 
 
 @dataclass(frozen=True)
@@ -369,6 +374,22 @@ def without(axes: Iterable[Axis], thrusters: Sequence[str]) -> str:
     return f"the vehicle has {listed(f'no {one}' for one in [*(axis.name for axis in axes), *words])}"
 
 
+def is_extrapolated(command: float, tested: Tested) -> bool:
+    """Return True if a command is stronger than those of the tests, or in a direction without a test."""
+    strongest = tested[command > 0.0]
+    return abs(command) > _ABOUT * strongest or strongest < LEAST_TESTED
+
+
+def is_whole(tested: Tested) -> bool:
+    """Return True if full command was tested in both directions."""
+    return not any(is_extrapolated(command, tested) for command in (-1.0, 1.0))
+
+
+def are_alike(one: float, other: float) -> bool:
+    """Return True if two commands are about the same."""
+    return one * other > 0.0 and max(one / other, other / one) <= _ABOUT
+
+
 def half_width(estimate: Estimate) -> float:
     """Return the larger half of the interval of a number, relative to the number."""
     value, interval = estimate
@@ -420,9 +441,9 @@ class AxisResult:
     axis: Axis
     verdict: Verdict = Verdict("not identified", ())
     answers: tuple[Answer, ...] = ()
-    tested: tuple[float, float] = (1.0, 1.0)
-    """The strongest command of the tests in the negative and in the positive direction. Answers to stronger ones, and
-    those in a direction that no test has, are extrapolated, and do not count for the verdict."""
+    tested: Tested = (1.0, 1.0)
+    """Answers to stronger commands, and those in a direction that no test has, are extrapolated, and do not count for
+    the verdict."""
     known: tuple[Coefficient, ...] = ()
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
     predictions: tuple[Prediction, ...] = ()
@@ -506,6 +527,8 @@ class Identification:
     """The mistakes that would explain a file better."""
     structures: tuple[Structure, ...] = ()
     """The hypotheses about the structure that won."""
+    alike: tuple[tuple[str, ...], ...] = ()
+    """Thrusters along one axis whose forces the logs do not tell apart."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
     """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()

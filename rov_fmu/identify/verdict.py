@@ -8,15 +8,17 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.findings import acting
 from rov_fmu.identify.result import (
     DISAGREEMENT,
-    LEAST_TESTED,
     MOST_UNKNOWN,
     USUAL,
+    WRONG,
+    Answer,
     AxisResult,
     Coefficient,
     Verdict,
     coverage_of,
-    half_width,
+    is_extrapolated,
     is_known,
+    is_whole,
     relative_error,
     score_of,
 )
@@ -43,8 +45,7 @@ class Rule:
     bad: float | None
     """The limit beyond which it is *do not use*."""
     sentence: str
-    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells. If the
-    value is the half-width of an interval, `known` tells how well the number in it is known."""
+    """The reason, with `size`, the value with two digits, `share`, the value in percent, and what `names` tells."""
     names: Callable[[AxisResult], Mapping[str, str]] = lambda _: {}
     unit: str = "%"
     is_least: bool = False
@@ -87,17 +88,33 @@ def _error_of_tables(e: AxisResult) -> float:
     return relative_error(e.points, "held_out", "V_ss")
 
 
-def _half_width(e: AxisResult, *of: str) -> float:
-    """Return the largest relative half-width of some answers within the tests; NaN without any."""
+def _widest(e: AxisResult, *of: str) -> tuple[float, Answer | None]:
+    """Return the largest half-width of some answers within the tests, and the answer; NaN without any.
+
+    That of a time is relative to it, and that of a speed or a distance to the largest one of these answers: a few
+    millimetres per second of a speed that is next to nothing do not matter.
+    """
     within = [a for a in e.answers if not is_extrapolated(a.command, e.tested)] or e.answers
-    return max((half_width(getattr(a, key)) for a in within for key in of), default=nan)
+    widths = list[tuple[float, Answer]]()
+    for key in of:
+        largest = 0.0 if key == "rise" else max((abs(getattr(a, key)[0]) for a in within), default=nan)
+        for a in within:
+            value, ends = getattr(a, key)
+            widths.append((max(abs(end - value) for end in ends) / max(largest, abs(value)), a))
+    return max(widths, key=lambda pair: pair[0], default=(nan, None))
 
 
-def _known(half_width: float) -> str:
-    """Return how well a number is known, as the end of a sentence, by the relative half-width of its interval."""
-    if not is_known(half_width):
-        return "not known: its interval is wider than its value"
-    return f"known to no better than {percent(half_width)}"
+def _half_width(e: AxisResult, *of: str) -> float:
+    return _widest(e, *of)[0]
+
+
+def _known(e: AxisResult, *of: str) -> dict[str, str]:
+    """Return at which command the least certain answer is, and how well it is known, as the end of a sentence."""
+    width, answer = _widest(e, *of)
+    if answer is None:
+        return {}
+    known = f"known to no better than {percent(width)} of the largest tested one" if is_known(width) else "not known"
+    return {"command": f"{answer.command:.0%}", "known": known}
 
 
 RULES = (
@@ -148,7 +165,7 @@ RULES = (
         "errors R of the fit to all data",
         lambda e: e.structure,
         USUAL,
-        None,
+        WRONG,
         "The model's errors are {size} times what noise explains, so it lacks something.",
         unit="1",
     ),
@@ -169,18 +186,20 @@ RULES = (
         unit="1",
     ),
     Rule(
-        "half-width of the widest V_ss",
+        "half-width of the widest V_ss, relative to the largest one",
         lambda e: _half_width(e, "steady"),
         0.15,
         0.3,
-        "A steady velocity is {known}.",
+        "The steady velocity at {command} is {known}.",
+        lambda e: _known(e, "steady"),
     ),
     Rule(
         "the same of times and stopping distances",
         lambda e: _half_width(e, "rise", "stop"),
         0.3,
         None,
-        "A time or a stopping distance is {known}.",
+        "A time or a stopping distance at {command} is {known}.",
+        lambda e: _known(e, "rise", "stop"),
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
@@ -237,21 +256,19 @@ RULES = (
 """All rules, in the order in which their reasons are told."""
 
 
-def is_extrapolated(command: float, tested: tuple[float, float]) -> bool:
-    """Return True if an answer is to a command beyond half and beyond the tests, or in a direction without a test."""
-    strongest = tested[command > 0.0]
-    return abs(command) > max(strongest, 0.5) or strongest < LEAST_TESTED
-
-
 def verdict(e: AxisResult) -> Verdict:
-    """Return the worst word of all rules, with a reason for each doubt."""
+    """Return the worst word of all rules, with a reason for each doubt, and for which commands it holds."""
     values = [(rule, rule.value(e)) for rule in RULES]
     reasons = [
-        rule.sentence.format(size=significant(value, 2), share=percent(value), known=_known(value), **rule.names(e))
+        rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]
-    return Verdict(max((rule.word(value) for rule, value in values), key=WORDS.index), tuple(reasons))
+    word = max((rule.word(value) for rule, value in values), key=WORDS.index)
+    if word != WORDS[-1] and not is_whole(e.tested):
+        astern, ahead = e.tested
+        reasons.append(f"It holds for commands from {0.0 - astern:.0%} to {ahead:.0%}.")
+    return Verdict(word, tuple(reasons))
 
 
 def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> float:

@@ -361,12 +361,15 @@ def _turned(values: Array, axes: Array) -> Array:
 
 
 def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel]:
-    """Yield the depth, and the horizontal distance from the first place, from n x 3 positions north, east and down."""
+    """Yield the depth, and how far north and east the vehicle is of the first place, and the distance from there, from
+    n x 3 positions north, east and down."""
     yield Channel(QUANTITIES[HEAVE.position], topic.source, topic.time, position[:, 2], unused=unused)
     there = np.isfinite(position[:, :2]).all(axis=1)
     if there.any():
-        distance = np.hypot(*(position - position[there][0])[:, :2].T)
-        yield Channel(QUANTITIES["distance"], topic.source, topic.time, distance, unused=unused)
+        north, east = (position - position[there][0])[:, :2].T
+        both = {"surge distance": north, "sway distance": east, "distance": np.hypot(north, east)}
+        for name, values in both.items():
+            yield Channel(QUANTITIES[name], topic.source, topic.time, values, unused=unused)
 
 
 def of_scalar(

@@ -146,6 +146,19 @@ def _with_their_units(ranges: dict[str, IdentifiedRange]) -> dict[str, Identifie
     return ranges
 
 
+_BETWEEN_FULL = rule(
+    "must be [low, high] with -1 <= low <= 0 <= high <= 1", lambda ends: -1.0 <= ends[0] <= 0.0 <= ends[1] <= 1.0
+)
+
+
+def _of_axes(tested: dict[str, Interval]) -> dict[str, Interval]:
+    """Return the commands if each belongs to an axis. Raises ValueError."""
+    for name in tested:
+        if name not in AXES:
+            raise ValueError(f"must have commands of {', '.join(AXES)}, and not of {name}")
+    return tested
+
+
 class Validity(Strict):
     """Where the model holds, and what it leaves out."""
 
@@ -156,6 +169,9 @@ class Validity(Strict):
     identified: Annotated[dict[str, IdentifiedRange], AfterValidator(_with_their_units)] = Field(default={})
     """The identified ranges of the velocities u, v, w, p, q, r, of roll phi, pitch theta and depth z, which
     `rov-fmu identify` writes. With them, the FMU has the output `outside`."""
+    tested: Annotated[dict[str, Annotated[Interval, _BETWEEN_FULL]], AfterValidator(_of_axes)] = Field(default={})
+    """The commands along each axis between which tests of this axis held it long enough, as in `surge = [-0.52, 0.57]`,
+    which `rov-fmu identify` writes. An axis that is not among them was tested up to `command_max`."""
     limits: _Sentences = ()
     """Known effects that the model leaves out, in sentences, for the FMU's documentation."""
 

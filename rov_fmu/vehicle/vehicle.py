@@ -105,6 +105,8 @@ class Vehicle:
     """The sources of the coefficients by name."""
     command_range: tuple[float, float] = (0.0, 1.0)
     """The weakest and the strongest thruster command for which the model was identified."""
+    tested: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    """The commands along axes between which these were tested, by the names of the axes."""
     alternatives: Mapping[str, Alternative] = field(default_factory=dict)
     """Other sets of published coefficients, by a name for each set."""
     data: Path | None = None
@@ -423,6 +425,10 @@ class Vehicle:
             if abs(sum(pushes)) > 1e-3 * sum(map(abs, pushes)):
                 yield other, sum(pushes)
 
+    def tested_along(self, axis: Axis) -> tuple[float, float]:
+        """Return the commands along an axis between which it was tested, the lower one first."""
+        return self.tested.get(axis.name, (-self.command_range[1], self.command_range[1]))
+
     def strongest(self, axis: Axis) -> float:
         """Return the larger of the thrusts or torques at full command in both directions, before the tuning α."""
         return max(abs(self.force(axis, c)) for c in (1.0, -1.0))
@@ -517,6 +523,7 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
         **dict(head),
         sources={name: q.source if q else NOT_GIVEN for name, q in quantities.items()},
         command_range=validity.command_range,
+        tested=validity.tested,
         alternatives=file.alternatives,
         limits=validity.limits,
         intervals={name: q.interval for name, q in quantities.items() if q and q.interval},

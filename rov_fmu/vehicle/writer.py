@@ -51,7 +51,13 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
     voltage = {"value": layout.voltage, "unit": "V", "source": layout.voltage_source}
     tables: dict[str, Any] = {
         "vehicle": {key: getattr(vehicle, key) for key in FileHead.model_fields},
-        "validity": {"command_min": low, "command_max": high, "limits": vehicle.limits, "identified": _ranges(layout)},
+        "validity": {
+            "command_min": low,
+            "command_max": high,
+            "limits": vehicle.limits,
+            "tested": vehicle.tested or None,
+            "identified": _ranges(layout),
+        },
         "body": {"coupling": True} if layout.coupled else {},
         "arm": {},
         "commands": {"pulse": layout.pulse} if layout.pulse else {},

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -106,6 +107,12 @@ def forces(*ratios: float) -> tuple[Point, ...]:
     )
 
 
+def turning(*names: str) -> Identification:
+    """A dive with some channels, whose yaw the model does not explain."""
+    dive = with_channels(*names)
+    return replace(dive, axes=(replace(dive.axes[0], axis=YAW, structure=2.0),))
+
+
 BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
 SCALE = Coefficient("a_t_top", 6.5, (6.0, 7.0), "N", "6.5 ± 0.6 N", 0.9)
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
@@ -128,6 +135,31 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         surge(structure=5.0),
         "lacks something along surge: its errors are 5.0 times what noise explains",
         quiet(),
+    ),
+    (
+        "nearest",
+        structured(replace(HEALTH, probability=nan)),
+        "Of these, the nearest is: thruster l: its force is 50% of that of a whole one. Check it for weed and damage. "
+        "It does not explain the errors",
+        structured(HEALTH),
+    ),
+    (
+        "estimator",
+        quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.03),)),
+        "the velocity of the estimator wanders by 0.030 m/s (RMS) beside its position",
+        quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.001),)),
+    ),
+    (
+        "not told apart",
+        quiet(alike=(("5", "6"),)),
+        "thrusters 5 and 6: the logs do not tell whether one of them has lost force",
+        quiet(),
+    ),
+    (
+        "unlogged motion",
+        turning("heading"),
+        "yaw: no log shows how the vehicle moves ahead and sideways",
+        turning("heading", "surge velocity"),
     ),
     (
         "health",
@@ -201,7 +233,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "unusual effect",
         quiet(effects=(SLOW,)),
         "the time constant of the thrusters of 0.60 s (0.50 to 0.70) is unusual. Something else may act in its place",
-        quiet(effects=(replace(SLOW, beyond=2.4),)),
+        quiet(effects=(replace(SLOW, beyond=0.96),)),
     ),
     (
         "change of thrust",

@@ -173,7 +173,7 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
             V_ss, Tau = TRUTH.response(HEAVE, answer.command)
             for name, (_, (low, high)), true in (("V_ss", answer.steady, V_ss), ("Tau", answer.rise, Tau)):
                 covered.setdefault(f"{name} {answer.command}", []).append(low <= true <= high)
-    assert len(covered) == 3 + 2 * 6
+    assert len(covered) == 3 + 2 * 8
     missed = {key: (sum(v), len(v)) for key, v in covered.items() if sum(v) < binom.ppf(0.001, len(v), 0.95)}
     assert not missed
 

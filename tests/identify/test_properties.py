@@ -14,6 +14,7 @@ from rov_fmu.identify.given import Tests as Given
 from rov_fmu.identify.identified_vehicle import identified_vehicle, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.result import KEPT
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import folder_of
 from tests.frozen.known import HERE
@@ -33,14 +34,25 @@ def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehi
     return fit, written(fit, identified_vehicle(tests, fit)[0], path), truth
 
 
+def least_without_evidence(fit: Fit) -> float:
+    """Return J of what is told without the effects that are left out of the file whatever the rise."""
+    table, absent = fit.objective.table, fit.file.posterior.absent
+    keys = {
+        p.key for n, p in enumerate(fit.file.posterior.table.parameters) if n in absent and p.of_kind.needs_evidence
+    }
+    places = [n for n, p in enumerate(table.parameters) if p.key in keys]
+    assert all(fit.posterior.evidence(n) < KEPT for n in places)
+    return minimise(fit.objective.without(places), fit.best.z).value if places else fit.best.value
+
+
 @pytest.mark.parametrize("seed", range(2))
 def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
-    """J rises by 2 at most. `written` compares J of the numbers of the file with that of the fit, and a fit from
-    elsewhere is not better."""
+    """J rises by 2 at most, to a tenth. `written` compares J of the numbers of the file with that of the fit, and a fit
+    from elsewhere is not better."""
     fit, vehicle, _ = drawn(tmp_path, 0.01, 0.02, seed)
     file, parameters = fit.file, fit.file.posterior.table.parameters
     assert file.posterior.absent
-    assert file.minimum.value - fit.best.value <= 2.0
+    assert file.minimum.value - least_without_evidence(fit) <= 2.1
     for n in file.posterior.absent:
         assert file.minimum.z[n] == parameters[n].null, parameters[n]
     assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
@@ -55,7 +67,7 @@ def test_what_is_told_is_the_vehicle_of_the_file_with_its_weak_effects(name: str
     """Only measured forces bend a curve in what is told: the shapes of others would explain noise."""
     tests = load_tests(HERE / "tank_tests" / name)
     fit = fit_all(*begin(tests))
-    assert fit.file.minimum.value - fit.best.value <= 2.0
+    assert fit.file.minimum.value - least_without_evidence(fit) <= 2.1
     parameters = fit.objective.table.parameters
     shapes = [n for n, p in enumerate(parameters) if p.kind == "thrust shape" and p.of not in fit.known.measured_curves]
     assert not fit.best.z[shapes].any()
@@ -71,8 +83,8 @@ def test_intervals_contain_the_truth_whatever_the_size_of_a_load(load: float, se
     covered = []
     for seed in range(seeds):
         fit, vehicle, truth = drawn(tmp_path / str(seed), load, 0.02, seed)
-        for answer in assess.answers(fit.posteriors, HEAVE, vehicle, strongest=0.5):
-            if answer.command in assess.COMMANDS:
+        for answer in assess.answers(fit.posteriors, HEAVE, vehicle, (0.5, 0.5)):
+            if abs(answer.command) < 1.0:
                 V, Tau = truth.response(HEAVE, answer.command)
                 for number, (_, (low, high)) in ((V, answer.steady), (Tau, answer.rise)):
                     covered.append(low <= number <= high)
@@ -90,7 +102,7 @@ def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
     widths = []
     for tests, one in ((short, fit), (half, fit_all(*begin(half)))):
         vehicle = identified_vehicle(tests, one)[0]
-        answers = (assess.answers(one.posteriors, axis, vehicle, strongest=0.3) for axis in (HEAVE, YAW))
+        answers = (assess.answers(one.posteriors, axis, vehicle, (0.3, 0.3)) for axis in (HEAVE, YAW))
         ends = [[answer.steady[1] for answer in of if answer.command in (-0.3, 0.3, 0.5)] for of in answers]
         widths.append(np.diff(ends)[..., 0])
     ratios = widths[1] / widths[0]

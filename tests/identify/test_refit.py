@@ -14,11 +14,11 @@ from tests.commands import REFIT, TESTS
 from tests.identify.conftest import Identified
 
 HELD_OUT = {
-    ("surge", "V_ss"): 0.0985,
-    ("heave", "V_ss"): 0.0674,
-    ("heave", "Tau"): 0.0651,
-    ("yaw", "V_ss"): 0.1777,
-    ("yaw", "Tau"): 0.1274,
+    ("surge", "V_ss"): 0.0828,
+    ("heave", "V_ss"): 0.0709,
+    ("heave", "Tau"): 0.0665,
+    ("yaw", "V_ss"): 0.1940,
+    ("yaw", "Tau"): 0.1595,
 }
 """The largest RMS relative errors of predictions by a fit without the rows of the same thrust: as measured, plus 3 %.
 
@@ -49,11 +49,12 @@ def test_the_shipped_file_is_one_that_its_tests_allow(refit: Identification, tmp
     """The files say the same but for their numbers, and the shipped coefficients and answers are in the intervals.
 
     An earlier version made the file that ships, and this file stays: its curves are the nearest quadratic ones to
-    curves of free shapes, and today's are fitted. Its ranges are in words, because its FMU keeps its variables.
+    curves of free shapes, and today's are fitted. Its ranges are in words, because its FMU keeps its variables, and its
+    verdicts do not say for which commands they hold.
     """
     path = tmp_path / "refit.toml"
     write_vehicle(refit.vehicle, path)
-    ranges = r"^\[validity\.identified\]\n(.+\n)+\n|^tested = \[\n(    .+\n)+\]\n"
+    ranges = r"^\[validity\.(?:identified|tested)\]\n(.+\n)+\n|^(?:tested|verdicts) = \[\n(    .+\n)+\]\n"
     numbers = rf"{ranges}|, correlation = .*(?= }}$)|^# rov-fmu identify .*$|-?\d[\d.]*|^tool = .*$"
     made, shipped = (re.sub(numbers, "", p.read_text(encoding="utf-8"), flags=re.M) for p in (path, REFIT))
     assert made == shipped

@@ -37,6 +37,8 @@ _ROUNDING = 1e-12
 _WEAKEST = 0.1
 """The least of 1 + eta: beyond the dead band there is always some thrust."""
 COUNT = 2 * len(KNOTS)
+_LEAST_SPEED = 0.15
+"""The speed, relative to the largest tested one, from which on drag has the nearest linear and quadratic terms."""
 
 
 @cache
@@ -72,6 +74,8 @@ class Shapes:
     """By curve: the commands at which thrust begins, ahead and astern; 0 where there is none."""
     exact_astern: frozenset[str] = frozenset()
     """The curves that do not deviate astern."""
+    powers: Mapping[str, tuple[Any, Any, float]] = field(default_factory=dict)
+    """By axis: q ahead and astern, and V, of the drag a |v| v |v/V|^q in place of the quadratic one."""
 
     def commands(self, curve: str, commands: Array) -> Array:
         """Return the commands of the prior curve that act like some commands of a curve: m, or m x n for n vehicles.
@@ -132,7 +136,8 @@ class Shapes:
             inputs |= {delayed_name(name): inputs[name] for name in layout.commands}
         numbers = _alone_of(layout, axis)({**vehicle.coefficients, **inputs})
         shape = np.broadcast_shapes(np.shape(_column(commands, vehicle)), *map(np.shape, vehicle.coefficients.values()))
-        return Motions({key: np.broadcast_to(numbers[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")})
+        of = {key: np.broadcast_to(numbers[key], shape) for key in ("A", "B", "A_reverse", "B_reverse", "C")}
+        return Motions(of, *self.powers.get(axis.name, ()))
 
 
 def _column(commands: Array, vehicle: Vehicle) -> Array:
@@ -162,14 +167,32 @@ def _alone_of(layout: Layout, axis: Axis) -> Callable[[Mapping[str, Any]], dict[
 
 
 NO_SHAPES = Shapes({})
+_SLOWEST = 1e-12
+"""A lower speed has the factor |v/V|^q of this one, m/s or rad/s."""
+_NODES = np.polynomial.legendre.leggauss(24)
+"""Where Gauss and Legendre evaluate an integral from -1 to 1, and the weights."""
+
+
+def _integral(of: Callable[[Array], Array], low: Array, high: Array) -> Array:
+    """Return the integral of a function between arrays of ends."""
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+    return np.asarray(half * sum(weight * of(middle + half * node) for node, weight in zip(*_NODES, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)
 class Motions:
-    """The motion of one axis alone, as `AxisAlone`, for many commands and vehicles at once: arrays of one shape."""
+    """The motion of one axis alone, as `AxisAlone`, for many commands and vehicles at once: arrays of one shape.
+
+    The drag is (B + A |v| |v/V|^q) v, as that of the filter.
+    """
 
     of: Mapping[str, Array]
     """By the keys of `alone_formulas`."""
+    power: Any = 0.0
+    """q ahead, or those of the vehicles."""
+    power_astern: Any = 0.0
+    typical: float = 1.0
+    """V, m/s or rad/s."""
 
     def drag(self, v: Array) -> tuple[Array, Array]:
         """Return A and B for velocities."""
@@ -178,17 +201,49 @@ class Motions:
 
     def acceleration(self, v: Array) -> Array:
         """Return v', (18)."""
-        A, B = self.drag(v)
-        return np.asarray(self.of["C"] - (B + A * np.abs(v)) * v)
+        return np.asarray(self.of["C"] - np.sign(v) * self._slowing(v, np.abs(v)))
+
+    def _slowing(self, side: Array, speed: Array) -> Array:
+        """Return the deceleration by the drag at some speeds, ahead or astern as the sign of `side`."""
+        A, B = self.drag(side)
+        return np.asarray((B + A * speed * (np.maximum(speed, _SLOWEST) / self.typical) ** self._power(side)) * speed)
+
+    @property
+    def is_quadratic(self) -> bool:
+        """True if the drag has no other power."""
+        return not (np.any(self.power) or np.any(self.power_astern))
+
+    def _power(self, side: Array) -> Array:
+        return np.asarray(np.where(side < 0.0, self.power_astern, self.power))
 
     def response(self) -> tuple[Array, Array]:
         """Return V_ss, and Tau of (17), from rest."""
-        numbers = self._closed_form(self.of["C"])
-        return numbers["V_ss"], numbers["Tau"]
+        C = self.of["C"]
+        numbers = self._closed_form(C)
+        if self.is_quadratic:
+            return numbers["V_ss"], numbers["Tau"]
+        with np.errstate(all="ignore"):
+            V = self._steady(C, np.abs(numbers["V_ss"]))
+            Tau = _integral(lambda v: 1.0 / (np.abs(C) - self._slowing(C, v)), 0.0 * V, RISE * V)
+        return np.sign(C) * V, np.where(C == 0.0, numbers["Tau"], Tau)
+
+    def _steady(self, C: Array, near: Array) -> Array:
+        """Return the speeds at which the drag is |C| (Newton's method for ln v), from those of quadratic drag."""
+        v = np.where((near > 0.0) & np.isfinite(near), near, self.typical)
+        (A, B), power = self.drag(C), self._power(C)
+        for _ in range(30):
+            quadratic = A * v * (v / self.typical) ** power
+            slope = B + (2.0 + power) * quadratic  # of the drag, which is (B + quadratic) v
+            v = v * np.exp(np.clip((np.abs(C) / v - B - quadratic) / slope, -1.0, 1.0))
+        return np.asarray(np.where(C == 0.0, 0.0, v))
 
     def stopping_distance(self, v: Array, share: float) -> Array:
         """Return the distance from v until `share` of it without any force, m or rad."""
-        return self._closed_form(v, share)["distance"]
+        if self.is_quadratic:
+            return self._closed_form(v, share)["distance"]
+        speed = np.abs(v)
+        with np.errstate(all="ignore"):
+            return _integral(lambda w: w / self._slowing(v, w), share * speed, speed)
 
     def _closed_form(self, v: Array, share: float = 1.0) -> dict[str, Array]:
         A, B = self.drag(v)
@@ -256,18 +311,19 @@ def _crossing(low: Array, high: Array, before: Array, after: Array, goal: Array)
 
 @dataclass(frozen=True, eq=False)
 class Quadratic:
-    """The a_t and b_t of one direction that are nearest to a thrust curve over m commands; or those of n vehicles."""
+    """The quadratic and linear terms nearest to a curve of thrust or drag at m points; or those of n vehicles."""
 
-    curve: Curve
+    of: str
+    """The name of the curve or of the axis."""
     coefficients: Mapping[str, Any]
-    """By the names of a_t and b_t."""
+    """By the names of a_t and b_t, or a_d and b_d."""
     misfit: Array
-    """Of the forces at the commands, relatively: m, or m x n."""
+    """Of the forces at the points, relatively: m, or m x n."""
     terms: Array
     """The forces for a coefficient of 1, relative to the curve: m x 2, or n x m x 2."""
 
     def covariance(self, variance: float) -> Array:
-        """Return the covariance of a_t and b_t with which the relative forces at the commands have a mean variance."""
+        """Return the covariance of both with which the relative forces at the commands have a mean variance."""
         terms = self.terms.reshape(-1, self.terms.shape[-1])
         return np.asarray(variance / len(self.coefficients) * np.linalg.inv(terms.T @ terms / len(terms)))
 
@@ -291,4 +347,23 @@ def nearest(
         values[np.abs(values) < _ROUNDING * np.abs(values).max(axis=0)] = 0.0
         names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
         misfit = (terms @ values.T[..., None])[..., 0].T - 1.0
-        yield Quadratic(curve, dict(zip(names, values, strict=True)), misfit, terms)
+        yield Quadratic(curve.name, dict(zip(names, values, strict=True)), misfit, terms)
+
+
+def nearest_drag(axis: str, drag: Mapping[str, Any], power: Any, typical: float, top: float) -> Quadratic:
+    """Return the linear and quadratic drag that is nearest to one with another power.
+
+    `drag` has the coefficients a and b of a |v| v |v/V|^q + b v by their names, `typical` is V, and `top` the largest
+    tested speed. The relative errors have equal weights from _LEAST_SPEED of it on. Neither coefficient is negative.
+    """
+    (a, b), v = drag.values(), np.linspace(_LEAST_SPEED, 1.0, 40) * top
+    speed = v[:, None] if np.ndim(a) or np.ndim(power) else v
+    force = ((a * speed * (speed / typical) ** power + b) * speed).T
+    terms = np.stack(np.broadcast_arrays(v**2, v), axis=-1) / force[..., None]
+    both = np.linalg.pinv(terms).sum(axis=-1).T  # least squares of terms @ values = 1
+    one, other = (terms.sum(axis=-2) / (terms**2).sum(axis=-2)).T  # each without the other one
+    alone = np.where(both[0] < both[1], [0.0 * one, other], [one, 0.0 * other])
+    values = np.where(both.min(axis=0) >= 0.0, both, alone)
+    values = np.where(np.equal(power, 0.0), np.broadcast_arrays(a, b), values)
+    misfit = (terms @ values.T[..., None])[..., 0].T - 1.0
+    return Quadratic(axis, dict(zip(drag, values, strict=True)), misfit, terms)

@@ -8,8 +8,6 @@ the file has the numbers of a minimum of J, and not those of another vehicle tha
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-import numpy as np
-
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, refits
@@ -38,18 +36,16 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     are absent: two effects of which either explains the data are not both left out. Many refits run together, and those
     that hold tell anew what to expect of the next ones.
 
-    An effect that would be an input of the FMU, such as the voltage, is left out before, whatever the rise, if the
-    evidence for it is not positive.
+    An effect that needs evidence, such as the voltage, which would be an input of the FMU, is left out before, whatever
+    the rise, if the evidence for it is not positive.
 
     The refits keep the derivatives of the fit that they begin at: J where they end is J, and exact derivatives follow
     at the end, with which more effects may go.
     """
-    posterior, parameters = Posterior.of(objective.table, best.z, best.information), objective.table.parameters
-    inputs = (n for n, p in enumerate(parameters) if p.of_kind.adds_input)
-    absent = frozenset(n for n in inputs if posterior.evidence(n) < _POSITIVE)
+    absent = _without_evidence(Posterior.of(objective.table, best.z, best.information))
     if absent:
-        best = _exact(objective, absent, best)
-    least, is_exact = best, True
+        (best,) = refits(objective, best, [objective.whole], [absent])
+    least, is_exact = best, not absent
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
         order = [*_weakest(posterior, least.value - best.value)]
@@ -69,17 +65,32 @@ def _exact(objective: Objective, absent: frozenset[int], near: Minimum) -> Minim
     return minimise(objective.without(absent), near.z, most=1, near=near.data)
 
 
+def _without_evidence(posterior: Posterior) -> frozenset[int]:
+    """Return the places of the effects that need evidence and have none, the least of them first."""
+    parameters = posterior.table.parameters
+    while rest := [n for n, p in enumerate(parameters) if p.of_kind.needs_evidence and n not in posterior.absent]:
+        least = min(rest, key=posterior.evidence)
+        if posterior.evidence(least) >= _POSITIVE:
+            break
+        posterior = posterior.without(least)
+    return posterior.absent
+
+
 def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
     """Yield the places of effects in the order in which they are left out, for a normal posterior after a rise of J."""
-    z, C, parameters = posterior.z, posterior.covariance, enumerate(posterior.table.parameters)
-    null = {n: p.null for n, p in parameters if p.is_effect and n not in posterior.absent}
-    while null:
-        rises = {n: (z[n] - end) ** 2 / max(C[n, n], 1e-300) for n, end in null.items()}
+    may_go = {n for n, p in enumerate(posterior.table.parameters) if p.is_effect and not p.of_kind.is_of_structure}
+    while rest := may_go - posterior.absent:
+        rises = {n: _rise(posterior, n) for n in rest}
         least = min(rises, key=lambda n: rises[n])
         rise += rises[least]
         if rise > _EXPECTED * MOST_RISE:
             return
         yield least
-        column = C[:, least] / C[least, least]
-        z = z - column * (z[least] - null.pop(least))
-        C = C - np.outer(column, C[least])
+        posterior = posterior.without(least)
+
+
+def _rise(posterior: Posterior, place: int) -> float:
+    """Return by how much J rises if an effect is absent."""
+    null = posterior.table.parameters[place].null
+    assert null is not None
+    return float((posterior.z[place] - null) ** 2 / max(posterior.covariance[place, place], 1e-300))

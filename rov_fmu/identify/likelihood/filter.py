@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rov_fmu.c.compile import FILTER_FILE, FILTER_LANES_FILE
 from rov_fmu.c.library import load_library
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.kinds import Action
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -48,9 +48,14 @@ class Sensor:
     """False for a velocity through the water."""
 
     @property
+    def is_horizontal(self) -> bool:
+        """True for a velocity or a position over ground, ahead or to starboard, or north or east."""
+        return self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+
+    @property
     def is_horizontal_velocity(self) -> bool:
         """True for a velocity over ground ahead or to starboard."""
-        return self.is_velocity and self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+        return self.is_velocity and self.is_horizontal
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,6 +81,9 @@ class Record:
     """The standard deviations of all states of the vehicle that the sensors concern."""
     tilt: Array = field(default_factory=lambda: np.zeros((3, 0)))
     """3 x k: times (s), and the measured roll and pitch (rad) of a vehicle that has neither axis; k = 0 or k >= 2."""
+    wanders: bool = False
+    """True if the slow horizontal velocity is an error of the sensors of velocity, which those of position do not have.
+    """
     beside: Array | None = None
     """m x axes: how large the short forces are after each row, relative to their size. If it is not None, commands
     change along straight lines from row to row."""
@@ -113,6 +121,9 @@ class Parameters:
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
     lags: tuple[Number | None, ...] = ()
     """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
+    powers: tuple[tuple[Number, Number, float], ...] = ()
+    """By axis: q ahead and astern, and V, of the drag a |v| v |v/V|^q in place of the quadratic one. Empty: all are
+    quadratic."""
     offset: Number = 0.0
     """How much later than its row a command acts, s."""
     width: Number = 0.0
@@ -154,7 +165,7 @@ class _Record(ctypes.Structure):
         *((name, ctypes.c_ssize_t) for name in ("samples", "rows", "sensors")),
         *((name, ctypes.c_void_p) for name in ("time", "value", "sensor", "kind", "place", "since", "told", "anew")),
         *((name, ctypes.c_void_p) for name in ("start", "error", "active")),
-        ("tilts", ctypes.c_ssize_t),
+        *((name, ctypes.c_ssize_t) for name in ("tilts", "wanders")),
         *((name, ctypes.c_void_p) for name in ("tilt_time", "roll", "pitch", "beside")),
         *((name, ctypes.c_double) for name in ("longest", "changing", "share")),
     ]
@@ -312,6 +323,7 @@ class Filter:
         axes = [form.axis.name for form in self.layout.axes]
         for first, names in ((0, self.vehicle_states), (self.force, axes), (self.short, axes)):
             units[first : first + len(names)] = [parameters.units.get(name, 1.0) for name in names]
+        powers = parameters.powers or ((0.0, 0.0, 1.0),) * len(axes)
         columns = [
             *at,
             *(one.size for one in slow),
@@ -320,6 +332,7 @@ class Filter:
             *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
             *(part for lever in levers for part in lever),
             *units,
+            *(number for column in zip(*powers, strict=True) for number in column),
             *(parameters.offset, parameters.width),
         ]
         found = np.empty((parameters.count, len(columns)))
@@ -364,7 +377,8 @@ class Filter:
         pointers = [array.ctypes.data for array in arrays], [array.ctypes.data for array in tilt]
         lines = None if beside is None else beside.ctypes.data
         kept: list[object] = [*arrays, *tilt, beside]
-        return _Record(*sizes, *pointers[0], len(tilt[0]), *pointers[1], lines, *self._steps), kept
+        tilts = len(tilt[0]), record.wanders
+        return _Record(*sizes, *pointers[0], *tilts, *pointers[1], lines, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
         """Return the kind and the place of a sensor, as filter.c wants them."""
@@ -391,8 +405,10 @@ def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
         return [places[name] if name in among else -1 for name in names]
 
     axes = layout.bare_axes
+    drags = [[form.coefficient(key) for key in ("a_d", f"a_d{REVERSE}")] for form in layout.axes]
     return [
         *of([axis.external for axis in axes], layout.inputs),
+        *(max(place, 0) for column in zip(*drags, strict=True) for place in of(column, places)),
         *(-1 if axis.is_rotation else axis.place for axis in axes),
         *(axis.place if axis.is_rotation else -1 for axis in axes),
         *of(_CURRENT, layout.inputs),

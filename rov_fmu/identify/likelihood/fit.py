@@ -19,6 +19,8 @@ from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import (
     Adopted,
+    Misfit,
+    Starts,
     StructureSearch,
     Trial,
     settled,
@@ -29,9 +31,9 @@ from rov_fmu.identify.likelihood.search import (
 )
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, QUICK, Minimum, evidence, evidence_at, minimise, scaled
 from rov_fmu.identify.result import KEPT
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import COMMAND
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
@@ -61,8 +63,12 @@ class Fit:
     """The hypotheses about the structure that won."""
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
-    structure: Mapping[Axis, float] = field(default_factory=dict)
-    """The error R along each axis, relative to what noise explains."""
+    nearest: Starts = field(default_factory=dict)
+    """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their numbers."""
+    alike: tuple[tuple[str, ...], ...] = ()
+    """Thrusters along one axis whose forces the data do not tell apart."""
+    structure: Mapping[Axis, Misfit] = field(default_factory=dict)
+    """The errors of predictions over 10 s along each axis."""
 
     @property
     def posteriors(self) -> tuple[Posterior, Posterior]:
@@ -75,6 +81,15 @@ class Fit:
         return min(float(self.file.posterior.table.limit(self.file.posterior.z)), 1.0)
 
     @cached_property
+    def speeds(self) -> dict[str, float]:
+        """The largest speed along each axis that logs and steady tables test, by its name, m/s or rad/s."""
+        logs = (self.objective.reached(self.best.z, n) for n in range(len(self.objective.logs)))
+        some = [(axis.name, max(ends)) for reached in logs for axis, ends in reached.items()]
+        steady = (row for row in self.objective.rows if row.quantity == "V_ss")
+        some += [(row.subject.name, abs(row.measured)) for row in steady]
+        return {name: max(speeds) for name, speeds in grouped(some).items()}
+
+    @cached_property
     def command_range(self) -> tuple[float, float]:
         """The weakest and the strongest command of the tests that the thrusters follow."""
         used = [abs(row.command) for row in self.objective.rows]
@@ -84,21 +99,6 @@ class Fit:
         used = [round(min(c, self.most_followed), 6) for c in used if c > 1e-3]
         low, high = min(used, default=0.0), max(used, default=1.0)
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
-
-    def tested(self, axis: Axis) -> tuple[float, float]:
-        """Return the strongest command of the tests of an axis in its negative and in its positive direction.
-
-        That of a log is the mean of its thrusters' commands, each with the sign with which it drives the axis.
-        """
-        used = [np.array([row.command for row in self.objective.rows if row.subject is axis])]
-        signs = self.known.layout.signs(axis)
-        for log in (one.log for one in self.objective.logs):
-            assert log.commands
-            own = {f"u_{COMMAND}": float(log.axis is axis)} if log.follows_axis else signs
-            weights = np.array([own.get(f"u_{name}", 0.0) for name in log.commands.thrusters])
-            used.append(log.commands.at(log.commands.rows) @ weights / max(np.abs(weights).sum(), 1.0))
-        every = np.concatenate(used)
-        return float(-every.min(initial=0.0)), float(every.max(initial=0.0))
 
 
 def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent) -> Fit:
@@ -154,19 +154,22 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     if measured < known.bent:
         told, least = _less_bent(model, known, measured, best, on_progress)
     file = _less_bent(model, known, frozenset(), least, on_progress) if measured else (told, least)
-    errors = with_shared(known.layout, structure(told, least))
-    unseen = unseen_errors(told, least.z, held)
+    misfits = with_shared(known.layout, structure(told, least))
+    ratios = {axis: one.ratio for axis, one in misfits.items()}
+    unseen = unseen_errors(told, least.z, held, misfits)
     of_file = without_weak_effects(*file)
     return Fit(
         known,
         told,
         least,
-        posterior.widened(errors, unseen),
-        replace(of_file, posterior=of_file.posterior.widened(errors, unseen)),
+        posterior.widened(ratios, unseen),
+        replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
         adopted,
         explained.rivals,
-        errors,
+        explained.nearest,
+        explained.alike,
+        misfits,
     )
 
 

@@ -19,6 +19,14 @@ from rov_fmu.tank.arrays import Array
 
 _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
+_WEAK, _WIDER = 0.7, 10.0
+"""The health of thrusters at which the data are asked about it, and how many times as wide the priors are then."""
+CONTRAST = 0.2
+"""A hypothesis about single thrusters is tried if the data alone tell the health of each to this standard error. It is
+0.003 to 0.12 where logs tell thrusters apart, and 0.45 to 4 where these always have nearly the same commands."""
+
+_ROUNDING = 1e-13
+"""What is smaller relative to the largest eigenvalue of the scaled information is rounding."""
 
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
@@ -55,6 +63,8 @@ class Hypothesis:
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
     is_first: bool = False
     """True if it leaves out samples, which would mislead all others. So it is tried before these."""
+    is_contrast: bool = False
+    """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
 
 
 @dataclass(frozen=True)
@@ -309,6 +319,7 @@ HYPOTHESES = {
             "wires, and its propeller"
         ),
         in_words=_of_twins,
+        is_contrast=True,
         why_no_null="a thruster pushes ahead or astern, and nothing lies between",
     ),
     "swapped commands": Hypothesis(
@@ -316,6 +327,7 @@ HYPOTHESES = {
         _pairs,
         _permuted(lambda of: (of[::-1], 1.0)),
         sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
+        is_contrast=True,
         why_no_null="two commands are swapped or not, and nothing lies between",
     ),
     "rotor lag": Hypothesis(
@@ -352,6 +364,7 @@ HYPOTHESES = {
         "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
         _of_twins,
         least=0.21,
+        is_contrast=True,
     ),
     "command limit": Hypothesis(
         0.03,
@@ -419,6 +432,38 @@ class Model:
         for one in in_order(variants):
             known, logs = HYPOTHESES[one.kind].change(known, logs, one)
         return replace(self, known=known, logs=logs)
+
+
+def contrasts(model: Model, at: Mapping[tuple[str, str, str], float]) -> dict[str, float]:
+    """Return the standard error of the health of each thruster by the data alone.
+
+    Noise and slow processes have their usual sizes, because a fit that lacks a fault explains it by noise. The priors
+    of the motion are so wide that they tell nothing. `at` is a place near the fit. A thruster that no log commands, and
+    a commanded force along an axis of the body, are not among the result. Raises DivergedError.
+    """
+    known, names = model.known, [of[0] for of in _ill(model.known, model.logs)]
+    if not names:
+        return {}
+    exact = known.exact - {known.layout.health[name] for name in names}
+    known = replace(known, exact=exact, assumed=(*known.assumed, *(("health", name) for name in names)))
+    objective = replace(model, known=known).objective(thinned=True)
+    parameters = objective.table.parameters
+    z = np.array([at.get(p.key, p.mean) if p.of_motion else p.mean for p in parameters])
+    of = {p.of: n for n, p in enumerate(parameters) if p.kind == "health"}
+    z[[*of.values()]] = _WEAK
+    z = np.clip(z, objective.low, objective.high)
+    tells = np.diag(1.0 / (_WIDER * objective.deviation) ** 2)
+    for one in objective.data(z, objective.runs(z), exact=False):
+        A = one.slopes / np.sqrt(one.variances)[:, None]
+        tells[np.ix_(one.places, one.places)] += A.T @ A
+    moves = [n for n, p in enumerate(parameters) if p.of_motion and p.low != p.high and n not in of.values()]
+    found = {}
+    for name, place in of.items():
+        some = [*moves, place]
+        scale = np.sqrt(np.diag(tells)[some])
+        inverse = np.linalg.pinv(tells[np.ix_(some, some)] / np.outer(scale, scale), rcond=_ROUNDING, hermitian=True)
+        found[name] = float(np.sqrt(inverse[-1, -1]) / scale[-1])
+    return found
 
 
 def probability(odds: float) -> float:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from math import inf, log
 from typing import Any, Literal
 
+import numpy as np
+
 from rov_fmu.equation.catalogue import CURVE, REVERSE
 from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.identify.likelihood.prior import Prior
@@ -21,6 +23,8 @@ USUAL_EXPONENT = 1.5
 PLACED = {True: "velocity sensor", False: "position sensor"}
 """The sensors that may be beside the origin: those of velocities, and those of positions."""
 INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "logging width", "white noise"
+QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
+POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
@@ -80,6 +84,10 @@ class Coordinate:
     """False for noise and slow processes, which change the covariance of the filter and not its mean."""
     unit: str = "1"
 
+    def number(self, z: Any) -> Any:
+        """Return the number that a coordinate stands for."""
+        return np.exp(z) if self.is_log else self.offset + self.factor * z
+
 
 @dataclass(frozen=True)
 class Kind(Coordinate):
@@ -102,10 +110,14 @@ class Kind(Coordinate):
     told_by: tuple[str, ...] = ()
     """The tests of an axis that tell it, which replace a coefficient of the base: `log`, `steady`, `astern` (steady
     velocities of negative commands) and `time_constant`."""
-    adds_input: bool = False
-    """True if a vehicle with the effect has an input more."""
+    needs_evidence: bool = False
+    """True if the file has it only with positive evidence: it would be an input more, or is only nearly in a file."""
     is_lag: bool = False
     """True for a time constant, which the samples of sensors must be close enough to show."""
+    unusual: float = 2.5
+    """How many deviations of its prior from its usual size an effect is unusual."""
+    is_usual_if_right: bool = False
+    """True if no size is unusual where predictions over 10 s along its axis have no larger errors than the noise."""
     finest: float = 0.0
     """The half-width of the narrowest interval: what is smaller is no effect."""
     force_power: float = 0.0
@@ -120,10 +132,14 @@ class Kind(Coordinate):
     """True for the size of a slow or short process."""
     slow: Process | None = None
     """The slow process whose size it is."""
+    is_of_sensor: bool = False
+    """True for a slow process that is an error of a sensor, and no disturbance of the motion."""
     hides_structure: bool = False
     """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
     least_unseen: float = 0.0
     """Its least size where unseen data are predicted."""
+    is_of_structure: bool = False
+    """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
     is_of_water: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
@@ -179,6 +195,16 @@ def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
     )
 
 
+def _power(end: str = "") -> Callable[[Prior, VehicleAxis], Mapping[str, Any] | None]:
+    """Return the power of drag ahead, or what it is more astern, of an axis that is fitted."""
+
+    def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+        free = form.axis in prior.fitted and all(_free(prior, form, f"{key}{end}") for key in ("a_d", "b_d"))
+        return {} if free else None
+
+    return of_axis
+
+
 def _astern(prior: Deviation, words: str, **own: Any) -> Kind:
     """Return the kind of what something is astern relative to what it is ahead, which is the same if it is absent."""
     return Kind(prior, words, is_ratio=True, null=0.0, **own)
@@ -204,6 +230,8 @@ _COLOURED = Deviation(
     "coloured_noise", 1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"
 )
 _WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
+
+_NEAREST = ". The vehicle file has the linear and the quadratic drag that are nearest to it at the tested speeds"
 
 KINDS = {
     "thrust scale": Kind(
@@ -286,7 +314,7 @@ KINDS = {
         starts=(0.0, 0.0, 1.0),
         adapts=True,
     ),
-    "quadratic drag": _drag(
+    QUADRATIC: _drag(
         "a_d",
         Deviation(
             "quadratic_drag", 1.0, "ln of the quadratic drag", "a factor of 2.7 about another vehicle or the data"
@@ -294,7 +322,7 @@ KINDS = {
         speed_power=-2.0,
         starts=(0.7, 0.0, -1.0),
     ),
-    "linear drag": _drag(
+    LINEAR: _drag(
         "b_d",
         Deviation(
             "linear_drag", 1.5, "ln of the linear drag", "it depends on the speed range, the hull and the tether"
@@ -309,6 +337,32 @@ KINDS = {
         told_by=("log", "astern"),
         of_axis=_drag_astern,
         adapts=True,
+    ),
+    POWER: Kind(
+        Deviation("drag_power", 0.3, "the excess of the power of drag over 2", "measured drag has 1.5 to 2.5"),
+        "excess of the power of drag over 2",
+        _NEAREST,
+        told_by=("log", "steady"),
+        of_axis=_power(),
+        low=-0.8,
+        high=1.5,
+        null=0.0,
+        unusual=5.0 / 3.0,
+        is_usual_if_right=True,
+        needs_evidence=True,
+    ),
+    POWER_ASTERN: Kind(
+        Deviation("drag_power_astern", 0.2, "the excess of the power of drag astern over that ahead", "as of drag"),
+        "excess of the power of drag astern over that ahead",
+        _NEAREST,
+        keys=("a_d_reverse", "b_d_reverse"),
+        told_by=("log", "astern"),
+        of_axis=_power(REVERSE),
+        low=-0.8,
+        high=0.8,
+        null=0.0,
+        is_usual_if_right=True,
+        needs_evidence=True,
     ),
     "centre of buoyancy": Kind(
         Deviation(
@@ -354,7 +408,7 @@ KINDS = {
         "exponent of thrust over voltage",
         keys=("n_V",),
         is_coefficient=True,
-        adds_input=True,
+        needs_evidence=True,
         mean=0.75,
         low=CURVE["n_V"].minimum,
         high=CURVE["n_V"].maximum,
@@ -400,6 +454,17 @@ KINDS = {
         0.2,
         least_unseen=0.03,  # batteries and water differ from day to day
     ),
+    "wander": _slow(
+        Deviation(
+            "wander", 2.5, "ln of the size of the wander of an estimator's velocity", "1 mm/s, within a factor of 12"
+        ),
+        Process(8.0, "Wander of the velocity", "velocity", "", ""),
+        0.001,
+        1e-7,
+        0.3,
+        unit="m/s",
+        is_of_sensor=True,
+    ),
     "slow velocity": _slow(
         Deviation(
             "slow_velocity", 2.5, "ln of the size of a slow velocity over ground", "1 mm/s, within a factor of 12"
@@ -426,6 +491,7 @@ KINDS = {
         low=0.0,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "command limit": Kind(
         None,
@@ -436,6 +502,7 @@ KINDS = {
         low=0.1,
         high=1.0,
         null=1.0,
+        is_of_structure=True,
     ),
     "slew limit": Kind(
         None,
@@ -447,6 +514,7 @@ KINDS = {
         high=20.0,
         null=0.0,
         unit="s",
+        is_of_structure=True,
     ),
     "voltage drop": Kind(
         None,
@@ -457,6 +525,7 @@ KINDS = {
         low=0.0,
         high=0.8,
         null=0.0,
+        is_of_structure=True,
     ),
     "white noise": Kind(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
@@ -472,13 +541,16 @@ KINDS = {
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative
 to white noise."""
-SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow}
-"""The slow processes, by the kinds of their sizes."""
+SLOW = {name: kind.slow for name, kind in KINDS.items() if kind.slow and not kind.is_of_sensor}
+"""The slow processes that disturb the motion, by the kinds of their sizes."""
 EFFECTS = {name: kind for name, kind in KINDS.items() if kind.words}
 PRIORS = {kind.prior.key: kind.prior for kind in KINDS.values() if kind.prior}
 """All deviations by their keys in [priors] of rov.toml. 0 means that the number is exact, or that a slow process is
 absent. The noise of a sensor is never exact."""
 ABSENT = {
-    key: kind.null for kind in EFFECTS.values() if kind.null is not None and not kind.is_ratio for key in kind.keys
+    key: kind.null
+    for kind in EFFECTS.values()
+    for key in kind.keys
+    if kind.null is not None and not key.endswith(REVERSE)
 }
 """The values of coefficients that a vehicle file may lack. Those astern are then equal to those ahead."""

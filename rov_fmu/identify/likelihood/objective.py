@@ -43,6 +43,8 @@ Samples = tuple[Array, Array]
 """Innovations and their variances."""
 _TOGETHER = 8
 """The number of parameters whose derivatives one thread computes at once: a multiple of the lanes of the filter."""
+_REACHED = 0.98
+"""The quantile of the speeds that tells what a log tests: what lasts shorter is no test."""
 _LEAST_DELAY = 1e-9
 """A lag that differs from none, s."""
 OUTLYING = 3.0
@@ -135,6 +137,21 @@ class Data:
         """Return some of the samples."""
         keys = ("innovations", "variances", "slopes", "log_slopes")
         return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
+
+    def leading(self, scale: Array) -> int | None:
+        """Return the parameter of these data that changes most along a direction (p), if any does."""
+        most = max(self.places, key=lambda k: abs(scale[k]), default=None)
+        return most if most is not None and scale[most] else None
+
+    def separate(self, scale: Array) -> None:
+        """Take the derivatives with respect to a direction, which the leading parameter has, apart into its own."""
+        leading = self.leading(scale)
+        if leading is None:
+            return
+        column, share = self.places.index(leading), scale[[*self.places]] / scale[leading]
+        share[column] = 0.0
+        for slopes in (self.slopes, self.log_slopes):
+            slopes[:, column] -= slopes @ share
 
     @property
     def normalised(self) -> Array:
@@ -244,6 +261,20 @@ class Objective:
         """
         parameters = (table or self.table).of_log(z, self.logs[number])
         return self.filters[number].run(self.records[number], parameters, **how)  # type: ignore[arg-type]
+
+    def reached(self, z: Array, number: int) -> dict[Axis, tuple[float, float]]:
+        """Return the largest speeds astern and ahead along the axes that a log measures; 0 without any.
+
+        They are those reached for long enough, so that the log tests them.
+        """
+        states = self.run(z, number, with_states=True).states.T
+        velocities = dict(zip(self.filters[number].vehicle_states, states, strict=False))
+
+        def largest(speeds: Array) -> float:
+            return float(np.quantile(speeds[speeds > 0.0], _REACHED)) if np.any(speeds > 0.0) else 0.0
+
+        measured = {m.sensor.axis: velocities[m.sensor.axis.velocity] for m in self.logs[number].measured}
+        return {axis: (largest(-v), largest(v)) for axis, v in measured.items()}
 
     def changes(
         self, z: Array, n: int, places: Sequence[int], steps: Array, run: Run, begin: float, span: float
@@ -357,8 +388,11 @@ class Objective:
         with respect to the noise are of earlier data, if these are given. All contain the changes of the gains of the
         filter. Without these, the common scale of all forces, which the motion does not tell, would look determined,
         and where the model does not explain a log, half of a gradient would have the wrong sign.
+
+        This scale would also look determined by the errors of differences, which are large at a kink of the motion.
+        One of its parameters therefore moves together with all others, and its own derivatives are what is left.
         """
-        parameters = self.table.parameters
+        parameters, scale = self.table.parameters, self.table.scale_of_forces(z)
         found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
             places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
@@ -372,8 +406,10 @@ class Objective:
                     found[n].log_slopes[:, column] = of_noise[n].log_slopes[:, column]
             for first in range(0, len(columns), _TOGETHER):
                 some = columns[first : first + _TOGETHER]
-                work.append(partial(self.differentiate, z, n, some, run, found[n], exact=exact))
+                work.append(partial(self.differentiate, z, n, some, run, found[n], scale, exact=exact))
         in_threads(work)
+        for one in found:
+            one.separate(scale)
         if self.rows:
             found.append(self._rows_data(z))
         return found
@@ -385,19 +421,24 @@ class Objective:
         columns: Sequence[int],
         run: Run,
         into: Data,
+        scale: Array,
         *,
         exact: bool,
     ) -> None:
         """Compute some columns of the derivatives of the innovations of a log, within the lower bounds of parameters.
 
         The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
-        sides.
+        sides. Those of the leading parameter of a common scale are with respect to this scale.
         """
         parameters = [self.table.parameters[into.places[column]] for column in columns]
         moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        sets = self.table.of_log(changed(z, moves), self.logs[n])
+        moved = changed(z, moves)
+        for column, (k, step) in enumerate(moves):
+            if k == into.leading(scale):
+                moved[:, column] = z + step * scale / scale[k]
+        sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
         for column, own in zip(columns, parameters, strict=True):
             k = into.places[column]

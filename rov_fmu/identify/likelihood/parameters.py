@@ -12,7 +12,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Part, Thruster, VehicleAxis
-from rov_fmu.identify.likelihood.curves import COUNT, Shapes
+from rov_fmu.identify.likelihood.curves import COUNT, Quadratic, Shapes, nearest_drag
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.kinds import (
     ABSENT,
@@ -22,8 +22,10 @@ from rov_fmu.identify.likelihood.kinds import (
     LEAST_LAG,
     OFFSET,
     PLACED,
+    POWER,
+    POWER_ASTERN,
     PRIORS,
-    SLOW,
+    WANDER,
     WHITE,
     WIDTH,
     Coordinate,
@@ -48,6 +50,8 @@ _PLACES = ("forward", "to starboard", "down")
 """The parts of the place of a sensor."""
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
+_LEAST_POWER = -0.9
+"""The least power of quadratic drag, less 2: below -1, drag would fall with the speed."""
 _MOTION_STEP = 3e-6
 """The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
 less than a per cent."""
@@ -82,10 +86,6 @@ class Parameter(Coordinate):
     def of_kind(self) -> Kind:
         """What all parameters of its kind are."""
         return KINDS[self.kind]
-
-    def number(self, z: Any) -> Any:
-        """Return the number that a coordinate stands for."""
-        return np.exp(z) if self.is_log else self.offset + self.factor * z
 
     @property
     def step(self) -> float:
@@ -126,6 +126,12 @@ class Table:
     def each(self, key: str) -> np.ndarray:
         """Return a number of each parameter, such as its `mean`, or `of_kind.is_size`."""
         return np.array([*map(attrgetter(key), self.parameters)])
+
+    def scale_of_forces(self, z: Array) -> Array:
+        """Return the direction, p, along which thrust, drag, load and inertia grow alike. The motion stays the same."""
+        power = self.each("of_kind.force_power")
+        from_null = z - np.array([p.null or 0.0 for p in self.parameters])
+        return np.where(self.each("is_log"), power, power * from_null)
 
     def place(self, kind: str, of: str = "", part: str = "") -> int | None:
         """Return the index of a parameter, or None."""
@@ -219,7 +225,41 @@ class Table:
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
-        return Shapes(deviations, bands, frozenset(reverse))
+        powers = {form.axis.name: self.powers(z, form.axis) for form in self.layout.axes}
+        return Shapes(deviations, bands, frozenset(reverse), powers)
+
+    def powers(self, z: Array, axis: Axis) -> tuple[Any, Any, float]:
+        """Return q ahead and astern, and V, of the drag a |v| v |v/V|^q along an axis. V does not change with z.
+
+        It is the velocity at which the drag of the prior is a quarter of the full thrust. So a is a drag at about half
+        command, which the data tell beside q. Exact drag is quadratic.
+        """
+        a, b = (self.base.get(axis.coefficient(key), 0.0) for key in ("a_d", "b_d"))
+        force = 0.25 * self.full.get(axis.name, 0.0) or a + b
+        typical = float(2.0 * force / (b + np.sqrt(b * b + 4.0 * a * force))) if force else 1.0
+        if axis.coefficient("a_d") in self.exact:
+            return 0.0, 0.0, typical
+        q = self.get(z, POWER, axis.name)
+        return q, np.maximum(q + self.get(z, POWER_ASTERN, axis.name), _LEAST_POWER), typical
+
+    def nearest_drags(self, z: Array, top: Mapping[str, float]) -> Iterator[Quadratic]:
+        """Yield the linear and quadratic drag, ahead and astern, nearest to that of each axis with another power.
+
+        `top` has the largest tested speed of the axes, m/s or rad/s. Without one, it is V.
+        """
+        coefficients = self.coefficients(z)
+        for axis in (form.axis for form in self.layout.axes):
+            *powers, typical = self.powers(z, axis)
+            for end, q in zip(("", REVERSE), powers, strict=True) if np.any(powers) else ():
+                names = [axis.coefficient(f"{key}{end}") for key in ("a_d", "b_d")]
+                drag = {name: coefficients[name] for name in names if name in coefficients}
+                if drag:
+                    yield nearest_drag(axis.name, drag, q, typical, top.get(axis.name, typical))
+
+    def of_file(self, z: Array, top: Mapping[str, float]) -> "Table":
+        """Return a table whose drag is that of a vehicle file, linear and quadratic, at some coordinates."""
+        drag = {name: value for one in self.nearest_drags(z, top) for name, value in one.coefficients.items()}
+        return replace(self, base={**self.base, **drag}, exact=self.exact.union(drag))
 
     def of_vehicle(self, vehicle: Vehicle) -> "Table":
         """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
@@ -245,11 +285,16 @@ class Table:
             units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
 
         def slow(kind: str, of: str = "", unit: Any = 1.0) -> Slow:
-            return Slow(unit * self.get(z, kind, of), SLOW[kind].time_constant)
+            process = KINDS[kind].slow
+            assert process
+            return Slow(unit * self.get(z, kind, of), process.time_constant)
 
-        along = slow("slow velocity", HORIZONTAL) if one.has_positions or one.has_velocities else Slow()
+        along = Slow()
+        if one.has_positions or one.has_velocities:
+            along = slow(WANDER if one.record.wanders else "slow velocity", HORIZONTAL)
         down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
         noises = [self.noise(z, m.channel.quantity.name) for m in one.measured]
+        powers = [self.powers(z, axis) for axis in axes]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         is_inside = HEAVE.name in layout.by_name
         return Parameters(
@@ -267,6 +312,7 @@ class Table:
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
             width=self.get(z, WIDTH, file),
+            powers=tuple(powers),
             inputs=shapes.inputs(layout, self.followed(z, one)),
             count=1 if z.ndim == 1 else z.shape[1],
         )
@@ -276,6 +322,11 @@ class Table:
         white = self.get(z, WHITE, quantity)
         coloured = white * self.get(z, "coloured noise", quantity)
         return white, coloured, self.get(z, "correlation time", quantity, default=1.0)
+
+    def wander(self, z: Array, one: SampledLog, sensor: Sensor) -> Any:
+        """Return the standard deviation of what wanders of a sensor's values in a log; 0 unless it is an estimator's
+        velocity."""
+        return self.get(z, WANDER, HORIZONTAL) if one.record.wanders and sensor.is_horizontal_velocity else 0.0
 
     def row_noise(self, z: Array, name: str) -> Any:
         """Return the relative noise of the rows of a table."""
@@ -513,8 +564,11 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
         yield make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
         yield make("slow velocity", HEAVE.name)
-    if any(one.has_positions or one.has_velocities for one in logs):
+    horizontal = {one.record.wanders for one in logs if one.has_positions or one.has_velocities}
+    if False in horizontal:
         yield make("slow velocity", HORIZONTAL)
+    if True in horizontal:
+        yield make(WANDER, HORIZONTAL)
     noises = grouped((m.channel.quantity.name, m.noise) for one in logs for m in one.measured)
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():

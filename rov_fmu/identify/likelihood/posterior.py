@@ -14,7 +14,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.result import USUAL, Interval
+from rov_fmu.identify.result import Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
 
@@ -43,12 +43,21 @@ class Posterior:
 
     @classmethod
     def of(cls, table: Table, z: Array, information: Array, absent: Collection[int] = ()) -> "Posterior":
-        """Return the posterior for the second derivatives of J."""
+        """Return the posterior for the second derivatives of J.
+
+        The common scale of all forces, of which the motion tells nothing, is a coordinate of its own in place of one of
+        its parameters. What the priors tell of it would be lost in rounding beside what exact data tell of each.
+        """
         free = [n for n in range(len(z)) if n not in absent]
-        H = information[np.ix_(free, free)] / 2.0
-        scale = np.sqrt(np.diag(H))  # parameters differ by many orders of magnitude
-        values, vectors = np.linalg.eigh(H / np.outer(scale, scale))
-        root = vectors / np.sqrt(np.maximum(values, _LEAST)) / scale[:, None]
+        forces = table.scale_of_forces(z)[free]
+        basis = np.eye(len(free))
+        if forces.any():
+            most = np.argmax(np.abs(forces))
+            basis[:, most] = forces / forces[most]
+        H = basis.T @ information[np.ix_(free, free)] @ basis / 2.0
+        sizes = np.sqrt(np.diag(H))  # parameters differ by many orders of magnitude
+        values, vectors = np.linalg.eigh(H / np.outer(sizes, sizes))
+        root = basis @ (vectors / np.sqrt(np.maximum(values, _LEAST)) / sizes[:, None])
         covariance = np.zeros_like(information)
         covariance[np.ix_(free, free)] = root @ root.T
         return cls(table, z, covariance, frozenset(absent))
@@ -75,7 +84,7 @@ class Posterior:
                 of[name] = min([of.get(name, _WORST), *along])
         parameters = self.table.parameters
         errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
-        factors = np.sqrt(1.0 + np.where(errors > USUAL, _ALIKE * (errors**2 - 1.0), 0.0))
+        factors = np.sqrt(1.0 + _ALIKE * np.maximum(errors**2 - 1.0, 0.0))
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
@@ -104,6 +113,14 @@ class Posterior:
         assert p.null is not None
         after, before = ((self.z[place] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
         return float(after - before + 2.0 * log(error / p.deviation))
+
+    def without(self, place: int) -> "Posterior":
+        """Return the posterior given that an effect is absent."""
+        column, null = self.covariance[:, place], self.table.parameters[place].null
+        assert null is not None
+        share = column / max(column[place], 1e-300)
+        z, covariance = self.z - share * (self.z[place] - null), self.covariance - np.outer(share, column)
+        return replace(self, z=z, covariance=covariance, absent=self.absent | {place})
 
     def slopes(self, function: Callable[[Array], Array]) -> Array:
         """Return the derivatives of m numbers of the vehicle with respect to the p coordinates, m x p.

@@ -31,6 +31,8 @@ FREE_DECAY = "free decay"
 """The kind of the finding about a log in which a vehicle slows down without thrust."""
 _CALM = 0.3
 """The standard deviation of an unknown velocity at the start, m/s or rad/s."""
+_ANYWHERE = 100.0
+"""The standard deviation of an unknown horizontal position at the start, m."""
 _LEVEL = 0.1
 """The standard deviation of an unknown angle at the start, rad."""
 _LEAST_CHANGE = 0.001
@@ -108,26 +110,28 @@ class SampledLog:
         return max(found)[1] if found else None
 
     def settled_at(self, time: float) -> "SampledLog":
-        """Return the log without the horizontal velocities before a time, s."""
+        """Return the log without the horizontal velocities and positions before a time, s."""
 
         def counts(m: SampledChannel) -> SampledChannel:
-            if not m.sensor.is_horizontal_velocity:
+            if not m.sensor.is_horizontal:
                 return m
             later = m.channel.time >= time
             left = replace(m, channel=replace(m.channel, time=m.channel.time[later], values=m.channel.values[later]))
             return replace(left, noise=_least_noise(left)) if self.lost else left
 
         def some(record: Record) -> Record:
-            horizontal = np.array([sensor.is_horizontal_velocity for sensor in record.sensors])
+            horizontal = np.array([sensor.is_horizontal for sensor in record.sensors])
             kept = (record.time >= time) | ~horizontal[record.sensor]
-            names = [] if kept.all() else [s.axis.velocity for s in record.sensors if s.is_horizontal_velocity]
+            some = [] if kept.all() else [s for s in record.sensors if s.is_horizontal]
+            velocities = dict.fromkeys((s.axis.velocity for s in some if s.is_velocity), _CALM)
+            positions = dict.fromkeys((DRIFTS[s.axis.place] for s in some if not s.is_velocity), _ANYWHERE)
             return replace(
                 record,
                 time=record.time[kept],
                 value=record.value[kept],
                 sensor=record.sensor[kept],
-                start={**record.start, **dict.fromkeys(names, 0.0)},
-                errors={**record.errors, **dict.fromkeys(names, _CALM)},
+                start={**record.start, **dict.fromkeys(velocities, 0.0)},
+                errors={**record.errors, **velocities, **positions},
             )
 
         measured = tuple(counts(m) for m in self.measured)
@@ -206,7 +210,7 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
     thin = _samples(measured, begin, THINNED, averaged=False)
     start, errors = _start(measured, layout, decaying)
     sensors = tuple(m.sensor for m in measured)
-    record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout))
+    record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout), _wanders(measured))
     time, value, sensor = thin
     thinned = replace(record, time=time, value=value, sensor=sensor)
     return SampledLog(log, layout, measured, record, thinned, log.commands.interval, lost)
@@ -293,6 +297,19 @@ def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
             continue
         inside = channel.there & (channel.time >= begin) & (channel.time <= end)
         yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel).values[inside])
+
+
+def _wanders(measured: Sequence[SampledChannel]) -> bool:
+    """Return True if the same messages have a horizontal position and velocity.
+
+    They are of an estimator. Its position is right in the long run, and its velocity is not the rate of this position:
+    errors of accelerations and angles let it wander for seconds.
+    """
+    sources = [
+        {m.channel.source for m in measured if m.sensor.is_horizontal and m.sensor.is_velocity is of}
+        for of in (True, False)
+    ]
+    return not sources[0].isdisjoint(sources[1])
 
 
 def _why_left_out(channel: Channel) -> str:

@@ -6,26 +6,26 @@ the structure is right. Above ALARM, each hypothesis changes the model, J is min
 factor (Laplace approximation), with the prior probability, decides. What wins is part of the model.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from itertools import islice
-from math import inf, log, nan
+from math import hypot, inf, log, nan, sqrt
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Model, Variant, in_order
+from rov_fmu.identify.likelihood.filter import DivergedError, Record
+from rov_fmu.identify.likelihood.hypotheses import CONTRAST, HYPOTHESES, Model, Variant, contrasts, in_order, twins
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, evidence_at, minimise, scaled, total
-from rov_fmu.identify.result import ALARM, least_error
+from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
+from rov_fmu.identify.result import ALARM, USUAL, least_error
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
@@ -37,6 +37,8 @@ _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted in a round, for each place at which J compares them."""
+_LEFT = 0.3
+"""A hypothesis about the thrust explains the errors over 10 s if at most this share of R² - 1 is left."""
 _FAR = 100.0
 """Where one has won, others are not fitted whose J is so much above its own."""
 _FORCE, _LOUD = 0.03, 1.0
@@ -51,8 +53,9 @@ constant this changes."""
 MOST_OF_ROW = 0.5
 """Commands that change within more than this part of the time between two rows are momentary values: they change at any
 time."""
-_SCALE = 0.01
-"""The standard error of the scale of a sensor in a log of an autopilot, whose estimates it has."""
+LEAST_LACK, _LACKS = 0.01, 1.5
+"""What the structure lacks, as a standard error of the logarithms of speeds and inertias: at least the first number,
+and so many times the errors over 10 s beyond the noise, relative to the motion."""
 _IDLE_STEP = 0.1
 """The time between two values of the unknown force that tell when commands do not act, s."""
 _IDLE = 0.5
@@ -70,47 +73,80 @@ Starts = Mapping[Variant, float | None]
 # ---- The alarm -------------------------------------------------------------------------------------------------------
 
 
-def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, float]:
-    """Return how much larger the errors along each axis are than the noise of the sensor: near 1 for a right structure.
+@dataclass(frozen=True)
+class Misfit:
+    """The errors of predictions over 10 s along an axis, the largest ones of its sensors."""
+
+    ratio: float = 0.0
+    """R: relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells it."""
+    lack: float = 0.0
+    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²."""
+
+    def or_larger(self, other: "Misfit") -> "Misfit":
+        """Return the larger one of each number."""
+        return Misfit(max(self.ratio, other.ratio), max(self.lack, other.lack))
+
+
+def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, Misfit]:
+    """Return how much larger the errors along each axis are than the noise of the sensor.
 
     The fit has seen these data, so only its structure can be wrong. The errors are those of predictions over 10 s, even
     where noise explains each next sample. Outliers do not count. The noise is at least 1 % of the motion.
 
     The motion in a log whose commands change between its rows cannot be predicted over 10 s, least of all a heading
     that is unstable without them. The errors of such a log are the innovations of a filter without slow processes,
-    relative to its own standard deviations. If `ahead` is True, they are those of predictions over 10 s there, too, as
-    long as the log has no short force, which stands for these commands.
+    relative to its own standard deviations, and say nothing about the motion. If `ahead` is True, they are those of
+    predictions over 10 s there, too, as long as the log has no short force, which stands for these commands.
     """
-    found: dict[Axis, float] = {}
+    found: dict[Axis, Misfit] = {}
     for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + SETTLING)
+        begin = SETTLING + _late(record)
+        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
         places = [usual & (record.sensor == number) for number in range(len(one.measured))]
-        least = [
-            least_error(m.noise, unchanged(record.time[at], record.value[at], AHEAD)) if at.sum() >= 10 else nan
-            for m, at in zip(one.measured, places, strict=True)
-        ]
+        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in places]
+        noise_of = (hypot(m.noise, objective.table.wander(best.z, one, m.sensor)) for m in one.measured)
+        least = [least_error(noise, change) for noise, change in zip(noise_of, motion, strict=True)]
+        is_motion = not (one.is_momentary or (one.lost and not ahead))
         try:
-            if one.is_momentary or (one.lost and not ahead):
+            if is_motion:
+                run = objective.run(best.z, n, begin=begin, span=AHEAD)
+                errors = run.innovations / np.array(least)[record.sensor]
+            else:
                 run = objective.run(_without_slow_noise(objective.table, best.z), n)
                 errors = run.innovations / np.sqrt(run.variances)
-            else:
-                run = objective.run(best.z, n, begin=SETTLING, span=AHEAD)
-                errors = run.innovations / np.array(least)[record.sensor]
         except DivergedError:
             errors = np.full(len(record.time), inf)
-        for m, at in zip(one.measured, places, strict=True):
+        for m, at, noise, change in zip(one.measured, places, least, motion, strict=True):
             if at.sum() >= 10:
-                found[m.sensor.axis] = max(found.get(m.sensor.axis, 0.0), rms(errors[at]))
+                R = rms(errors[at])
+                lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and change > 0.0 else 0.0
+                found[m.sensor.axis] = Misfit(R, lack).or_larger(found.get(m.sensor.axis, Misfit()))
     return found
 
 
+def _late(record: Record) -> float:
+    """Return how long after the first sample of a log all sensors have begun, s; 0 if this is most of the log.
+
+    A prediction that begins without velocities is worse than the model.
+    """
+    first = [record.time[record.sensor == n][:1] for n in range(len(record.sensors))]
+    late = float(np.concatenate(first).max() - record.time[0])
+    return late if late < 0.5 * (record.time[-1] - record.time[0]) else 0.0
+
+
+def worst(found: Mapping[Axis, Misfit]) -> float:
+    """Return the largest error R of all axes; 0 where nothing tells it."""
+    return max((one.ratio for one in found.values()), default=0.0)
+
+
 def _without_slow_noise(table: Table, z: Array) -> Array:
-    """Return the parameters with no slow processes. Coloured noise and short forces are at most as large as usual."""
+    """Return the parameters without what disturbs the motion slowly. Coloured noise and short forces are at most as
+    large as usual."""
     quiet = z.copy()
     for n, p in enumerate(table.parameters):
         if p.of_kind.hides_structure:
             quiet[n] = min(z[n], p.mean)
-        elif p.of_kind.is_size:
+        elif p.of_kind.is_size and not p.of_kind.is_of_sensor:
             quiet[n] = p.low
     return quiet
 
@@ -121,44 +157,46 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
     return {file: 1.0 if width > MOST_OF_ROW else max(float(width), _NARROWEST) for file, width in found.items()}
 
 
-def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float]) -> Array:
-    """Return the covariance of the parameters by errors that a log does not show if its commands change between rows.
+def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
+    """Return the covariance of the parameters by errors that do not become smaller with the number of samples.
 
-    Along each axis, commands act a small part of their window earlier or later, because a stick and a controller change
-    them at other times. The axis then answers earlier or later, as if it had another inertia, and a fast axis the more.
-    Such a log also has the estimates of an autopilot, whose scale is not exact. With a scale s, a velocity v reads s v,
-    as if the drag were a/s² and b/s, and the inertia m/s.
+    What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
+    and the inertia m/s. It acts on times as a scale of the inertia alone. It is as large in unseen data, so it has the
+    size of the errors over 10 s.
+
+    Where commands change between the rows of a log, they act a small part of their window earlier or later along each
+    axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
+    had another inertia, and a fast axis the more.
 
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
     now, parameters = windows(objective, z), objective.table.parameters
     widths = [one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.lost]
     found = np.zeros((len(z), len(z)))
-    if not widths:
-        return found
     vehicle, shapes = objective.table.model(z)
-    for axis in vehicle.layout.bare_axes:
+    for axis, misfit in misfits.items():
+        lack = hypot(LEAST_LACK, min(_LACKS * misfit.lack, 1.0))
+        scale = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
+        is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
+        found += lack**2 * (np.outer(scale, scale) + np.diag(is_inertia))
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
-        own = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
-        found += _SCALE**2 * np.outer(own, own)
-        if 0.0 < time < inf:
-            is_inertia = np.array([p.kind == INERTIA and p.of == axis.name for p in parameters])
+        if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (_LATE * max(widths) / time) ** 2)
     return found
 
 
-def with_shared(layout: Layout, errors: Mapping[Axis, float]) -> dict[Axis, float]:
-    """Return the error of each axis. Where nothing measures one, it is the largest of those that share a thruster.
+def with_shared(layout: Layout, errors: Mapping[Axis, Misfit]) -> dict[Axis, Misfit]:
+    """Return the misfit of each axis. Where nothing measures one, it is the largest of those that share a thruster.
 
     Where both are measured, a fault of the thrusters shows in both. What shows in one alone acts on this one alone,
     such as waves or a tether.
     """
-    return {
-        axis: errors[axis]
-        if axis in errors
-        else max((error for other, error in errors.items() if layout.shares_thrusters(axis, other)), default=0.0)
-        for axis in layout.bare_axes
-    }
+
+    def shared(axis: Axis) -> Misfit:
+        along = (error for other, error in errors.items() if layout.shares_thrusters(axis, other))
+        return reduce(Misfit.or_larger, along, Misfit())
+
+    return {axis: errors[axis] if axis in errors else shared(axis) for axis in layout.bare_axes}
 
 
 # ---- Before any fit --------------------------------------------------------------------------------------------------
@@ -319,6 +357,10 @@ class Explained:
     adopted: tuple[Adopted, ...]
     rivals: tuple[Posterior, ...]
     """The fits with hypotheses that did not win, and whose odds are near even."""
+    nearest: Starts
+    """The hypotheses that are more probable than others, but do not explain the errors over 10 s."""
+    alike: tuple[tuple[str, ...], ...]
+    """Thrusters along one axis whose forces the data do not tell apart."""
 
 
 def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf) -> Trial | None:
@@ -339,23 +381,12 @@ def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: f
 
 
 def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
-    """Return the minimum of J with some hypotheses for all samples, from a fit that they hardly move.
-
-    It ends where the evidence within reach is clearly below that of this fit. The result is None if a motion diverges.
-    """
-    model, least = model.applied(*starts), near.score - CLOSE - prior
+    """Return the minimum of J with some hypotheses, from the end of another fit; None if a motion diverges."""
+    model = model.applied(*starts)
     objective = model.objective()
-
-    def promises(value: float, information: Array) -> bool:
-        return evidence(objective, value, information) > least
-
     with suppress(DivergedError):
         start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
-        full, quick = minimise(objective, start, last=False, promises=promises), -inf
-        if promises(full.value, full.information):
-            thinned = model.objective(thinned=True)
-            quick = evidence_at(thinned, minimise(thinned, full.z, enough=QUICK, last=False))
-        return _trial(starts, model, objective, full, prior, quick)
+        return _trial(starts, model, objective, minimise(objective, start, last=False), prior, near.quick)
     return None
 
 
@@ -374,7 +405,7 @@ def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
     Only J of the other samples is compared.
     """
     adopted = list[Adopted]()
-    if max(structure(plain.objective, plain.minimum, ahead=True).values(), default=0.0) > ALARM:
+    if worst(structure(plain.objective, plain.minimum, ahead=True)) > ALARM:
         for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
             variants = [Variant(kind, of) for of in HYPOTHESES[kind].variants(plain.model.known, plain.model.logs)]
             for one in variants:
@@ -421,13 +452,58 @@ class StructureSearch:
                 rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = self._without_absent(best)
-        now, trials = self.now, [one for one in self.tried.values() if one]
+        now, nearest = self._explaining()
+        trials = [one for one in self.tried.values() if one]
         adopted = (
             Adopted(variant, now.score - max(one.score for one in trials if variant not in one.starts))
             for variant in in_order(now.starts)
         )
         posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
-        return Explained(now, tuple(adopted), tuple(posteriors))
+        return Explained(now, tuple(adopted), tuple(posteriors), nearest, tuple(self._alike()))
+
+    def _alike(self) -> Iterator[tuple[str, ...]]:
+        """Yield the groups of commanded thrusters along one axis that the data do not tell apart."""
+        known, logs = self.model.known, self.model.logs
+        unknown = [name for name, error in self.contrasts.items() if error >= CONTRAST]
+        names = {twin for name in unknown for twin in twins(known, logs, name)}
+        along = [known.layout.thrusters_along(axis) for axis in known.layout.bare_axes]
+        groups = (tuple(t.name for t in some if t.name in names) for some in along)
+        yield from dict.fromkeys(group for group in groups if len(group) > 1)
+
+    def _explaining(self) -> tuple[Trial, Starts]:
+        """Return the fit with those hypotheses that explain the errors over 10 s, and the others that had won.
+
+        Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
+        else. A lag hardly shows in these errors, and J sees it.
+        """
+        now, nearest = self.now, dict[Variant, float | None]()
+        while doubtful := {v: z for v, z in now.starts.items() if not self._explains(now, v)}:
+            nearest |= doubtful
+            now = self._best_of(now.starts.keys() - doubtful.keys())
+        return now, nearest
+
+    def _best_of(self, variants: Collection[Variant]) -> Trial:
+        """Return the most probable fit with only some of these hypotheses."""
+        some = (one for one in self.tried.values() if one and one.starts.keys() <= {*variants})
+        return max(some, key=lambda one: one.score)
+
+    def _explains(self, now: Trial, variant: Variant) -> bool:
+        """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger."""
+        if not HYPOTHESES[variant.kind].changes_thrust or HYPOTHESES[variant.kind].has_times:
+            return True
+        layout = now.model.known.layout
+        without = self._best_of(now.starts.keys() - {variant})
+        before, after = (structure(one.objective, one.minimum) for one in (without, now))
+        ill = [t for t in layout.thrusters if t.name in variant.of or not variant.of]
+        on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
+        others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
+        worst_of = max(on, key=lambda axis: before[axis].ratio, default=None)
+        if worst_of is None:  # nothing tells these errors
+            return others
+        if before[worst_of].ratio <= min(USUAL, HYPOTHESES[variant.kind].alarm):
+            return False
+        left = (after[worst_of].ratio ** 2 - 1.0) / (before[worst_of].ratio ** 2 - 1.0)
+        return others and left <= _LEFT and all(after[axis].ratio <= ALARM for axis in on)
 
     def _gain(self, other: Trial) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""
@@ -454,7 +530,19 @@ class StructureSearch:
         kinds = ((kind, one) for kind, one in HYPOTHESES.items() if not one.is_first)
         every = (Variant(kind, of) for kind, one in kinds for of in one.variants(known, logs))
         some = (timed(self.model, plain.objective, plain.minimum.z, one) for one in every)
-        return [one for one in some if one.of or not HYPOTHESES[one.kind].has_times]
+        return [
+            one
+            for one in some
+            if (one.of or not HYPOTHESES[one.kind].has_times)
+            and (not HYPOTHESES[one.kind].is_contrast or all(self.contrasts.get(n, inf) < CONTRAST for n in one.of))
+        ]
+
+    @cached_property
+    def contrasts(self) -> dict[str, float]:
+        """The standard error of the health of each thruster by the data alone; empty if a motion diverges."""
+        with suppress(DivergedError):
+            return contrasts(self.model, place_of(self.plain.objective.table, self.plain.minimum.z))
+        return {}
 
     @property
     def _smaller(self) -> list[Starts]:
@@ -481,20 +569,16 @@ class StructureSearch:
         for starts, gain in [*self._promising()]:
             if gain < won - _FAR:
                 continue
-            is_shown, prior = gain > -inf, self._prior(starts)
-            if is_shown:
-                enough = max(one.quick for one in (self.now, *fits)) - WINS
-                trial = fitted(self.model, starts, prior, self.search, enough)
-                # Without a trial, the evidence of thinned logs is not enough.
-                is_worse = trial.score < self.now.score if trial else enough < self.now.quick
-                if is_worse and starts.keys() > self.now.starts.keys():
-                    self.lost[self._new(starts)] = gain
-            else:
-                trial = refitted(self.model, starts, prior, self.now)
+            enough = max(one.quick for one in (self.now, *fits)) - WINS
+            trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
+            # Without a trial, the evidence of thinned logs is not enough.
+            is_worse = trial.score < self.now.score if trial else enough < self.now.quick
+            if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():
+                self.lost[self._new(starts)] = gain
             self.tried[frozenset(starts)] = trial
             if trial:
                 fits.append(trial)
-                if is_shown and trial.score > self.now.score + _FAR:
+                if trial.score > self.now.score + _FAR:
                     won = max(won, gain)
         return fits
 
@@ -504,9 +588,9 @@ class StructureSearch:
         The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
         """
         now = self.now
-        predicted = filtered = max(structure(now.objective, now.minimum, ahead=True).values(), default=0.0)
+        predicted = filtered = worst(structure(now.objective, now.minimum, ahead=True))
         if any(one.lost and not one.is_momentary for one in now.model.logs):
-            filtered = max(structure(now.objective, now.minimum).values(), default=0.0)
+            filtered = worst(structure(now.objective, now.minimum))
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
@@ -514,7 +598,7 @@ class StructureSearch:
             hypothesis = HYPOTHESES[one.kind]
             if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
-            for some in self._smaller if hypothesis.changes_thrust else [now.starts]:
+            for some in self._smaller:
                 if len(some) < _MOST and not any(one.excludes(other) for other in some):
                     sets = [{**some, one: start} for start in hypothesis.starts or (None,)]
                     (shown if hypothesis.changes_thrust else others).extend(sets)

@@ -275,15 +275,12 @@ def scaled(objective: Objective, z: Array) -> Array:
     Motion does not tell this scale, and steps of the fit, which are short where the data have kinks, hardly move it.
     The parameters stay if J would not fall: measured forces, and axes with exact coefficients, tell the scale.
     """
-    direction = objective.table.each("of_kind.force_power")
-    loads = ~objective.table.each("is_log") & (direction != 0.0)
-    no_load = np.array([p.null or 0.0 for p in objective.table.parameters])
-    direction[loads] = (z - no_load)[loads]
+    direction = objective.table.scale_of_forces(z)
     if not direction.any():
         return z
     weight = direction / objective.deviation**2
     change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
-    moved = z + direction * np.where(loads, np.expm1(change), change)  # the others are logarithms
+    moved = z + direction * np.where(objective.table.each("is_log"), change, np.expm1(change))
     moved = np.clip(moved, objective.low, objective.high)
     before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
     return moved if after < before else z

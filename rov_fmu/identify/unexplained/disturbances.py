@@ -10,7 +10,7 @@ from rov_fmu.equation.catalogue import AXES, HEAVE
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import Parameter
+from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior, around
 from rov_fmu.identify.likelihood.solve import Minimum, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
@@ -89,7 +89,7 @@ def _disturbance(
     one, run, time = objective.logs[number], runs[number], objective.records[number].time
     slow = SLOW[parameter.kind]
     columns = objective.filters[number].places_of(slow.acts_as, parameter.of)
-    if not columns:
+    if not columns or (one.record.wanders and parameter.of == HORIZONTAL):
         return None
     axis = AXES.get(parameter.of)
     states, deviations = run.states[:, columns], run.deviations[:, columns]

@@ -208,13 +208,14 @@ def _is_tuned(vehicle: Vehicle) -> bool:
 
 def plot_steady(ax: Axes, vehicle: Vehicle, axis: Axis, table: ResponseTable | None) -> None:
     """Plot V_ss over the command with and without tuning, the measured points, and the range of valid commands."""
-    low, high = (100.0 * end for end in vehicle.command_range)
+    low = 100.0 * vehicle.command_range[0]
+    astern, ahead = (100.0 * end for end in vehicle.tested_along(axis))
     factor, unit = in_degrees(axis.unit)
     least = -100 if differs_by_direction(vehicle, axis) else 0
-    if (low, high) != (0.0, 100.0):
-        ax.axvspan(low, high, label="valid commands", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+    if (low, ahead) != (0.0, 100.0):
+        ax.axvspan(low, max(low, ahead), label="valid commands", facecolor=LIGHT["band"], edgecolor="none", zorder=0)
         if least:
-            ax.axvspan(-high, -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+            ax.axvspan(min(astern, -low), -low, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
     commands = range(least, 101, 2)
     models = [("tuned", vehicle, "blue", "-")]
     if _is_tuned(vehicle):

@@ -34,8 +34,8 @@ _INSTANCES = {"C": "core", "I": "instance", "Inst": "instance", "Instance": "ins
 """The fields of a DataFlash message with the number of the filter's core, or of the sensor or battery."""
 _FLAGS = ("flags", "flags.bits", "SS")
 """The fields with these flags, in a .tlog, in JSON and in a DataFlash log."""
-_HORIZONTAL = {"vx", "vy", "VN", "VE"}
-"""The fields that are unknown where the filter does not know the horizontal velocity."""
+_HORIZONTAL = {"vx", "vy", "VN", "VE", "x", "y", "PN", "PE"}
+"""The fields that are unknown where the filter does not know the horizontal velocity: it then holds the position."""
 
 
 @dataclass

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
 
 from rov_fmu.c.compile import C_SOURCES, FILTER_LANES_FILE, VECTORS_HEADER, compile_engine
 from rov_fmu.c.simulation import simulate
@@ -321,6 +322,36 @@ def test_the_mean_is_the_motion_of_the_engine(name: str) -> None:
     assert np.ptp(variables, axis=1).min() > 0.01
 
 
+@pytest.mark.parametrize("power", [-0.6, 0.5])
+def test_the_mean_has_another_power_of_drag(power: float) -> None:
+    """SciPy integrates w and F, ahead and astern, where drag has other coefficients astern."""
+    k = heave(T_top=0.2, F_0_w=0.1, a_d_w_reverse=14.0, b_d_w_reverse=0.9)
+    time = 0.1 * np.arange(60.0)
+
+    def rates(t: float, x: Array) -> list[float]:
+        (w, F), c = x.tolist(), float(COMMANDS[np.searchsorted(SWITCHES, t, side="right") - 1])
+        end = "_reverse" if w < 0.0 else ""
+        drag = (k[f"a_d_w{end}"] * abs(w) * abs(w / 0.3) ** (power - 0.1 * (w < 0.0)) + k[f"b_d_w{end}"]) * w
+        moved = (k["alpha_w"] * F + 0.1 - drag) * k["beta_w"] / k["m_rov"]
+        return [moved, ((k["a_t_top"] * abs(c) + k["b_t_top"]) * c - F) / k["T_top"]]
+
+    x, expected = np.array([START["w"], START["F_t"]]), list[Array]()
+    for begin, end in zip(SWITCHES, [*SWITCHES[1:], 6.0], strict=True):
+        at = time[(time >= begin) & (time < end)]
+        run_of = solve_ivp(rates, (begin, end - 1e-12), x, "DOP853", dense_output=True, rtol=1e-10, atol=1e-12)
+        expected.append(run_of.sol(at)[0])
+        x = run_of.y[:, -1]
+    log = record((VELOCITY,), [(t, 0) for t in time.tolist()], between=0.0)
+    known = parameters(k, 1, white=(1e9,), powers=((power, power - 0.1, 0.3),))
+    found = Filter(k).run(log, known)
+    assert -found.innovations == pytest.approx(np.concatenate(expected), abs=1e-4)
+    plain = Filter(k).run(log, replace(known, powers=()))
+    assert np.abs(plain.innovations - found.innovations).max() > 0.01
+    assert (
+        Filter(k).run(log, replace(known, powers=((0.0, 0.0, 0.3),))).innovations.tolist() == plain.innovations.tolist()
+    )
+
+
 def test_a_measured_tilt_turns_the_net_weight_and_the_way() -> None:
     """Of a vehicle without roll and pitch; the tilt is the same from the first to the last sample."""
     share, sensors = cos(0.5) * cos(0.3), (TOLD["w"], DEPTH)
@@ -409,6 +440,7 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
         known,
         coefficients={name: value * random.uniform(0.9, 1.1, count) for name, value in known.coefficients.items()},
         white=tuple(sigma * random.uniform(0.5, 2.0, count) for sigma in known.white),
+        powers=tuple((*random.uniform(-0.6, 0.6, (2, count)), 0.3) for _ in k.layout.axes),
         offset=random.uniform(-0.1, 0.1, count),
         width=random.uniform(0.0, 1.0, count),
         count=count,
@@ -432,8 +464,8 @@ def test_functions_of_vectors_are_exact_to_rounding(tmp_path: Path) -> None:
         #define EXPORT __attribute__((visibility("default")))
         EXPORT void compute(const double x[], const double y[], double found[], long n) {
             for (long k = 0; k < n; k++) {
-                const real a = x[k], b = y[k], each[4] = {sin(a), cos(a), atan2(a, b), exp(b)};
-                for (int f = 0; f < 4; f++) { found[4 * k + f] = LANE(each[f], k % LANES); }
+                const real a = x[k], b = y[k], each[5] = {sin(a), cos(a), atan2(a, b), exp(b), logarithm(fabs(a))};
+                for (int f = 0; f < 5; f++) { found[5 * k + f] = LANE(each[f], k % LANES); }
             }
         }"""
     files = VECTORS_HEADER, C_SOURCES / "real.h", FILTER_LANES_FILE
@@ -442,13 +474,13 @@ def test_functions_of_vectors_are_exact_to_rounding(tmp_path: Path) -> None:
     random, count = np.random.default_rng(3), 5000
     x = random.uniform(-1.0, 1.0, count) * 10.0 ** random.uniform(-8.0, 5.0, count)
     y = random.uniform(-700.0, 700.0, count)
-    y[:6], x[:3] = (0.0, -0.0, 1e-300, -750.0, 750.0, np.nan), (0.0, 1.0, -1e-300)
-    found = np.zeros((count, 4))
+    y[:6], x[:3] = (0.0, -0.0, 1e-300, -750.0, 750.0, np.nan), (2.0**-0.5, 1.0, -1e-300)
+    found = np.zeros((count, 5))
     pointers = [ctypes.c_void_p(array.ctypes.data) for array in (x, y, found)]
     ctypes.CDLL(str(library)).compute(*pointers, ctypes.c_long(count))
     a, b = x.astype(np.longdouble), y.astype(np.longdouble)
     with np.errstate(over="ignore", under="ignore"):
-        expected = np.column_stack([np.sin(a), np.cos(a), np.arctan2(a, b), np.exp(b)]).astype(float)
+        expected = np.column_stack([np.sin(a), np.cos(a), np.arctan2(a, b), np.exp(b), np.log(np.abs(a))]).astype(float)
     expected[3:5, 3] = 0.0, np.inf
     assert found == pytest.approx(expected, rel=1e-15, abs=3e-16, nan_ok=True)
 

@@ -10,6 +10,7 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood import parameters
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, table_of
@@ -43,10 +44,28 @@ def place(objective: Objective) -> Array:
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
     found = minimise(objective, objective.mean + louder * objective.deviation)
     root = np.linalg.cholesky(np.linalg.inv(found.information / 2.0))
-    z = found.z + 0.3 * root @ np.random.default_rng(1).standard_normal(len(root))
+    z = found.z + 0.3 * root @ np.random.default_rng(2).standard_normal(len(root))
     z = np.clip(z, objective.low + 0.01 * objective.deviation, objective.high - 0.01 * objective.deviation)
     assert all(np.abs(one.innovations / np.sqrt(one.variances)).max() < 3.9 for one in objective.runs(z))
     return np.asarray(z, float)
+
+
+def test_quadratic_drag_is_that_of_the_model_without_another_power(objective: Objective, place: Array) -> None:
+    """J without the prior of q is equal at q = 0, and almost equal next to it."""
+    powers = [n for n, p in enumerate(objective.table.parameters) if p.kind.startswith("power of drag")]
+    assert len(powers) == 4
+    rest = tuple(p for p in objective.table.parameters if not p.kind.startswith("power of drag"))
+    plain = Objective(replace(objective.table, parameters=rest), objective.logs, objective.rows)
+    without = np.delete(place, powers)
+    runs = plain.runs(without)
+    J = plain.value(without, runs)
+    for q in (0.0, 1e-11, -1e-11):
+        z = place.copy()
+        z[powers] = q
+        own = objective.runs(z, runs)
+        assert objective.value(z, own) == pytest.approx(J, abs=1e-6, rel=0.0)
+        (trial,) = objective.trials(z[:, None], [objective.whole], runs)
+        assert trial[0] == pytest.approx(J, abs=1e-6, rel=0.0)
 
 
 def both_ways(objective: Objective, z: Array, n: int, runs: Sequence[Run]) -> Iterator[tuple[float, Array, list[Run]]]:
@@ -62,6 +81,22 @@ def both_ways(objective: Objective, z: Array, n: int, runs: Sequence[Run]) -> It
 
 def names(parameters: Sequence[Parameter]) -> list[str]:
     return [" ".join(filter(None, (p.kind, p.of, p.part))) for p in parameters]
+
+
+def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
+    objective: Objective, place: Array, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The motion does not depend on it, and derivatives lose much at a kink. Here, their steps are far too long.
+
+    An assumed thrust would otherwise be told within 1 % by a log that is nearly exact.
+    """
+    monkeypatch.setattr(parameters, "_MOTION_STEP", 0.03)
+    logs = objective.of(Part(range(len(objective.logs)), []))
+    scale = objective.table.scale_of_forces(place)
+    for is_exact in (True, False):
+        for one in logs.data(place, logs.runs(place), exact=is_exact):
+            along = np.linalg.norm(one.slopes @ scale[[*one.places]])
+            assert along < 1e-4 * np.linalg.norm(one.slopes * scale[[*one.places]])
 
 
 def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
@@ -160,7 +195,7 @@ def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objec
         assert (found.z == best.z)[~of_motion].all(), "the noise stays"
         (again,) = refits(own, minimise(own, found.z), [own.whole])
         errors = np.sqrt(np.diag(np.linalg.inv(again.information / 2.0)))
-        assert (np.abs(found.z - again.z) < 1.0 * errors)[of_motion].all()
+        assert (np.abs(found.z - again.z) < 1.5 * errors)[of_motion].all()
 
 
 def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objective: Objective, place: Array) -> None:

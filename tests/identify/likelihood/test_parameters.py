@@ -62,11 +62,15 @@ inertia surge: ln 1 ± 0.5, 0 to inf
 quadratic drag surge: ln 3.16 ± 1, 0 to inf
 linear drag surge: ln 9.38 ± 1.5, 0 to inf
 drag astern surge: 0 ± 0.2, -inf to inf, absent at 0
+power of drag surge: 0 ± 0.3, -0.8 to 1.5, absent at 0
+power of drag astern surge: 0 ± 0.2, -0.8 to 0.8, absent at 0
 load surge: 0 ± 0.05, -inf to inf, absent at 0
 inertia heave: ln 1 ± 0.5, 0 to inf
 quadratic drag heave: ln 18.7 ± 1, 0 to inf
 linear drag heave: ln 0.632 ± 1.5, 0 to inf
 drag astern heave: 0 ± 0.2, -inf to inf, absent at 0
+power of drag heave: 0 ± 0.3, -0.8 to 1.5, absent at 0
+power of drag astern heave: 0 ± 0.2, -0.8 to 0.8, absent at 0
 load heave: 0 ± 0.05, -inf to inf, absent at 0
 logging offset log_heave_0.csv: -0.05 ± 0.05, -inf to inf
 logging width log_heave_0.csv: 0.5 ± 0.5, 0 to 1
@@ -151,6 +155,13 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
     sideways = of("slow velocity", "horizontal")
     drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
+    for p, tested in ((one, HEAVE), (other, SURGE)):
+        ((q, back, typical),) = p.powers
+        more = [of(f"power of drag{end}", tested.name) for end in ("", " astern")]
+        assert np.array([q, back - q]) == pytest.approx(more)
+        quadratic, linear = (base[tested.coefficient(key)] for key in ("a_d", "b_d"))
+        quarter = 0.25 * table.full[tested.name]
+        assert quadratic * typical**2 + linear * typical == pytest.approx(quarter), "of full thrust"
     assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "to the north")]
 
 

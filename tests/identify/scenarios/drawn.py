@@ -13,7 +13,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.signal import lfilter
 
-from rov_fmu.identify.assess import ANSWERED
+from rov_fmu.identify.assess import COMMANDS
 from tests.folders import THRUSTER
 from tests.identify.scenarios.scenario import (
     NOTHING_SPECIAL,
@@ -187,7 +187,7 @@ class Drawn:
         health = [abs(h) for h in self.fault.health]
         found: dict[tuple[str, str], float] = {}
         for axis in self.sensors:
-            for command in ANSWERED:
+            for command in COMMANDS:
                 names = [(axis, name) for name in answer_names(command)]
                 followed = copysign(min(abs(command), self.fault.saturation), command)
                 found |= zip(names, body.answers(axis, followed, health, rotor=self.fault.rotor), strict=True)

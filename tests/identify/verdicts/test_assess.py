@@ -1,19 +1,32 @@
 """How fast, how soon and how far: the uncertainty of the answers."""
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.stats import t
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE
-from rov_fmu.identify.assess import answers, answers_of_file
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
+from rov_fmu.identify.assess import answers, answers_of_file, commands_of_answers
+from rov_fmu.identify.assess import tested_commands as of_tests
+from rov_fmu.identify.beginning import begin, load_tests
+from rov_fmu.identify.likelihood.fit import Fit
+from rov_fmu.identify.likelihood.hypotheses import Model
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.result import half_width
+from rov_fmu.identify.result import Tested, half_width
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT
+from tests.folders import HEAD, MASS, TURNS, folder_of, responses
+from tests.identify.conftest import FORCES
 from tests.vehicles import VIDEORAY, extended
+
+FULL = (1.0, 1.0)
+"""Tests of all commands."""
 
 
 def of_drag(deviation: float) -> Posterior:
@@ -33,7 +46,7 @@ def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
         return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_distance(abs(V), 0.1)])
 
     more, less = (VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(s)) for s in (0.01, -0.01))
-    found = answers([uncertain], SURGE, file)
+    found = answers([uncertain], SURGE, file, FULL)
     assert axis
     assert [one.command for one in found] == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0]
     for one in found:
@@ -47,7 +60,7 @@ def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
             assert low < value < high
             ends = np.minimum(fitted * np.exp(-width), number * 0.99), np.maximum(fitted * np.exp(width), number * 1.01)
             assert sorted(map(abs, (low, high))) == pytest.approx(ends, rel=1e-3)
-    for one in answers([of_drag(0.0)], SURGE, VIDEORAY):
+    for one in answers([of_drag(0.0)], SURGE, VIDEORAY, FULL):
         for value, (low, high) in (one.steady, one.rise):
             assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
 
@@ -60,7 +73,7 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     z = np.array([0.2, np.log(rov.effective_inertia(rov.layout.by_name["surge"]))])
 
     def half(posterior: Posterior) -> float:
-        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov) if one.command == 0.5)
+        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov, FULL) if one.command == 0.5)
         assert lagged
         assert lagged[1][0] < lagged[0] < lagged[1][1]
         return half_width(lagged)
@@ -71,14 +84,14 @@ def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_pa
     )
     assert opposed < alone < equal
     assert alone**2 == pytest.approx(0.5 * (opposed**2 + equal**2), rel=0.05), "as variances add"
-    assert not any(one.lagged for one in answers([of_drag(0.04)], SURGE, VIDEORAY)), "it has no lag"
+    assert not any(one.lagged for one in answers([of_drag(0.04)], SURGE, VIDEORAY, FULL)), "it has no lag"
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:
     losing, exact = extended(VIDEORAY, d_rear=3.0), of_drag(0.0)
     table = replace(exact.table, layout=losing.layout, base=losing.coefficients)
     half, full = (
-        next(a for a in answers([replace(exact, table=table)], SURGE, losing, strongest=0.5) if a.command == command)
+        next(a for a in answers([replace(exact, table=table)], SURGE, losing, (0.5, 0.5)) if a.command == command)
         for command in (0.5, 1.0)
     )
     V, _ = losing.response(SURGE, 0.5)
@@ -97,7 +110,7 @@ def test_intervals_contain_what_a_part_of_the_data_says_where_it_differs_by_more
     part, difference = of_drag(0.05), share * t.ppf(0.975, 10) * 0.04
     other = replace(part, z=part.z + difference)
     V, Tau = VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(difference)).response(SURGE, 0.5)
-    alone, both = (answers([of_drag(0.03)], SURGE, VIDEORAY, fits=fits)[2] for fits in ((), [other]))
+    alone, both = (answers([of_drag(0.03)], SURGE, VIDEORAY, FULL, fits=fits)[2] for fits in ((), [other]))
     if share < 1.0:
         assert (both.steady, both.rise, both.stop) == (alone.steady, alone.rise, alone.stop)
     else:
@@ -118,3 +131,44 @@ def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
             assert value == pytest.approx(own)
             assert interval == pytest.approx(np.quantile(some, (0.025, 0.975)), abs=0.3 * np.std(some))
         assert exact.steady == (exact.steady[0], (exact.steady[0], exact.steady[0]))
+
+
+def test_a_command_is_tested_by_the_motion_along_its_axis_that_it_holds(fit: Fit) -> None:
+    """Logs of heave and yaw held 30 % ahead for 8 s and 20 % astern for 6 s; the thrust tables went to 80 %."""
+    found, z = of_tests(fit.objective, fit.best.z), fit.best.z
+    assert {*found} == {*fit.known.layout.bare_axes}
+    for axis in (HEAVE, YAW):
+        astern, ahead = found[axis]
+        assert 0.12 < astern <= 0.2, "it was still gaining speed"
+        assert 0.24 < ahead <= 0.3
+
+    def commanded(change: Callable[[Array], Array]) -> dict[Axis, Tested]:
+        fine = [one.refined(0.1) for one in fit.objective.logs]
+        logs = [one.with_inputs(change(one.record.inputs.copy())) for one in fine]
+        return of_tests(Objective(fit.objective.table, logs, fit.objective.rows), z)
+
+    def with_a_peak(inputs: Array) -> Array:
+        inputs[5] = 1.0
+        return inputs
+
+    peaked, weaker = commanded(with_a_peak), commanded(lambda inputs: 0.5 * inputs)
+    for axis in (HEAVE, YAW):
+        assert peaked[axis][1] == pytest.approx(found[axis][1], abs=0.03), "the vehicle hardly moved in 0.1 s"
+        assert weaker[axis][0] <= 0.1
+        assert weaker[axis][1] == pytest.approx(0.15), "of what moved the vehicle faster, no command tells"
+
+
+def test_a_steady_table_tests_its_commands_and_thrust_tables_test_none(tmp_path: Path) -> None:
+    tables = responses(VIDEORAY, HEAVE)
+    tests = load_tests(folder_of(tmp_path, f"{HEAD}[known]\n{MASS}{TURNS}", {**FORCES, **tables}))
+    known, logs, rows = begin(tests)
+    objective = Model(known, logs, rows).objective()
+    assert of_tests(objective, objective.mean)[HEAVE] == (0.7, 0.8)
+
+
+@pytest.mark.parametrize(
+    ("tested", "more"),
+    [((0.7, 0.57), [-0.7, 0.57]), ((0.0, 0.5), []), ((0.31, 0.97), []), ((0.04, 0.6), [0.6])],
+)
+def test_the_strongest_tested_commands_are_answered_unless_they_are_usual(tested: Tested, more: list[float]) -> None:
+    assert commands_of_answers(tested) == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0, *more]

@@ -12,6 +12,7 @@ import pytest
 from rov_fmu import load
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.fmu.card import card_text
+from rov_fmu.identify.assess import COMMANDS
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.identify import identify
@@ -149,8 +150,8 @@ def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> Non
     assert {axis.axis for axis in result.axes} == {HEAVE, YAW}
     assert not result.vehicle.layout.has(SURGE)
     speeds = {one.command: one.steady for axis in result.axes if axis.axis is YAW for one in axis.answers}
-    for command, (value, (low, high)) in speeds.items():
-        truth = truths["yaw", f"V_ss {100.0 * command:g} %"]
+    for command in COMMANDS:
+        (value, (low, high)), truth = speeds[command], truths["yaw", f"V_ss {100.0 * command:g} %"]
         assert abs(value / truth - 1.0) < 0.005
         assert low < truth < high
 

@@ -65,7 +65,11 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "do not use",
             "An unknown slow velocity over ground of 1.0 N (RMS) acts in log.csv.",
         ),
-        ({"answers": results.answers(1.0, 0.2)}, "usable", "A steady velocity is known to no better than 20%."),
+        (
+            {"answers": results.answers(1.0, 0.2)},
+            "usable",
+            "The steady velocity at -100% is known to no better than 20% of the largest tested one.",
+        ),
         ({"answers": ()}, "do not use", "No steady velocity is determined."),
         (
             {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
@@ -73,7 +77,7 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
         ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
-        ({"effects": [replace(SLOW, beyond=2.4)]}, "good", ""),
+        ({"effects": [replace(SLOW, beyond=0.96)]}, "good", ""),
         ({"is_assumed": True}, "usable", "The mass and the thrusters are assumed."),
         ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
         (
@@ -147,9 +151,10 @@ def test_a_rule_lowers_the_verdict_just_beyond_its_limits(rule: Any) -> None:
         ((0.7, 0.0), (0.3, 0.5, 1.0), "good"),
         ((0.7, 0.7), (-1.0, 1.0), "good"),
         ((0.0, 0.7), (0.5,), "do not use"),
-        ((0.7, 0.7), (-0.3,), "do not use"),
+        ((0.7, 0.7), (-0.5,), "do not use"),
+        ((0.7, 0.7), (-0.3,), "usable"),  # 40 % of this speed are 24 % of the largest one
         ((1.0, 1.0), (1.0,), "do not use"),
-        ((0.0, 0.0), (-0.3,), "do not use"),
+        ((0.0, 0.0), (-1.0,), "do not use"),
     ],
 )
 def test_what_nobody_tested_does_not_decide(tested: tuple[float, float], loose: tuple[float, ...], word: str) -> None:
@@ -163,9 +168,10 @@ def test_no_reason_has_a_percentage_beyond_0_and_100(size: float) -> None:
     kinds = ("unknown dist", "half-width of the widest V_ss", "the same of times", "held-out V_ss")
     for made in [*(MADE[kind](size) for kind in kinds), MADE["score G"](-size)]:
         reasons = " ".join(verdict(AxisResult(HEAVE, **(USUAL | made))).reasons)
+        reasons = re.sub(r"at -?\d+%", "", reasons)  # a command
         shares = [float(number) for number in re.findall(r"(-?[\d.]+)%", reasons)]
         assert all(0.0 <= share <= 100.0 for share in shares), reasons
-        assert re.search("more than 100%|worse than no change|not known: its interval is wider than its value", reasons)
+        assert re.search("more than 100%|worse than no change|is not known", reasons)
 
 
 def test_the_score_is_0_for_no_change_and_1_for_the_noise() -> None:

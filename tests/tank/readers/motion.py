@@ -35,10 +35,12 @@ DIVE = Dive(
 
 
 _RATES = {"roll velocity", "pitch velocity", "yaw velocity"}
+PLACES = ("surge distance", "sway distance", "distance")
+"""How far north and east the vehicle is of its first place, and how far away."""
 LACKING: dict[object, set[str]] = {
     writers.flash: _RATES,
     writers.flash_text: _RATES,
-    writers.csv: {*_RATES, "distance"},
+    writers.csv: {*_RATES, *PLACES},
 }
 """The quantities that the logs of some writers do not have."""
 
@@ -46,10 +48,10 @@ LACKING: dict[object, set[str]] = {
 def expected(dive: Dive = DIVE) -> dict[str, tuple[Array, float]]:
     """Return what the sensors measure, within the resolution of the formats: 0.01 degrees, 1 mV, numbers of 32 bits."""
     axes = ("surge", "sway", "heave"), ("roll", "pitch", "yaw")
-    rates = np.tile(RATES, (len(dive.time), 1))
+    rates, moved = np.tile(RATES, (len(dive.time), 1)), (dive.position[:, :2] - dive.position[0, :2]).T
     return {
         "depth": (dive.position[:, 2], 1e-5),
-        "distance": (np.hypot(*(dive.position[:, :2] - dive.position[0, :2]).T), 1e-5),
+        **{name: (values, 1e-5) for name, values in zip(PLACES, (*moved, np.hypot(*moved)), strict=True)},
         **{name: (dive.euler[:, n], 1e-4) for n, name in enumerate(("roll angle", "pitch angle", "heading"))},
         **{f"{axis} velocity": (dive.velocity[:, n], 4e-4) for n, axis in enumerate(axes[0])},
         **{f"{axis} velocity": (rates[:, n], 1e-6) for n, axis in enumerate(axes[1])},

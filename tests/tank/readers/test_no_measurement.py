@@ -23,7 +23,7 @@ from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_of, marks, measured_only
 from tests.tank.logs import measured
-from tests.tank.readers.motion import BLUEROV2
+from tests.tank.readers.motion import BLUEROV2, PLACES
 from tests.tank.readers.writers import Ros, table
 
 N = 600
@@ -293,7 +293,7 @@ UNKNOWN: dict[str, tuple[str, Mapping[str, Numbers], Iterable[str]]] = {
     "orientation of an IMU": (IMU, {"orientation_covariance[0]": -1.0}, ANGLES),
     "rates of an IMU": (IMU, {"angular_velocity_covariance[0]": -1.0}, SPIN),
     "an IMU that knows later": (IMU, {"orientation_covariance[0]": np.where(LATER, 0.0, -1.0)}, ANGLES),
-    "pose of odometry": (ODOMETRY, {"pose.covariance[0]": -1.0}, ("depth", "distance", *ANGLES)),
+    "pose of odometry": (ODOMETRY, {"pose.covariance[0]": -1.0}, ("depth", *PLACES, *ANGLES)),
     "twist of odometry": (ODOMETRY, {"twist.covariance[0]": -1.0}, (*_AXES, *SPIN)),
     "depth of odometry": (ODOMETRY, {"pose.covariance[14]": 1e6}, ("depth",)),
     "heading of odometry": (ODOMETRY, {"pose.covariance[35]": 99999.0}, ANGLES),
@@ -302,7 +302,7 @@ UNKNOWN: dict[str, tuple[str, Mapping[str, Numbers], Iterable[str]]] = {
     "a quaternion of zeros": (IMU, NO_TURN, ANGLES),
     "a quaternion of ones": (IMU, dict.fromkeys(ORIENTED, 1.0), ANGLES),
     "a quaternion of PX4": ("vehicle_attitude", {"q[0]": 5.0}, ANGLES),
-    "place of PX4": ("vehicle_local_position", {"xy_valid": 0.0}, ("distance",)),
+    "place of PX4": ("vehicle_local_position", {"xy_valid": 0.0}, PLACES),
     "depth of PX4": ("vehicle_local_position", {"z_valid": 0.0}, ("depth",)),
     "speeds of PX4": ("vehicle_local_position", {"v_xy_valid": 1.0 * LATER}, _AXES[:2]),
     "heave of PX4": ("vehicle_local_position", {"v_z_valid": 0.0}, ("heave velocity",)),

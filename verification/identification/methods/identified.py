@@ -50,8 +50,9 @@ class Identified:
         own = self.found.posterior
         vehicle, _ = identified_vehicle(self.tests, self.found)
         known: dict[str, tuple[float, float, float]] = {}
-        for answer in assess.answers(self.found.posteriors, axis, vehicle):
-            if answer.command in assess.COMMANDS:
+        tested = assess.tested_commands(self.found.objective, self.found.best.z)[axis]
+        for answer in assess.answers(self.found.posteriors, axis, vehicle, tested):
+            if abs(answer.command) < 1.0:
                 low, high = sorted(map(abs, answer.steady[1]))
                 known[f"V_ss {100 * answer.command:g} %"] = abs(answer.steady[0]), low, high
 
