@@ -10,7 +10,7 @@ from types import ModuleType
 
 from ..attitude import QUATERNION, entry, quaternion_rates, start_formulas
 from ..catalogue import AXES
-from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
+from ..expression import FUNCTIONS, PYTHON, Expression, Name, of, total, written
 from ..layout import Layout
 from ..terms import Equation, equation_of, mass_matrix, rate_formula
 from .step import interpolated
@@ -189,8 +189,8 @@ def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
 
 def _sizes(equation: Equation, layout: Layout, states: list[str]) -> str:
     """Print the function of the sizes of the terms in the rates."""
-    formulas = {name: total(call("abs", term.formula) for term in terms) for name, terms in equation.rows.items()} | {
-        name: call("abs", rate) for name, rate in _quaternion_rates(layout, states).items()
+    formulas = {name: total(abs(term.formula) for term in terms) for name, terms in equation.rows.items()} | {
+        name: abs(rate) for name, rate in _quaternion_rates(layout, states).items()
     }
     sizes = "".join(f"        {written(x, PYTHON)},  # {name}\n" for name, x in formulas.items())
     return f"""\
