@@ -253,7 +253,7 @@ def _steering(layout: Layout, names: Names) -> Iterator[Force]:
         for fin in layout.fins:
             angle = names("angle", fin.name)
             parts.append((fin.effect(axis), Name(fin.coefficient("lift")) * angle))
-            if fin.has_drag:
+            if "drag" in fin.keys:
                 effect = effect_along(axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(effect * lift for effect, lift in parts if abs(effect) > FAINT)

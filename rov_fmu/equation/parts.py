@@ -200,7 +200,8 @@ class BodyForce(Thruster):
 class Fin(Actuator):
     """A control surface. Its lift is proportional to its angle."""
 
-    has_drag: bool = False
+    keys: tuple[str, ...] = ("lift", "angle_max")
+    """The keys of FIN that the vehicle has."""
 
     def effect(self, axis: Axis) -> float:
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""

@@ -70,8 +70,14 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "provenance": made.model_dump() if made else {},
     }
     for name, (*above, key) in layout.keys_in_file.items():
-        if vehicle.sources.get(name, NOT_GIVEN) != NOT_GIVEN:
-            _table_at(tables, above)[key] = _quantity(vehicle, name)
+        if name in vehicle.basis and (basis := vehicle.basis[name]).source != NOT_GIVEN:
+            unit, interval = layout.coefficients[name].unit, basis.interval or ()
+            _table_at(tables, above)[key] = {
+                "value": vehicle[name],
+                "unit": unit,
+                "interval": interval,
+                "source": basis.source,
+            }
     return tables
 
 
@@ -276,12 +282,6 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
     except UnicodeEncodeError as error:
         part = shown(text[max(error.start - 20, 0) : error.end])
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
-
-
-def _quantity(vehicle: Vehicle, name: str) -> dict[str, Any]:
-    """Return the table of a coefficient."""
-    interval, unit = vehicle.intervals.get(name, ()), vehicle.layout.coefficients[name].unit
-    return {"value": vehicle[name], "unit": unit, "interval": interval, "source": vehicle.sources[name]}
 
 
 def _estimated(row: Estimated) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.vehicle.description import Provenance
+from rov_fmu.vehicle.schema import bases
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_vehicle
@@ -108,13 +109,15 @@ def drawn(path: Path, rng: random.Random) -> Vehicle:
     return replace(
         rov,
         coefficients=values,
-        sources=dict.fromkeys(values, rng.choice(TEXTS)),
+        basis=bases(
+            dict.fromkeys(values, rng.choice(TEXTS)),
+            {**rov.intervals, **{n: (values[n] * (1.0 - 1e-9) / 3.0, 3.0 * values[n]) for n in known}},
+            {n: row.model_copy(update={"error": row.error * 1.1}) for n, row in rov.estimates.items()},
+        ),
         name=rng.choice(TEXTS),
         data=None,
         pictures=None,
         alternatives={},
-        intervals={**rov.intervals, **{n: (values[n] * (1.0 - 1e-9) / 3.0, 3.0 * values[n]) for n in known}},
-        estimates={n: row.model_copy(update={"error": row.error * 1.1}) for n, row in rov.estimates.items()},
         provenance=Provenance(
             tool="tool", method="heave: a\nyaw: b", inputs={"ä.csv": HASH}, warnings=("a warning",), facts=("b", "c")
         ),

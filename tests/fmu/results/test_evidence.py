@@ -97,7 +97,7 @@ def test_both_interfaces_put_the_bytes_of_the_users_file_into_the_fmu(kind: str,
         written = changed.file_content or origin(changed)[0][name]
         assert written != path.read_bytes()
         assert b"9.87654321" in written or changed["m_rov"] == one["m_rov"]
-    assert origin(replace(one.with_(m_rov=9.0), coefficients=one.coefficients, sources=one.sources)) == origin(one)
+    assert origin(replace(one.with_(m_rov=9.0), coefficients=one.coefficients, basis=one.basis)) == origin(one)
 
 
 def test_a_file_that_changes_while_its_vehicle_is_in_use_does_not_change_the_vehicle(tmp_path: Path) -> None:
