@@ -399,15 +399,18 @@ class Layout:
 
     @cached_property
     def calculated(self) -> dict[str, Declaration]:
-        """The calculated variables that are neither states nor rates.
+        """The calculated variables that are neither states nor rates."""
+        return self.thrust | self.angles | self.outside
 
-        They are the forces of the thrusters that are no states, the torque of the thrusters of each curve, the Euler
-        angles of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
+    @cached_property
+    def thrust(self) -> dict[str, Declaration]:
+        """The forces of the thrusters that are no states, and the torque of the thrusters of each curve.
+
+        They are those before the tuning α.
         """
         forces = {f"F_{t.name}": thrust_declaration(t, self.curve_of[t.name]) for t in self.thrusters}
         torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
-        forces = {name: declaration for name, declaration in forces.items() if name not in self.lagging}
-        return forces | torques | self.angles | self.outside
+        return {name: declaration for name, declaration in forces.items() if name not in self.lagging} | torques
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:
