@@ -5,7 +5,7 @@ equations on the page of an FMU follow from these declarations. So does what oth
 lists as left out, from the effects.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -142,6 +142,11 @@ def effects_of(layout: Layout) -> list[Effect]:
         COUPLING: layout.coupled,
     }
     return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *of_forces]))
+
+
+def left_out(layout: Layout, has: Container[Effect]) -> list[str]:
+    """Return the words of the effects of a vehicle that something lacks which has only some effects."""
+    return [effect.words for effect in effects_of(layout) if effect not in has]
 
 
 # ---- The forces ------------------------------------------------------------------------------------------------------
