@@ -8,7 +8,7 @@ In Fossen's notation, with the velocities nu = (u, v, w, p, q, r) through the wa
     C(nu) nu     Coriolis and Munk terms               MassMatrix.coriolis (mass.py)
     D(nu) nu     linear and quadratic damping, lift    _drag (forces.py)
     g(eta)       weight and buoyancy                   _restoring, or the net weight in _loads (forces.py)
-    tau          thrust, its loss with speed, fins,    _loads, _advance, _steering (forces.py),
+    tau          thrust, its loss with speed, fins,    _loads, advance, _steering (forces.py),
                  loads from outside                    from the commands: thrust_formulas (thrust.py)
     J(eta) nu    kinematics                            _Table.pose here, rotation_terms (attitude.py)
 

@@ -41,7 +41,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         if table:
             document[name] = _item(table, folder, _DEPTHS.get(name, 1))
     text: str = tomlkit.dumps(document)
-    return sealed(text, "# {}", "identify") if made else text
+    return sealed(text, "identify") if made else text
 
 
 def _tables(vehicle: Vehicle) -> dict[str, Any]:
@@ -278,7 +278,7 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
             warnings.warn(named(warning.message), warning.category, stacklevel=2)
 
     try:
-        return Output(path, text.encode(), check)
+        return Output(path, (sealed(text) if text == without_seal(text) else text).encode(), check)
     except UnicodeEncodeError as error:
         part = shown(text[max(error.start - 20, 0) : error.end])
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
