@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import (
+from rov_fmu.io.columns import (
     COMMANDS,
     FORCE_UNITS,
     NEUTRAL,
@@ -22,10 +22,10 @@ from rov_fmu.io.csv_table import (
     Column,
     Columns,
     Conversion,
-    DataFileError,
     KnownColumns,
     pulses,
 )
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array

@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.equation.units import in_degrees
-from rov_fmu.io.csv_table import Column, KnownColumns
+from rov_fmu.io.columns import Column, KnownColumns
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.catalogue import (
