@@ -22,7 +22,7 @@ from rov_fmu.equation.parts import (
     Vector,
     VehicleAxis,
 )
-from rov_fmu.vehicle.schema import Estimated, bases
+from rov_fmu.vehicle.schema import Basis, Estimated
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -273,12 +273,22 @@ def frictionless(rov: Vehicle) -> Vehicle:
     return rov.with_(**{name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
 
 
+def bases(
+    sources: Mapping[str, str],
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+    estimates: Mapping[str, Estimated] | None = None,
+) -> dict[str, Basis]:
+    """Return what the values of some coefficients rest on, by their names."""
+    intervals, estimates = intervals or {}, estimates or {}
+    return {name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()}
+
+
 def with_intervals(
     rov: _Vehicle, intervals: Mapping[str, tuple[float, float]], estimates: Mapping[str, Estimated] | None = None
 ) -> _Vehicle:
     """Return the vehicle with these intervals and estimates alone."""
     sources = dict.fromkeys(rov.coefficients, "A tank test") | rov.sources
-    return replace(rov, basis=bases(sources, intervals, estimates or {}))
+    return replace(rov, basis=bases(sources, intervals, estimates))
 
 
 def a_vehicle(rov: Vehicle) -> Vehicle:

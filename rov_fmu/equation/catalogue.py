@@ -311,22 +311,19 @@ AXIS = {
     ),
     "F_0": Declaration("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
-AT_ZERO = "; at 0 the velocity never changes"
 """The end of the description of β for the axes whose β may be 0."""
-TUNING = {
+LEAST_BETA = 1e-3
+"""The least β of coupled axes, whose effective inertia m/β must be finite."""
+COUPLED_TUNING = {
     "alpha": Declaration("1", "Tuning α_{velocity}: scales {push} in {axis}", 0.0, 1e3, needed=False, tunable=True),
     "beta": Declaration(
-        "1",
-        "Tuning β_{velocity}: scales acceleration in {axis}" + AT_ZERO,
-        0.0,
-        1e3,
-        needed=False,
-        tunable=True,
+        "1", "Tuning β_{velocity}: scales acceleration in {axis}", LEAST_BETA, 1e3, needed=False, tunable=True
     ),
 }
+_BETA = COUPLED_TUNING["beta"]
+_WORDS = f"{_BETA.description}; at 0 the velocity never changes"
+TUNING = COUPLED_TUNING | {"beta": replace(_BETA, description=_WORDS, minimum=0.0)}
 """The tuning factors of every axis; each is 1 unless the file gives it."""
-LEAST_BETA = 1e-3
-"""The least β of coupled axes."""
 
 
 def axis_words(axis: Axis) -> dict[str, str]:

@@ -19,18 +19,17 @@ from .catalogue import (
     ANGLES,
     ANGLES_AT_START,
     ARM,
-    AT_ZERO,
     ATTITUDE,
     AXIS,
     BODY,
     COMMANDS,
+    COUPLED_TUNING,
     CURRENT,
     CURRENT_DOWN,
     CURVE,
     FIN,
     HEADING,
     HEAVE,
-    LEAST_BETA,
     OUTSIDE,
     PITCH,
     POSITION,
@@ -252,6 +251,11 @@ class Layout:
     def declared(self) -> "tuple[Coefficient, ...]":
         """The coefficients, in the order of the FMU's variables."""
         axes = [(("axes", one.axis.name), one, axis_words(one.axis)) for one in self.axes]
+        is_coupled = self.coupled or any(key == "m_a" for key, *_ in self.cross)
+        tuning = [
+            COUPLED_TUNING if is_coupled and (self.has_attitude or axis is not HEAVE) else TUNING
+            for axis in self.bare_axes
+        ]
         tables = [
             _declared(("body",), BODY, {axis.inertia for axis in self.bare_axes}),
             _declared(("body",), RESTORING, self.restoring),
@@ -260,9 +264,12 @@ class Layout:
             *(_declared(("curves", c.name), CURVE, c.keys, c.coefficient, curve_words(c)) for c in self.curves),
             *(_declared(("fin", f.name), FIN, f.keys, f.coefficient, actuator_words(f)) for f in self.fins),
             *(_declared(place, AXIS, one.keys, one.coefficient, words) for place, one, words in axes),
-            *(_declared(place, TUNING, TUNING, one.coefficient, words) for place, one, words in axes),
             *(
-                _declared(("thruster", t.name), THRUSTER, THRUSTER, t.coefficient, actuator_words(t))
+                _declared(place, own, own, one.coefficient, words)
+                for own, (place, one, words) in zip(tuning, axes, strict=True)
+            ),
+            *(
+                _declared(("thruster", t.name), THRUSTER, t.keys, t.coefficient, actuator_words(t))
                 for t in self.thrusters
             ),
             (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
@@ -277,13 +284,7 @@ class Layout:
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
         """The declarations of the coefficients by name."""
-        declared = {one.name: one.declaration for one in self.declared}
-        if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
-            for axis in (axis for axis in self.bare_axes if self.has_attitude or axis is not HEAVE):
-                beta = axis.coefficient("beta")
-                description = declared[beta].description.removesuffix(AT_ZERO)
-                declared[beta] = replace(declared[beta], description=description, minimum=LEAST_BETA)
-        return declared
+        return {one.name: one.declaration for one in self.declared}
 
     @cached_property
     def tuning(self) -> tuple[str, ...]:

@@ -27,7 +27,7 @@ from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated, bases
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
@@ -111,7 +111,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     vehicle = replace(
         rov,
         **dict(tests.description.tables.vehicle or ()),
-        basis=bases(sources, intervals, estimates),
+        basis={name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()},
         command_range=validity.command_range if validity else fit.command_range,
         alternatives={},
         data=None,
@@ -175,21 +175,21 @@ def _rounded(vehicle: Vehicle, digits: int) -> Vehicle:
     def short(value: float) -> float:
         return float(f"{value:.{digits}g}")
 
-    def shorter(ends: tuple[float, float]) -> tuple[float, float]:
-        return short(ends[0]), short(ends[1])
+    def ends(interval: tuple[float, float]) -> tuple[float, float]:
+        return short(interval[0]), short(interval[1])
 
-    estimates = {
-        name: Estimated(
-            error=short(row.error),
-            correlation={other: r for other, value in row.correlation.items() if (r := round(value, digits))},
-        )
-        for name, row in vehicle.estimates.items()
-    }
+    def estimate(row: Estimated) -> Estimated:
+        correlation = {other: r for other, value in row.correlation.items() if (r := round(value, digits))}
+        return Estimated(error=short(row.error), correlation=correlation)
+
     return replace(
         vehicle,
         coefficients={name: short(value) for name, value in vehicle.coefficients.items()},
-        command_range=shorter(vehicle.command_range),
-        basis=bases(vehicle.sources, {name: shorter(ends) for name, ends in vehicle.intervals.items()}, estimates),
+        command_range=ends(vehicle.command_range),
+        basis={
+            name: Basis(one.source, one.interval and ends(one.interval), one.estimate and estimate(one.estimate))
+            for name, one in vehicle.basis.items()
+        },
     )
 
 

@@ -425,15 +425,6 @@ class Basis(NamedTuple):
         return self._replace(estimate=self.estimate.model_copy(update={"correlation": correlation}))
 
 
-def bases(
-    sources: Mapping[str, str],
-    intervals: Mapping[str, tuple[float, float]] = _NONE,
-    estimates: Mapping[str, Estimated] = _NONE,
-) -> dict[str, Basis]:
-    """Return what the values of some coefficients rest on, by their names."""
-    return {name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()}
-
-
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 

@@ -16,7 +16,7 @@ from scipy.special import ndtri, stdtrit
 from rov_fmu.equation.catalogue import TUNING, Declaration
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.groups import grouped
-from rov_fmu.vehicle.schema import Basis, Estimated
+from rov_fmu.vehicle.schema import Estimated
 
 Array = NDArray[np.float64]
 
@@ -131,22 +131,22 @@ NOTHING = Uncertainty((), np.zeros(0), np.zeros(0), np.zeros((0, 0)), np.zeros((
 def uncertainty(
     layout: Layout,
     coefficients: Mapping[str, float],
-    basis: Mapping[str, Basis],
+    intervals: Mapping[str, tuple[float, float]],
+    estimates: Mapping[str, Estimated],
 ) -> Uncertainty:
     """Return the distribution of the coefficients by the intervals and estimates of a vehicle file."""
     declarations = layout.coefficients
-    errors, estimates = dict[str, float](), dict[str, Estimated]()
-    for name, declaration in declarations.items():
-        if name in basis and (interval := basis[name].interval):
-            if estimate := basis[name].estimate:
-                errors[name], estimates[name] = estimate.error, estimate
-            else:
-                errors[name] = _half_width(name, coefficients[name], interval, declaration) / NORMAL
-    names = tuple(errors)
+    names = tuple(name for name in declarations if name in intervals)
+    errors = []
+    for name in names:
+        if name in estimates:
+            errors.append(estimates[name].error)
+        else:
+            errors.append(_half_width(name, coefficients[name], intervals[name], declarations[name]) / NORMAL)
     return Uncertainty(
         names,
         np.array([coefficients[name] for name in names]),
-        np.array([*errors.values()]),
+        np.array(errors),
         correlation(names, estimates),
         np.array([(declarations[name].minimum, declarations[name].maximum) for name in names]).reshape(-1, 2),
     )

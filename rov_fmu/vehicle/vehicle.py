@@ -206,11 +206,8 @@ class Vehicle:
     def _by_hand(self, before: str, after: str = "") -> str:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
         coefficients = self.layout.coefficients.items()
-        items = [
-            f"{name} = {one.written(self[name])}"
-            for name, one in coefficients
-            if name in self.basis and self.basis[name].source == BY_HAND
-        ]
+        sources = self.sources
+        items = [f"{name} = {one.written(self[name])}" for name, one in coefficients if sources.get(name) == BY_HAND]
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
 
     @property
@@ -230,7 +227,7 @@ class Vehicle:
         """The joint distribution of the coefficients that have a confidence interval."""
         from rov_fmu.vehicle.uncertainty import uncertainty  # NumPy and SciPy: few need it
 
-        return uncertainty(self.layout, self.coefficients, self.basis)
+        return uncertainty(self.layout, self.coefficients, self.intervals, self.estimates)
 
     def draws(self, count: int, generator: "Generator", *, forced: bool = False) -> dict[str, "NDArray[float64]"]:
         """Return the coefficients of `count` vehicles, drawn from what is known about this one, by their names.

@@ -18,7 +18,7 @@ from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, toml_text
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead, why_no_identifier
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -66,18 +66,17 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "cross": {},
         "inputs": layout.mix,
         "alternatives": {name: one.model_dump() for name, one in vehicle.alternatives.items()},
-        "estimates": {name: _estimated(row) for name, row in vehicle.estimates.items()},
+        "estimates": {
+            name: {"error": row.error, "correlation": row.correlation or None}
+            for name, row in vehicle.estimates.items()
+        },
         "provenance": made.model_dump() if made else {},
     }
     for name, (*above, key) in layout.keys_in_file.items():
-        if name in vehicle.basis and (basis := vehicle.basis[name]).source != NOT_GIVEN:
-            unit, interval = layout.coefficients[name].unit, basis.interval or ()
-            _table_at(tables, above)[key] = {
-                "value": vehicle[name],
-                "unit": unit,
-                "interval": interval,
-                "source": basis.source,
-            }
+        basis = vehicle.basis.get(name)
+        if basis and basis.source != NOT_GIVEN:
+            value = {"value": vehicle[name], "unit": layout.coefficients[name].unit}
+            _table_at(tables, above)[key] = value | {"interval": basis.interval or (), "source": basis.source}
     return tables
 
 
@@ -282,11 +281,6 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
     except UnicodeEncodeError as error:
         part = shown(text[max(error.start - 20, 0) : error.end])
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
-
-
-def _estimated(row: Estimated) -> dict[str, Any]:
-    """Return the table of a standard error and of the correlations."""
-    return {"error": row.error, "correlation": row.correlation or None}
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:

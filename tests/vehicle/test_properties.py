@@ -14,7 +14,6 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.vehicle.description import Provenance
-from rov_fmu.vehicle.schema import bases
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_vehicle
@@ -22,7 +21,7 @@ from tests.commands import REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 from tests.often import often
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, SIX_AXES
+from tests.vehicles import EVERYTHING, SIX_AXES, bases
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 SOURCES = [path.read_bytes() for path in (VIDEORAY, REFIT, EVERYTHING, EVERYTHING)]
