@@ -63,8 +63,8 @@ class EquationSource:
 
     def parameters(self) -> list[str]:
         """Return statements that compute the numbers that follow from the coefficients alone."""
-        both = {name: x.args[1:] for name, x in self.equation.directed.items()}
-        sides = {f"{name}[{n}]": formula for name, pair in both.items() for n, formula in enumerate(pair)}
+        directed = self.equation.directed.items()
+        sides = {f"{name}[{n}]": side for name, one in directed for n, side in enumerate(one.args[1:])}
         formulas = {**self.equation.parameters, **sides}
         return _statements(formulas, {name: f"n->{name}" for name in formulas}, self._in_c)
 

@@ -66,16 +66,10 @@ class Force:
 
     def __post_init__(self) -> None:
         """Raise ValueError for a force that the equation cannot have."""
-        hidden = [*STATES.intersection(*[self.along(reverse=reverse).names for reverse in (False, True)])]
-        reason = ""
-        if len(self.factors) > 2:
-            reason = "at most two states may multiply a coefficient"
-        elif hidden:
-            reason = f"the coefficient of a product of states may not contain {sorted(hidden)[0]}"
-        elif len(self._directions) > 1:
-            reason = f"the directions of {' and '.join(sorted(self._directions))} cannot both count"
-        if reason:
-            raise ValueError(f"{self.effect.words}: {reason} (terms.py)")
+        hidden = STATES & (self.along().names | self.along(reverse=True).names)
+        if hidden or len(self.factors) > 2 or len(self._directions) > 1:
+            reason = "must be a coefficient times at most two states, and depend on the direction of one (terms.py)"
+            raise ValueError(f"{self.effect.words}: {reason}")
 
     @cached_property
     def _parts(self) -> tuple[int, tuple[Expression, ...]]:
@@ -95,7 +89,7 @@ class Force:
     @cached_property
     def velocity(self) -> str:
         """The velocity on whose direction the force depends, or an empty text."""
-        return next(iter(self._directions), "")
+        return "".join(self._directions)
 
     @property
     def _directions(self) -> set[str]:

@@ -252,10 +252,7 @@ class Layout:
         """The coefficients, in the order of the FMU's variables."""
         axes = [(("axes", one.axis.name), one, axis_words(one.axis)) for one in self.axes]
         is_coupled = self.coupled or any(key == "m_a" for key, *_ in self.cross)
-        tuning = [
-            COUPLED_TUNING if is_coupled and (self.has_attitude or axis is not HEAVE) else TUNING
-            for axis in self.bare_axes
-        ]
+        alone = () if is_coupled and self.has_attitude else (HEAVE,) if is_coupled else self.bare_axes
         tables = [
             _declared(("body",), BODY, {axis.inertia for axis in self.bare_axes}),
             _declared(("body",), RESTORING, self.restoring),
@@ -265,8 +262,8 @@ class Layout:
             *(_declared(("fin", f.name), FIN, f.keys, f.coefficient, actuator_words(f)) for f in self.fins),
             *(_declared(place, AXIS, one.keys, one.coefficient, words) for place, one, words in axes),
             *(
-                _declared(place, own, own, one.coefficient, words)
-                for own, (place, one, words) in zip(tuning, axes, strict=True)
+                _declared(place, TUNING if one.axis in alone else COUPLED_TUNING, TUNING, one.coefficient, words)
+                for place, one, words in axes
             ),
             *(
                 _declared(("thruster", t.name), THRUSTER, t.keys, t.coefficient, actuator_words(t))

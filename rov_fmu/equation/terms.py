@@ -356,9 +356,9 @@ class _Table:
         own = first.effect.name, v, *(() if set(first.factors) == {v} else dict.fromkeys(first.factors))
         if not directions:
             return Term(self._named(ahead, *own), first.factors, first.effect)
-        if len(directions) > 1:
+        velocity, *others = map(Name, directions)
+        if others:
             raise ValueError("a force with the direction of another velocity needs an effect of its own")
-        (velocity,) = map(Name, directions)
         if self._is_constant(ahead):
             coefficient: Expression = self.names(*own)
             self.directed[self.names(*own).identifier] = Operation("directed", (velocity, ahead, astern))

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
-from io import BytesIO, StringIO, TextIOWrapper
+from io import BytesIO, TextIOWrapper
 from itertools import islice, zip_longest
 from math import isfinite, nan
 from pathlib import Path
@@ -41,8 +41,6 @@ _UTF_16_MARKS = (BOM_UTF16_LE, BOM_UTF16_BE)
 _CODE_PAGE = "cp1252"
 MOST_BEFORE = 100
 """The number of lines in which the header is looked for."""
-_START = 100_000
-"""The number of bytes at the beginning of a text that tell whether it is a table."""
 _UNIT = re.compile(r"\s\[[^\[\]]*\]$")
 _WORDS = {"true": 1.0, "false": 0.0}
 EMPTY = "the file is empty"
@@ -62,16 +60,6 @@ class DataFileError(FileError):
 
 class UnreadableFileError(DataFileError):
     """A data file of which nothing can be read, because it is damaged, cut short, or of an unknown kind."""
-
-
-def read_header(path: Path, open_stream: OpenStream | None = None) -> list[str]:
-    """Return the cells of the header. Raises DataFileError."""
-    return read_start(path, open_stream, 1)[0]
-
-
-def read_start(path: Path, open_stream: OpenStream | None, count: int) -> list[list[str]]:
-    """Return the cells of the header and of the first rows, at most `count` of all. Raises DataFileError."""
-    return [cells for _, cells in islice(CsvFile(path, open_stream), count)]
 
 
 class Series(dict[str, "array[float]"]):
@@ -174,14 +162,6 @@ def open_text(path: Path) -> OpenStream:
 
 def _stream(content: bytes, encoding: str) -> TextIO:
     return TextIOWrapper(BytesIO(content), encoding)
-
-
-def looks_like_table(path: Path) -> bool:
-    """Return True if a text has a row of numbers below a header with as many columns. Only its beginning is read."""
-    with path.open("rb") as file:
-        start = file.read(_START)
-    encoding = "utf-16" if start.startswith(_UTF_16_MARKS) else "utf-8-sig"
-    return _dialect(StringIO(start.decode(encoding, "replace"))).has_rows
 
 
 @dataclass(frozen=True)
@@ -329,6 +309,11 @@ class CsvFile:
         before = [line for line in islice(self._open(), self._dialect.before) if line.strip()]
         if count := sum(not _GIVEN_SEPARATOR.fullmatch(line.strip(" \r\n")) for line in before):
             self.assumed["lines before header"] = {"count": count}
+
+    @property
+    def has_rows(self) -> bool:
+        """True if a row of numbers with as many cells follows the header."""
+        return self._dialect.has_rows
 
     def __iter__(self) -> Lines:
         """Yield the lines. They are not kept, because their cells take much memory. Raises DataFileError.

@@ -95,7 +95,7 @@ def _deep(layout: Layout, names: Names) -> Iterator[Force]:
     "tank/readers/parsers.py": [
         (
             _BEHIND,
-            "from rov_fmu.tank.readers.tables import open_matlab\n",
+            "from rov_fmu.tank.readers.ulog import read_ulog\n",
             """\
 from rov_fmu.tank.readers.jsonl import open_jsonl
 """,

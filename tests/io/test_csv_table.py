@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.io.columns import Column, Columns, read_columns
-from rov_fmu.io.csv_table import LARGEST, DataFileError, read_header, read_series
-from rov_fmu.tank.readers.tables import grown_rows
+from rov_fmu.io.csv_table import LARGEST, DataFileError, read_series
+from rov_fmu.tank.readers.tables import grown_rows, read_start
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import often
@@ -129,7 +129,7 @@ def test_a_row_is_never_skipped(tmp_path: Path) -> None:
     path = _file(tmp_path, "long,late\n1,2\n3,4\nlength [m],time [s]\n5,6\n")
     with pytest.raises(DataFileError, match="line 1, column 1 = 'long'"):
         read_columns(path, {"length": LENGTH, "time": MAYBE})
-    assert read_header(_file(tmp_path, "Timestamp,depth\n,\n--.--,-\ns,m\n2024-05-11 10:00:00.1,--.--\n")) == [
+    assert _header(_file(tmp_path, "Timestamp,depth\n,\n--.--,-\ns,m\n2024-05-11 10:00:00.1,--.--\n")) == [
         "Timestamp",
         "depth",
     ]
@@ -148,6 +148,10 @@ def test_what_is_in_no_encoding_is_refused(content: bytes, tmp_path: Path) -> No
 
 TITLES = ("time [s]", "roll [deg]", "mode", "depth [m]", "volts [V]", "fix")
 SI = {name: Column({unit: 1.0}) for name, unit in (("time", "s"), ("roll", "deg"), ("depth", "m"), ("volts", "V"))}
+
+
+def _header(path: Path) -> list[str]:
+    return read_start(path, None, 1)[0]
 
 
 def _cells(n: int) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
 
-from ..attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
 from ..catalogue import AXES
 from ..expression import FUNCTIONS, PYTHON, Expression, Name, of, total, written
 from ..layout import Layout
@@ -46,8 +46,7 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    entries = [entry(row, column) for row in (1, 2, 3) for column in (1, 2, 3)]
-    alike = ("uvwpqr", ("x", "y", "z", "psi"), entries, quaternion)
+    alike = ("uvwpqr", ("x", "y", "z", "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
@@ -113,7 +112,7 @@ def printed_accelerations(layout: Layout, step: str) -> str:
     return _module(words, step, accelerations_text(layout))
 
 
-_KNOWN = (*(axis.velocity for axis in AXES.values()), *(entry(3, column) for column in (1, 2, 3)))
+_KNOWN = (*(axis.velocity for axis in AXES.values()), *ROTATION[6:])
 """The states that the simulator gives: the velocities through the water, and the third row of the rotation matrix."""
 
 

@@ -15,7 +15,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.columns import Column, KnownColumns, read_columns
-from rov_fmu.io.csv_table import DataFileError, OpenStream, read_start
+from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
@@ -28,7 +28,7 @@ from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
-from rov_fmu.tank.readers.tables import grown_rows
+from rov_fmu.tank.readers.tables import grown_rows, read_start
 from rov_fmu.tank.readers.tank_tables import read_rows
 from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, time_columns
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from io import StringIO
-from itertools import pairwise
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -27,12 +27,12 @@ from rov_fmu.io.csv_table import (
     QUOTED_NUMBER,
     THOUSANDS,
     VALUE,
+    CsvFile,
     DataFileError,
     Grown,
     Lines,
     OpenStream,
     is_missing,
-    read_start,
 )
 from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
@@ -102,6 +102,11 @@ def rules_of_page() -> dict[str, Any]:
             "least": LEAST_PRESSURE * ATMOSPHERE,
         },
     }
+
+
+def read_start(path: Path, open_stream: OpenStream | None, count: int) -> list[list[str]]:
+    """Return the cells of the header and of the first rows, at most `count` of all. Raises DataFileError."""
+    return [cells for _, cells in islice(CsvFile(path, open_stream), count)]
 
 
 def read_table(
