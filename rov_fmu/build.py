@@ -26,10 +26,10 @@ from rov_fmu.fmu.reference_results import reference_results
 from rov_fmu.io.file_kinds import FMU
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
-from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.io.reading import open_file
 from rov_fmu.prove.check import check_evidence
-from rov_fmu.prove.signature import private_key, signature_path, signed
+from rov_fmu.prove.signature import check_private_key, check_signature, signature_path, signed
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
@@ -84,7 +84,7 @@ def build(
     - `interface`: `cs` for Co-Simulation, `me` for Model Exchange, or `both`, which is the default; the FMU in pure
       Python has only `cs`.
     - `osp`: True to also write <identifier>_OspModelDescription.xml to the folder of the FMU.
-    - `sign`: the file of a private key (Ed25519), which signs the FMU in <output>.sig; it needs the extra `sign`.
+    - `sign`: the file of a private key of OpenSSH, with which ssh-keygen signs the FMU in <output>.sig.
     - `force`: True to replace files that this program did not write, or that have changed since.
     - `inputs`: further files that must not be overwritten, like those that the vehicle names.
     - `on_content`: called once the content is made and the compilers begin.
@@ -101,12 +101,24 @@ def build(
     interface = interface or ("both" if native else "cs")
     version = {2: "", 3: ".fmi3"}[fmi]
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
-    beside = [Output(osp_path(output, vehicle.identifier), osp_model_description(vehicle.layout))] if osp else []
-    key = private_key(sign) if sign else None
+    beside = []
+    if osp:
+        groups = sealed(osp_model_description(vehicle.layout).decode(), "build").encode()
+        beside.append(Output(osp_path(output, vehicle.identifier), groups))
+    if sign:
+        check_private_key(sign)
     signature = signature_path(output)
-    targets = [(output, FMU), *((other.path, "") for other in beside), (signature if key else None, "")]
-    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])], force=force, is_ours=_is_as_built)
-    if not key and not force and signature.is_file():
+    targets = [(output, FMU), *((other.path, "") for other in beside), (signature if sign else None, "")]
+
+    def is_ours(path: Path) -> bool:
+        """Return True for an FMU of this program that nobody has changed since, and for the signature that fits it."""
+        try:
+            return bool(check_signature(output) if path == signature else check_evidence(path).files)
+        except (FileError, InputError, ProofError):
+            return False
+
+    check_targets(targets, [*inputs, *vehicle.files, *filter(None, [sign])], force=force, is_ours=is_ours)
+    if not sign and not force and signature.is_file():
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, chosen, fmi=fmi, interface=interface)
@@ -126,11 +138,11 @@ def build(
         files[f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}"] = library
     packed = archive(files, partial(meta_data, vehicle, files))
     lost = sorted(_platforms_in(output) - _folders(files))
-    if key:
-        beside.append(Output(signature, signed(packed, key)))
+    if sign:
+        beside.append(Output(signature, signed(packed, sign)))
     checked: list[tuple[str, bool]] = []
     draft = Output(output, packed, lambda path: checked.append(_check(path, vehicle, chosen, fmi)))
-    written = write_whole(draft, *beside, force=force, is_ours=_is_as_built)
+    written = write_whole(draft, *beside, force=force, is_ours=is_ours)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], written, lost)
 
@@ -182,14 +194,6 @@ def chosen_platforms(names: str | Sequence[str] | None, fmi: int = 2) -> list[st
     if "host" in names and host is None:
         raise BuildError(f"--platform host: there is no platform for this machine, only {', '.join(PLATFORMS)}")
     return list(dict.fromkeys(host if name == "host" and host else name for name in names))
-
-
-def _is_as_built(path: Path) -> bool:
-    """Return True if a file is an FMU of this program that nobody has changed since."""
-    try:
-        return bool(check_evidence(path).files)
-    except (FileError, InputError, ProofError):
-        return False
 
 
 def _platforms_in(fmu: Path) -> set[str]:

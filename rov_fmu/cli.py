@@ -211,7 +211,7 @@ def _commands(context: click.Context) -> None:
 @_file_option(
     "--sign",
     metavar="KEY",
-    help="Private key (Ed25519, by ssh-keygen or in PEM) that signs the FMU. The signature is FILE.fmu.sig.",
+    help="Private key of OpenSSH that signs the FMU. The signature is FILE.fmu.sig.",
 )
 @_force_option()
 def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **options: Any) -> None:

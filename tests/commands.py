@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
@@ -12,6 +13,7 @@ from shlex import quote, split
 from typing import Any
 
 import click
+import pytest
 
 from rov_fmu.cli import _commands, main
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
@@ -172,3 +174,11 @@ def endless_compiler(folder: Path) -> dict[str, str]:
     )
     zig.chmod(0o755)
     return {"PYTHONPATH": str(zig.parent.parent)}
+
+
+def make_key(path: Path, secret: str = "") -> None:
+    """Write a private key to a path, and the public one beside it, or skip the test where OpenSSH is not installed."""
+    if not shutil.which("ssh-keygen"):
+        pytest.skip("OpenSSH makes the keys")
+    made = ["ssh-keygen", "-q", "-t", "ed25519", "-N", secret, "-f", str(path)]
+    subprocess.run(made, check=True, capture_output=True)

@@ -70,14 +70,6 @@ def pytest_itemcollected(item: pytest.Item) -> None:
         item.own_markers = [mark for mark in item.own_markers if mark.name != "long"]
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _own_list_of_written_files(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
-    """Keep the list of the files that the program wrote in a folder of the tests, and not in the user's."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("XDG_STATE_HOME", str(tmp_path_factory.mktemp("state")))
-        yield
-
-
 @pytest.fixture(autouse=True, scope="session")
 def one_process() -> Iterator[None]:
     """Read the logs of all tests in one child process, which takes half a second to start."""

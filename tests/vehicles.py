@@ -22,6 +22,7 @@ from rov_fmu.equation.parts import (
     Vector,
     VehicleAxis,
 )
+from rov_fmu.vehicle.schema import Basis, Estimated
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -56,7 +57,7 @@ def thruster(
 
 def fin(name: str, direction: Vector, position: Vector, has_drag: bool = False) -> Fin:
     """Return a fin with a direction and a position that have a source."""
-    return Fin(name=name, has_drag=has_drag, **_places(direction, position))
+    return Fin(name=name, keys=("lift", *(["drag"] if has_drag else []), "angle_max"), **_places(direction, position))
 
 
 _DRAG = ("a_d", "b_d")
@@ -192,12 +193,12 @@ def four_axes(vehicle: Vehicle) -> Vehicle:
     )
     layout = replace(rov.layout, axes=forms, restoring=())
     values = {**rov.coefficients, "F_0_w": rov["W"] - rov["B"]}
-    sources = {**vehicle.sources, "F_0_w": vehicle.sources["W"]}
+    basis = {**vehicle.basis, "F_0_w": vehicle.basis["W"]}
     return replace(
         vehicle,
         layout=layout,
         coefficients={name: values[name] for name in layout.coefficients},
-        sources={name: sources[name] for name in layout.coefficients},
+        basis={name: basis[name] for name in layout.coefficients},
     )
 
 
@@ -272,9 +273,26 @@ def frictionless(rov: Vehicle) -> Vehicle:
     return rov.with_(**{name: 0.0 for name in rov.coefficients if name[:3] in ("a_d", "b_d", "F_0") or name in lift})
 
 
+def bases(
+    sources: Mapping[str, str],
+    intervals: Mapping[str, tuple[float, float]] | None = None,
+    estimates: Mapping[str, Estimated] | None = None,
+) -> dict[str, Basis]:
+    """Return what the values of some coefficients rest on, by their names."""
+    intervals, estimates = intervals or {}, estimates or {}
+    return {name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()}
+
+
+def with_intervals(
+    rov: _Vehicle, intervals: Mapping[str, tuple[float, float]], estimates: Mapping[str, Estimated] | None = None
+) -> _Vehicle:
+    """Return the vehicle with these intervals and estimates alone."""
+    sources = dict.fromkeys(rov.coefficients, "A tank test") | rov.sources
+    return replace(rov, basis=bases(sources, intervals, estimates))
+
+
 def a_vehicle(rov: Vehicle) -> Vehicle:
     """Return a vehicle file's content with these coefficients and placeholders for all texts."""
-    sources = dict.fromkeys(rov.coefficients, "A tank test")
     return Vehicle(
         rov.layout,
         rov.coefficients,
@@ -283,7 +301,7 @@ def a_vehicle(rov: Vehicle) -> Vehicle:
         version="1",
         description="A test",
         source="A tank",
-        sources=sources,
+        basis=bases(dict.fromkeys(rov.coefficients, "A tank test")),
         command_range=(0.1, 1.0),
     )
 

@@ -108,10 +108,11 @@ TESTS = {
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
     "rov_fmu/bridges/*": "bridges",
+    "rov_fmu/io/columns.py": "io/test_csv_table.py",
     "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "
     "tank/readers/test_sources.py vehicle/test_thrust_tables.py prove/test_experiments.py study/test_plans.py "
     "cli/test_messages.py io",
-    "rov_fmu/io/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
+    "rov_fmu/fmu/picture.py": "report/test_own_pictures.py cli/test_inputs.py",
     "rov_fmu/io/templates.py": "report/test_own_pictures.py fmu/test_sources.py frozen/test_known_results.py",
     "rov_fmu/io/toml_file.py": "vehicle/test_checks.py vehicle/test_vehicle.py vehicle/test_json_schema.py "
     "vehicle/test_properties.py tank/test_description_mistakes.py study/test_plans.py cli/test_messages.py io",

@@ -18,13 +18,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output, write_whole
 from rov_fmu.report.plots.steps import draw_steps, from_zero, measured_step, tables_by_axis
 from rov_fmu.report.plots.svg import LIGHT, add_knots, add_legend, name_axes, saved, with_even_text
 from rov_fmu.report.published import ResponseTable
 from rov_fmu.report.templates import pretty_unit
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 

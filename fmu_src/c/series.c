@@ -22,7 +22,7 @@
 #define SERIES_UNROLLED INLINE
 #endif
 
-enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save; step.py has its own order */
+enum { ORDER = 19 }; /* a higher order costs more than its longer pieces save */
 
 typedef struct {
     int order;                     /* the order of the highest coefficient that is known */

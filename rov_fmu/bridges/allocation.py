@@ -13,7 +13,18 @@ from math import ceil
 import numpy as np
 
 from rov_fmu.bridges.sdf import Array, written
-from rov_fmu.equation.forces import ADVANCE, DEAD_TIME, LAG, ROTOR_LAG, effects_of
+from rov_fmu.equation.forces import (
+    COUPLING,
+    DEAD_BAND,
+    LIFT,
+    LINEAR,
+    LOAD,
+    QUADRATIC,
+    RESTORING,
+    THRUST,
+    WEIGHT,
+    left_out,
+)
 from rov_fmu.equation.parts import Curve
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -33,6 +44,11 @@ _RANGE = 0.8, 1.2
 """The range of the voltage relative to the usual one, where the thrust follows a power of it."""
 _SAMPLES = 300
 """The commands among which the rows of a table are chosen."""
+
+
+_OF_HULL = (LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
+_HAS = (THRUST, DEAD_BAND, *_OF_HULL)
+"""The effects that the files have, and those that the body has whatever its thrusters do."""
 
 
 def allocation_files(vehicle: Vehicle) -> dict[str, str]:
@@ -57,7 +73,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         "tables": tables,
         "command_of": command_of,
         "row": _row,
-        "left_out": [effect.words for effect in effects_of(layout) if effect in (ADVANCE, DEAD_TIME, LAG, ROTOR_LAG)],
+        "left_out": left_out(layout, _HAS),
     }
     lines = ["curve,voltage_V,force_N,command"]
     for curve, by_voltage in tables.items():

@@ -16,7 +16,7 @@ from rov_fmu.bridges.mcap import hull_size
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.equation.python import step
-from rov_fmu.equation.python.printed import printed_accelerations
+from rov_fmu.equation.python.printed import left_out_of_accelerations, printed_accelerations
 from rov_fmu.io.messages import listed
 from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -157,6 +157,7 @@ def _notes(vehicle: Vehicle) -> list[str]:
             f"The vehicle file has no {listed(lacking)}: along and about such an axis the body is held, with a million "
             "times its mass"
         )
+    notes += [f"Left out: {words}" for words in left_out_of_accelerations(layout)]
     if not layout.coupled and len(layout.axes) > 1:
         notes.append("The vehicle file has no Coriolis and Munk terms, and there are none here")
     return notes

@@ -31,7 +31,7 @@ from rov_fmu.equation.forces import (
     RESTORING,
     THRUST,
     WEIGHT,
-    effects_of,
+    left_out,
 )
 from rov_fmu.equation.parts import FAINT, Thruster, VehicleAxis
 from rov_fmu.io.messages import InputError
@@ -389,9 +389,7 @@ def _notes_of_commands(vehicle: Vehicle) -> Iterator[str]:
     }
     has = [part for part, is_there in parts.items() if is_there]
     yield f"the Thruster plugin takes newtons, so these are left to the sender: {', '.join(has)}"
-    for effect in effects_of(layout):
-        if effect not in _IN_GAZEBO:
-            yield f"left out: {effect.words}"
+    yield from (f"left out: {words}" for words in left_out(layout, _IN_GAZEBO))
 
 
 def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:

@@ -19,7 +19,7 @@ import numpy as np
 from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.io.csv_table import NO_OUTPUT, pulses
+from rov_fmu.io.columns import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.io.output import Output, is_same, write_whole

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
-from rov_fmu.io.csv_table import NO_OUTPUT
+from rov_fmu.io.columns import NO_OUTPUT
 
 _HEAD = struct.Struct("<HHI")
 _CHANNELS = {18458: 16, 29569: 32}

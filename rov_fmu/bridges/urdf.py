@@ -10,6 +10,21 @@ from collections.abc import Iterator
 
 from rov_fmu.bridges import sdf
 from rov_fmu.equation.catalogue import AXES, BODY, REVERSE
+from rov_fmu.equation.forces import (
+    COUPLING,
+    DEAD_BAND,
+    DEAD_TIME,
+    LAG,
+    LIFT,
+    LINEAR,
+    LOAD,
+    QUADRATIC,
+    RESTORING,
+    ROTOR_LAG,
+    THRUST,
+    WEIGHT,
+    left_out,
+)
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
@@ -50,10 +65,16 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
     return sdf.Model(text, notes, ())
 
 
+_OF_CONTROLLER = (THRUST, DEAD_BAND, DEAD_TIME, LAG, ROTOR_LAG)
+_IN_URDF = (*_OF_CONTROLLER, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
+"""The effects that the reader of the file or its controller has, or that have notes of their own."""
+
+
 def _notes(vehicle: Vehicle) -> Iterator[str]:
     """Yield what <hydrodynamics> does otherwise than the vehicle file."""
     layout = vehicle.layout
     yield "the tags have no thrusters: their curves, places, lags and alpha are left to the controller"
+    yield from (f"left out: {words}" for words in left_out(layout, _IN_URDF))
     if any(vehicle[part.axis.coefficient("beta")] != 1.0 for part in layout.axes):
         yield "beta: the added mass is that of the effective inertia, (m + m_a) / beta less the mass"
     if missing := [name for name in AXES if name not in layout.by_name]:

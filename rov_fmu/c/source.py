@@ -7,7 +7,7 @@ from itertools import groupby, takewhile
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
-from rov_fmu.equation.attitude import QUATERNION, start_formulas
+from rov_fmu.equation.attitude import QUATERNION, TURN, start_formulas
 from rov_fmu.equation.expression import (
     PYTHON,
     ZERO,
@@ -63,8 +63,8 @@ class EquationSource:
 
     def parameters(self) -> list[str]:
         """Return statements that compute the numbers that follow from the coefficients alone."""
-        both = {name: (d.forward, d.reverse) for name, d in self.equation.directed.items()}
-        sides = {f"{name}[{n}]": formula for name, pair in both.items() for n, formula in enumerate(pair)}
+        directed = self.equation.directed.items()
+        sides = {f"{name}[{n}]": side for name, one in directed for n, side in enumerate(one.args[1:])}
         formulas = {**self.equation.parameters, **sides}
         return _statements(formulas, {name: f"n->{name}" for name in formulas}, self._in_c)
 
@@ -95,7 +95,7 @@ class EquationSource:
         """
         if self.layout.has_attitude:
             return []
-        turning = {name for name, others in self.equation.states_in_rate.items() if others & {"cos_psi", "sin_psi"}}
+        turning = {name for name, others in self.equation.states_in_rate.items() if not others.isdisjoint(TURN)}
         return [name for name in self.equation.states if name not in self.equation.used | turning]
 
     def turning(self) -> list[str]:

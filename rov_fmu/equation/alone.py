@@ -24,7 +24,6 @@ from .expression import (
     compiled,
     directed,
     equal,
-    product,
     replaced,
     total,
     where,
@@ -44,7 +43,7 @@ def closed_form() -> dict[str, Expression]:
     A, B, C, D = map(Name, "ABCD")
     without_drag = where(equal(C, 0.0), 0.0, directed(C, inf, -inf))
     return {
-        "D": where(A < 0.0, 0.0, call("hypot", B, 2.0 * call("sqrt", A) * call("sqrt", call("abs", C)))),
+        "D": where(A < 0.0, 0.0, call("hypot", B, 2.0 * call("sqrt", A) * call("sqrt", abs(C)))),
         "V_ss": where(D > 0.0, 2.0 * C / (B + D), without_drag),
         "Tau": where(D > 0.0, 2.0 * call("atanh", RISE / (1.0 + (1.0 / e) * (B / D))) / D, inf),
     }
@@ -52,7 +51,7 @@ def closed_form() -> dict[str, Expression]:
 
 def stopping_formula() -> Expression:
     """Return the distance from v until `share` of it without any force: the integral of 1 / (A |v| + B)."""
-    A, B, share, speed = Name("A"), Name("B"), Name("share"), call("abs", Name("v"))
+    A, B, share, speed = Name("A"), Name("B"), Name("share"), abs(Name("v"))
     quadratic = call("log", (A * speed + B) / (A * share * speed + B)) / A
     linear = where(B > 0.0, (1.0 - share) * speed / B, inf)
     return where(A > 0.0, where(speed > 0.0, where(speed < inf, quadratic, inf), 0.0), linear)
@@ -75,7 +74,7 @@ def alone_formulas(layout: Layout, velocity: str) -> dict[str, Expression]:
     """The factors of forces that are constant: none, and for a vehicle that moves without turning, how level it is."""
     if not layout.by_velocity[velocity].axis.is_rotation:
         constant.append((entry(3, 3),))
-    loads = [force.sign * product(*force.coefficient) for force in forces if force.factors in constant]
+    loads = [force.along() for force in forces if force.factors in constant]
     formulas = _drag((force for force in forces if {*force.factors} == {velocity}), gain) | {"C": gain * total(loads)}
     steady = {force: Name(name) for lag in equation.lags for force, name in lag.steady.items()}
     return {key: replaced(formula, {**steady, **equation.forces}) for key, formula in formulas.items()}

@@ -11,12 +11,18 @@ from .expression import Expression, Name, call, directed, total, where
 Formulas = dict[str, Expression]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
 """The quaternion from the body frame to the earth frame."""
+TURN = ("cos_psi", "sin_psi")
+"""The heading in the table of terms, where the vehicle neither rolls nor pitches."""
 _RATES = {1: "p", 2: "q", 3: "r"}
 
 
 def entry(row: int, column: int) -> str:
     """Return the name of an entry of the rotation matrix."""
     return f"R_{row}{column}"
+
+
+ROTATION = tuple(entry(row, column) for row, column in product((1, 2, 3), repeat=2))
+"""The entries of the rotation matrix."""
 
 
 def rotation_terms(velocities: frozenset[str]) -> dict[str, list[tuple[float, tuple[str, str]]]]:
@@ -83,7 +89,7 @@ def start_angle_formulas() -> Formulas:
         "R_31": -st,
         "R_32": ct * sp,
         "R_33": ct * cp,
-        "theta": call("atan2", st, call("abs", ct)),
+        "theta": call("atan2", st, abs(ct)),
     }
 
 

@@ -14,10 +14,11 @@ which it belongs: the key a_d of surge gives a_d_u, the key a_t_reverse of the c
 import re
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
-from math import degrees, inf, pi
+from math import inf, pi
 from typing import Literal
 
 from .attitude import INITIAL, QUATERNION
+from .units import unit_of
 
 # ---- Axes ------------------------------------------------------------------------------------------------------------
 
@@ -184,15 +185,6 @@ def coefficient_name(key: str, of: str) -> str:
     return f"{stem}_{of}{key[len(stem) :]}"
 
 
-DISPLAYS = {
-    "1": ("%", 100.0),
-    "rad": ("deg", degrees(1.0)),
-    "m/s": ("knot", 1.0 / (1852.0 / 3600.0)),
-    "rad/s": ("deg/s", degrees(1.0)),
-}
-"""The display unit of a unit, with the factor from the unit to the display unit."""
-
-
 @dataclass(frozen=True)
 class Declaration:
     """The declaration of a coefficient or a variable: SI unit, description, bounds (included), and a typical size.
@@ -217,7 +209,7 @@ class Declaration:
     @property
     def display_unit(self) -> str | None:
         """The unit in which people read the quantity, or None if that is its own unit."""
-        return None if self.unit == "1" and not self.is_share else DISPLAYS.get(self.unit, (None,))[0]
+        return None if self.unit == "1" and not self.is_share else unit_of(self.unit).display
 
     def written(self, value: float) -> str:
         """Return a value with its unit, which a ratio does not have."""
@@ -319,22 +311,19 @@ AXIS = {
     ),
     "F_0": Declaration("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
-AT_ZERO = "; at 0 the velocity never changes"
 """The end of the description of β for the axes whose β may be 0."""
-TUNING = {
+LEAST_BETA = 1e-3
+"""The least β of coupled axes, whose effective inertia m/β must be finite."""
+COUPLED_TUNING = {
     "alpha": Declaration("1", "Tuning α_{velocity}: scales {push} in {axis}", 0.0, 1e3, needed=False, tunable=True),
     "beta": Declaration(
-        "1",
-        "Tuning β_{velocity}: scales acceleration in {axis}" + AT_ZERO,
-        0.0,
-        1e3,
-        needed=False,
-        tunable=True,
+        "1", "Tuning β_{velocity}: scales acceleration in {axis}", LEAST_BETA, 1e3, needed=False, tunable=True
     ),
 }
+_BETA = COUPLED_TUNING["beta"]
+_WORDS = f"{_BETA.description}; at 0 the velocity never changes"
+TUNING = COUPLED_TUNING | {"beta": replace(_BETA, description=_WORDS, minimum=0.0)}
 """The tuning factors of every axis; each is 1 unless the file gives it."""
-LEAST_BETA = 1e-3
-"""The least β of coupled axes."""
 
 
 def axis_words(axis: Axis) -> dict[str, str]:

@@ -45,6 +45,9 @@ class Expression:
     def __neg__(self) -> "Expression":
         return _negative(self)
 
+    def __abs__(self) -> "Expression":
+        return Operation("abs", (self,))
+
     @cached_property
     def names(self) -> frozenset[str]:
         """The identifiers of the names in the expression."""
@@ -86,7 +89,7 @@ class Operation(Expression):
         return frozenset().union(*(arg.names for arg in self.args))
 
 
-ZERO = Number(0.0)
+ZERO, ONE = Number(0.0), Number(1.0)
 
 
 def _number(x: Expression) -> float | None:

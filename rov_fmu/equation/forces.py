@@ -5,13 +5,14 @@ equations on the page of an FMU follow from these declarations. So does what oth
 lists as left out, from the effects.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Container, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import chain
 
-from .attitude import entry
-from .catalogue import HEAVE, REVERSE, YAW, Axis, cross_name
-from .expression import Expression, Name, Names, call, directed, product, total
+from .attitude import ROTATION, TURN, entry
+from .catalogue import AXES, HEADING, HEAVE, POSITION, REVERSE, YAW, Axis, cross_name
+from .expression import ONE, Expression, Name, Names, Operation, directed, product, total
 from .layout import Layout
 from .parts import FAINT, Curve, Thruster, effect_along
 
@@ -46,44 +47,76 @@ EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
 
+STATES = frozenset([*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION])
+"""The states of the table of terms that a force may contain."""
+
+
 @dataclass(frozen=True)
 class Force:
-    """A force or moment along an axis: a coefficient, alone or times one or two states of the table."""
+    """A force or moment along an axis as a formula: a coefficient, alone or times one or two states of the table.
+
+    Quadratic drag is `Force(QUADRATIC, "u", -(a_d * abs(u) * u))`: of one or two factors in the formula, |u| stands for
+    a state as u does. `directed(u, a, b)` in the place of a_d is the coefficient a ahead and b astern.
+    """
 
     effect: Effect
     axis: str
     """The velocity of the axis."""
-    sign: int
-    coefficient: tuple[Expression, ...]
-    """The factors of the coefficient."""
-    factors: tuple[str, ...] = ()
-    """The states that multiply the coefficient. A force without them is constant while the inputs are held."""
-    velocity: str = ""
-    """The velocity on whose direction the coefficient depends, or an empty text."""
-    reverse: tuple[Expression, ...] = ()
-    """The factors of the coefficient for a negative velocity, if they are others."""
-    turns: bool = False
-    """True when the force has the other sign for a negative velocity."""
+    formula: Expression
 
     def __post_init__(self) -> None:
         """Raise ValueError for a force that the equation cannot have."""
-        if len(self.factors) > 2:
-            raise ValueError(f"{self.effect.words}: at most two states may multiply a coefficient (terms.py)")
+        hidden = STATES & (self.along().names | self.along(reverse=True).names)
+        if hidden or len(self.factors) > 2 or len(self._directions) > 1:
+            reason = "must be a coefficient times at most two states, and depend on the direction of one (terms.py)"
+            raise ValueError(f"{self.effect.words}: {reason}")
+
+    @cached_property
+    def _parts(self) -> tuple[int, tuple[Expression, ...]]:
+        """The sign and the factors of the formula."""
+        sign, rest, factors = 1, self.formula, list[Expression]()
+        while isinstance(rest, Operation) and rest.op in ("*", "neg"):
+            sign = -sign if rest.op == "neg" else sign
+            factors = [*rest.args[1:], *factors]
+            rest = rest.args[0]
+        return sign, (rest, *factors)
+
+    @cached_property
+    def factors(self) -> tuple[str, ...]:
+        """The states that multiply the coefficient. A force without them is constant while the inputs are held."""
+        return tuple(filter(None, map(_state, self._parts[1])))
+
+    @cached_property
+    def velocity(self) -> str:
+        """The velocity on whose direction the force depends, or an empty text."""
+        return "".join(self._directions)
 
     @property
-    def formula(self) -> Expression:
-        """The force as a formula, for both directions of the velocity."""
-        both = zip(self.coefficient, self.reverse or self.coefficient, strict=True)
-        coefficient = [directed(Name(self.velocity), *pair) for pair in both]
-        states: list[Expression] = [*map(Name, self.factors)]
-        if self.turns:
-            states[0] = call("abs", states[0])
-        return self.sign * product(*coefficient, *states)
+    def _directions(self) -> set[str]:
+        return {*map(_direction, self._parts[1])} - {""}
 
-    def along(self, inverse: Expression, *, reverse: bool = False) -> Expression:
+    def along(self, inverse: Expression = ONE, *, reverse: bool = False) -> Expression:
         """Return the coefficient of an acceleration: `inverse` is the acceleration per load."""
-        factors = (self.reverse or self.coefficient) if reverse else self.coefficient
-        return (-self.sign if reverse and self.turns else self.sign) * product(inverse, *factors)
+        sign, factors = self._parts
+        coefficient = [inverse]
+        for x in factors:
+            if _state(x):
+                sign = -sign if reverse and _direction(x) else sign
+            else:
+                coefficient.append(x.args[1 + reverse] if isinstance(x, Operation) and _direction(x) else x)
+        return sign * product(*coefficient)
+
+
+def _state(x: Expression) -> str:
+    """Return the state that a factor is, also as |v|, or an empty text."""
+    if isinstance(x, Operation) and x.op == "abs":
+        x = x.args[0]
+    return x.identifier if isinstance(x, Name) and x.identifier in STATES else ""
+
+
+def _direction(x: Expression) -> str:
+    """Return the state on whose direction a factor depends, or an empty text."""
+    return _state(x.args[0]) if isinstance(x, Operation) and x.op in ("abs", "directed") else ""
 
 
 def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
@@ -105,6 +138,11 @@ def effects_of(layout: Layout) -> list[Effect]:
     return list(dict.fromkeys([*(effect for effect, is_there in has.items() if is_there), *of_forces]))
 
 
+def left_out(layout: Layout, has: Container[Effect]) -> list[str]:
+    """Return the words of the effects of a vehicle that something lacks which has only some effects."""
+    return [effect.words for effect in effects_of(layout) if effect not in has]
+
+
 # ---- The forces ------------------------------------------------------------------------------------------------------
 
 
@@ -116,12 +154,12 @@ def _loads(layout: Layout, names: Names) -> Iterator[Force]:
         if axis is YAW:  # each of these torques is an output
             thrust = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
         if thrust:
-            yield Force(THRUST, v, 1, (Name(axis.coefficient("alpha")), total(thrust)))
-        yield Force(LOAD, v, 1, (Name(axis.external),))
+            yield Force(THRUST, v, Name(axis.coefficient("alpha")) * total(thrust))  # tau
+        yield Force(LOAD, v, Name(axis.external))  # tau_ext
         if "F_0" in vehicle_axis.keys:
-            yield Force(LOAD, v, 1, (Name(vehicle_axis.coefficient("F_0")),))
+            yield Force(LOAD, v, Name(vehicle_axis.coefficient("F_0")))
         if axis is HEAVE and layout.restoring and not layout.has_attitude:
-            yield Force(WEIGHT, v, 1, (names("net_weight"),))
+            yield Force(WEIGHT, v, names("net_weight"))  # W - B
 
 
 def thrusts(
@@ -149,35 +187,39 @@ def _with_arm(thruster: Thruster, axis: Axis, force: Expression, names: Names) -
 
 
 def _drag(layout: Layout) -> Iterator[Force]:
-    """Yield the damping: linear and quadratic drag of each axis, and the cross terms."""
-    for vehicle_axis in layout.axes:
-        v = vehicle_axis.axis.velocity
-        for key, effect, factors in (("b_d", LINEAR, (v,)), ("a_d", QUADRATIC, (v, v))):
-            ahead, astern = (Name(vehicle_axis.coefficient(key + end)) for end in ("", REVERSE))
-            yield Force(effect, v, -1, (ahead,), factors, v, (astern,), turns=key == "a_d")
+    """Yield the damping D(nu) nu: linear and quadratic drag of each axis, and the cross terms."""
+    for one in layout.axes:
+        axis, v = one.axis.velocity, Name(one.axis.velocity)
+        b_d, a_d = (directed(v, Name(one.coefficient(k)), Name(one.coefficient(k + REVERSE))) for k in ("b_d", "a_d"))
+        yield Force(LINEAR, axis, -(b_d * v))  # X_u u
+        yield Force(QUADRATIC, axis, -(a_d * abs(v) * v))  # X_|u|u |u| u
     for key, axis, *others in layout.cross:
-        coefficient = (Name(cross_name(key, axis, *others)),)
+        coefficient, v, last = Name(cross_name(key, axis, *others)), Name(others[0]), Name(others[-1])
         if key == "b_d":
-            yield Force(LINEAR, axis, -1, coefficient, (others[0],))
+            yield Force(LINEAR, axis, -(coefficient * v))  # Y_r r
         elif key == "a_d":
-            yield Force(QUADRATIC, axis, -1, coefficient, (others[0], others[0]), others[0], turns=True)
+            yield Force(QUADRATIC, axis, -(coefficient * abs(v) * v))  # Y_|r|r |r| r
         elif key == "lift":
-            yield Force(LIFT, axis, 1, coefficient, (others[0], others[1]))
+            yield Force(LIFT, axis, coefficient * v * last)  # Y_uv u v
 
 
 def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
-    """Yield the forces and moments of weight and buoyancy. The moment is W r_G x k - B r_B x k, where k points down."""
+    """Yield -g(eta), the forces and moments of weight and buoyancy: (W - B) k and (W r_G - B r_B) x k.
+
+    The third row of the rotation matrix is k, which points down.
+    """
     if not (layout.restoring and layout.has_attitude):
         return
-    x, y, z = (entry(3, n) for n in (1, 2, 3))
+    x, y, z = (Name(entry(3, n)) for n in (1, 2, 3))
     arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
     for v in layout.by_velocity:
         if v in "uvw":
-            yield Force(RESTORING, v, 1, (names("net_weight"),), ((x, y, z)["uvw".index(v)],))
+            yield Force(RESTORING, v, names("net_weight") * (x, y, z)["uvw".index(v)])  # (W - B) k
             continue
         for sign, (coordinate, direction) in zip((1, -1), arms[v], strict=True):
             if {f"{coordinate}_G", f"{coordinate}_B"} & set(layout.restoring):
-                yield Force(RESTORING, v, sign, (names("righting", coordinate),), (direction,))
+                moment = names("righting", coordinate) * direction
+                yield Force(RESTORING, v, sign * moment)  # (W r_G - B r_B) x k
 
 
 def advance(
@@ -198,21 +240,21 @@ def advance(
                     loss = _with_arm(t, axis, of_thruster, names)
                     parts.append(effect * _with_arm(t, other, loss, names))
             if parts:
-                lost = Name(axis.coefficient("alpha")), total(parts)
-                yield Force(ADVANCE, axis.velocity, -1, lost, (other.velocity,))
+                lost = Name(axis.coefficient("alpha")) * total(parts)
+                yield Force(ADVANCE, axis.velocity, -(lost * Name(other.velocity)))  # T_|n|v |n| v_a
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield the lift of the fins, lift |u|u δ, and their drag, which is proportional to |u|u δ²."""
-    ahead = (1.0, 0.0, 0.0)
+    ahead, u = (1.0, 0.0, 0.0), Name("u")
     for axis in layout.bare_axes:
         parts = []
         for fin in layout.fins:
             angle = names("angle", fin.name)
             parts.append((fin.effect(axis), Name(fin.coefficient("lift")) * angle))
-            if fin.has_drag:
+            if "drag" in fin.keys:
                 effect = effect_along(axis, ahead, fin.place)
                 parts.append((-effect, Name(fin.coefficient("drag")) * angle * angle))
         acting = total(effect * lift for effect, lift in parts if abs(effect) > FAINT)
         if acting.names:
-            yield Force(STEERING, axis.velocity, 1, (acting,), ("u", "u"), "u", turns=True)
+            yield Force(STEERING, axis.velocity, acting * abs(u) * u)  # Y_uuδ |u| u δ

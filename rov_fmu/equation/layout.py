@@ -4,10 +4,13 @@ A layout does not contain the values of the coefficients. `catalogue.py` declare
 variables.
 """
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from itertools import chain
 from math import inf
+from types import MappingProxyType
+from typing import NamedTuple
 
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
@@ -16,17 +19,17 @@ from .catalogue import (
     ANGLES,
     ANGLES_AT_START,
     ARM,
-    AT_ZERO,
     ATTITUDE,
     AXIS,
     BODY,
     COMMANDS,
+    COUPLED_TUNING,
     CURRENT,
     CURRENT_DOWN,
     CURVE,
+    FIN,
     HEADING,
     HEAVE,
-    LEAST_BETA,
     OUTSIDE,
     PITCH,
     POSITION,
@@ -34,10 +37,12 @@ from .catalogue import (
     ROLL,
     SURGE,
     SWAY,
+    THRUSTER,
     TUNING,
     YAW,
     Axis,
     Declaration,
+    axis_words,
     command_declaration,
     cross_declaration,
     cross_name,
@@ -50,16 +55,36 @@ from .catalogue import (
 )
 from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thruster, VehicleAxis
 from .words import (
-    CoefficientTable,
+    actuator_words,
     command_words,
+    curve_words,
     rotor_declaration,
-    table_of_axis,
-    table_of_curve,
-    table_of_fin,
-    table_of_thruster,
     thrust_declaration,
     torque_declaration,
 )
+
+
+class Coefficient(NamedTuple):
+    """A coefficient of a vehicle, without its value."""
+
+    name: str
+    """The name in the FMU: a_d_u."""
+    keys: tuple[str, ...]
+    """The tables around it in the vehicle file, and its key: axes, surge, a_d."""
+    declaration: Declaration
+
+
+def _declared(
+    place: tuple[str, ...],
+    declarations: Mapping[str, Declaration],
+    keys: Container[str],
+    name_of: Callable[[str], str] = str,
+    words: Mapping[str, str] = MappingProxyType({}),
+) -> Iterator[Coefficient]:
+    """Yield the coefficients of a table of the vehicle file that have these keys; `words` fill their texts."""
+    for key, declaration in declarations.items():
+        if key in keys:
+            yield Coefficient(name_of(key), (*place, key), declaration.filled(**words))
 
 
 @dataclass(frozen=True)
@@ -223,47 +248,40 @@ class Layout:
     # -- declarations --
 
     @cached_property
-    def coefficient_tables(self) -> tuple[CoefficientTable, ...]:
-        """The tables of the vehicle file with coefficients, in the order of the FMU's variables, except [cross]."""
-        inertias = {axis.inertia for axis in self.bare_axes}
-        of_vehicle = (
-            ("body", [key for key in BODY if key in inertias], BODY),
-            ("body", self.restoring, RESTORING),
-            ("arm", ARM if self.has_arm else (), ARM),
-            ("commands", COMMANDS if self.has_dead_time else (), COMMANDS),
-        )
-        return (
+    def declared(self) -> "tuple[Coefficient, ...]":
+        """The coefficients, in the order of the FMU's variables."""
+        axes = [(("axes", one.axis.name), one, axis_words(one.axis)) for one in self.axes]
+        is_coupled = self.coupled or any(key == "m_a" for key, *_ in self.cross)
+        alone = () if is_coupled and self.has_attitude else (HEAVE,) if is_coupled else self.bare_axes
+        tables = [
+            _declared(("body",), BODY, {axis.inertia for axis in self.bare_axes}),
+            _declared(("body",), RESTORING, self.restoring),
+            _declared(("arm",), ARM, ARM if self.has_arm else ()),
+            _declared(("commands",), COMMANDS, COMMANDS if self.has_dead_time else ()),
+            *(_declared(("curves", c.name), CURVE, c.keys, c.coefficient, curve_words(c)) for c in self.curves),
+            *(_declared(("fin", f.name), FIN, f.keys, f.coefficient, actuator_words(f)) for f in self.fins),
+            *(_declared(place, AXIS, one.keys, one.coefficient, words) for place, one, words in axes),
             *(
-                CoefficientTable((table,), {key: key for key in keys}, declared, {})
-                for table, keys, declared in of_vehicle
+                _declared(place, TUNING if one.axis in alone else COUPLED_TUNING, TUNING, one.coefficient, words)
+                for place, one, words in axes
             ),
-            *map(table_of_curve, self.curves),
-            *map(table_of_fin, self.fins),
-            *(table_of_axis(vehicle_axis, declared) for declared in (AXIS, TUNING) for vehicle_axis in self.axes),
-            *map(table_of_thruster, self.thrusters),
-        )
+            *(
+                _declared(("thruster", t.name), THRUSTER, t.keys, t.coefficient, actuator_words(t))
+                for t in self.thrusters
+            ),
+            (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
+        ]
+        return tuple(chain(*tables))
 
     @cached_property
     def keys_in_file(self) -> dict[str, tuple[str, ...]]:
         """The tables and the key of each coefficient in the vehicle file, by its name in the FMU."""
-        places = {name: (*table.place, key) for table in self.coefficient_tables for key, name in table.names.items()}
-        return places | {name: ("cross", name) for name in (cross_name(*row) for row in self.cross)}
+        return {one.name: one.keys for one in self.declared}
 
     @cached_property
     def coefficients(self) -> dict[str, Declaration]:
-        """The coefficients, in the order of the FMU's variables."""
-        declared = {
-            name: table.declarations[key].filled(**table.words)
-            for table in self.coefficient_tables
-            for key, name in table.names.items()
-        }
-        declared |= {cross_name(*row): cross_declaration(*row) for row in self.cross}
-        if self.coupled or any(key == "m_a" for key, *_ in self.cross):  # these effective inertias m/β must be finite
-            for axis in (axis for axis in self.bare_axes if self.has_attitude or axis is not HEAVE):
-                beta = axis.coefficient("beta")
-                description = declared[beta].description.removesuffix(AT_ZERO)
-                declared[beta] = replace(declared[beta], description=description, minimum=LEAST_BETA)
-        return declared
+        """The declarations of the coefficients by name."""
+        return {one.name: one.declaration for one in self.declared}
 
     @cached_property
     def tuning(self) -> tuple[str, ...]:
@@ -379,15 +397,18 @@ class Layout:
 
     @cached_property
     def calculated(self) -> dict[str, Declaration]:
-        """The calculated variables that are neither states nor rates.
+        """The calculated variables that are neither states nor rates."""
+        return self.thrust | self.angles | self.outside
 
-        They are the forces of the thrusters that are no states, the torque of the thrusters of each curve, the Euler
-        angles of a vehicle with an attitude, and `outside`. Forces and torques are those before the tuning α.
+    @cached_property
+    def thrust(self) -> dict[str, Declaration]:
+        """The forces of the thrusters that are no states, and the torque of the thrusters of each curve.
+
+        They are those before the tuning α.
         """
         forces = {f"F_{t.name}": thrust_declaration(t, self.curve_of[t.name]) for t in self.thrusters}
         torques = {f"tau_{curve.name}": torque_declaration(curve) for curve in self.turning_curves}
-        forces = {name: declaration for name, declaration in forces.items() if name not in self.lagging}
-        return forces | torques | self.angles | self.outside
+        return {name: declaration for name, declaration in forces.items() if name not in self.lagging} | torques
 
     @cached_property
     def angles(self) -> dict[str, Declaration]:

@@ -58,14 +58,15 @@ class CurrentTable:
 
 
 class Part:
-    """A part of a layout with optional coefficients: a thrust curve or an axis."""
+    """A part of a layout with coefficients: a thrust curve, an axis, a thruster or a fin."""
 
+    name: str
     keys: tuple[str, ...]
 
     @property
     def suffix(self) -> str:
         """The end of the names of its coefficients."""
-        raise NotImplementedError
+        return self.name
 
     def coefficient(self, key: str) -> str:
         """Return the name of a coefficient by its key. Without one for reverse, it is the name of the forward one."""
@@ -97,11 +98,6 @@ class Curve(Part):
     """What lags with the time constant T: the force, T F' = F(c) - F, or the rotor's speed, T n' = n_c - n."""
     electric_current: CurrentTable | None = field(default=None, compare=False)
     """The current of one thruster. All curves of a vehicle have it, or none."""
-
-    @property
-    def suffix(self) -> str:
-        """The name of the curve."""
-        return self.name
 
     @property
     def has_lag(self) -> bool:
@@ -140,7 +136,7 @@ class SourcedVector(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Actuator:
+class Actuator(Part):
     """A thruster or a fin: a part that commands drive, without its numbers."""
 
     name: str
@@ -156,10 +152,6 @@ class Actuator:
         """The position (m), or the centre of mass where there is none."""
         return self.position.value if self.position else (0.0, 0.0, 0.0)
 
-    def coefficient(self, key: str) -> str:
-        """Return the name of a coefficient by its key."""
-        return f"{key}_{self.name}"
-
 
 @dataclass(frozen=True, kw_only=True)
 class Thruster(Actuator):
@@ -167,6 +159,8 @@ class Thruster(Actuator):
 
     curve: str
     """The name of the thrust curve."""
+    keys: tuple[str, ...] = ("health",)
+    """The keys of THRUSTER."""
     arm: Literal["port", "starboard"] | None = None
     """The side of a thruster that pushes ahead with the arm R sin γ, (4), in place of a position."""
 
@@ -200,7 +194,8 @@ class BodyForce(Thruster):
 class Fin(Actuator):
     """A control surface. Its lift is proportional to its angle."""
 
-    has_drag: bool = False
+    keys: tuple[str, ...] = ("lift", "angle_max")
+    """The keys of FIN that the vehicle has."""
 
     def effect(self, axis: Axis) -> float:
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""

@@ -8,7 +8,7 @@ In Fossen's notation, with the velocities nu = (u, v, w, p, q, r) through the wa
     C(nu) nu     Coriolis and Munk terms               MassMatrix.coriolis (mass.py)
     D(nu) nu     linear and quadratic damping, lift    _drag (forces.py)
     g(eta)       weight and buoyancy                   _restoring, or the net weight in _loads (forces.py)
-    tau          thrust, its loss with speed, fins,    _loads, _advance, _steering (forces.py),
+    tau          thrust, its loss with speed, fins,    _loads, advance, _steering (forces.py),
                  loads from outside                    from the commands: thrust_formulas (thrust.py)
     J(eta) nu    kinematics                            _Table.pose here, rotation_terms (attitude.py)
 
@@ -28,9 +28,17 @@ from functools import cached_property, lru_cache
 
 from rov_fmu.io.groups import grouped
 
-from .attitude import angle_formulas, entry, quaternion_formulas, quaternion_rates, rotation_formulas, rotation_terms
+from .attitude import (
+    TURN,
+    angle_formulas,
+    entry,
+    quaternion_formulas,
+    quaternion_rates,
+    rotation_formulas,
+    rotation_terms,
+)
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import Expression, Formulas, Name, Names, call, directed, of, product, total, where
+from .expression import ONE, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
 from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
 from .layout import Layout
 from .mass import MassMatrix
@@ -54,32 +62,13 @@ class Term:
         return product(self.coefficient, *map(Name, self.factors))
 
 
-ONE = of(1.0)
-
-
-@dataclass(frozen=True)
-class Directed:
-    """A coefficient that depends on the direction of a velocity. Every term with it contains that velocity."""
-
-    velocity: str
-    forward: Expression
-    """The formula for a positive velocity."""
-    reverse: Expression
-    """The formula for a negative velocity."""
-
-    @property
-    def formula(self) -> Expression:
-        """One formula for both directions."""
-        return directed(Name(self.velocity), self.forward, self.reverse)
-
-
 @dataclass(frozen=True)
 class Equation:
     """The equation of motion of a vehicle. Formulas are evaluated in their order, and each may use those before it."""
 
     parameters: Mapping[str, Expression]
     """Formulas for the numbers that follow from the coefficients alone."""
-    directed: Mapping[str, Directed]
+    directed: Mapping[str, Operation]
     """The coefficients that depend on the direction of a velocity."""
     thrust: Mapping[str, Expression]
     """Formulas from the commands to the steady thrust of every thruster."""
@@ -194,12 +183,11 @@ class Equation:
     @cached_property
     def program(self) -> dict[str, Expression]:
         """All formulas from the inputs, states and coefficients of a vehicle to the numbers in its thrust and rates."""
-        directed = {name: d.formula for name, d in self.directed.items()}
         lags = [term.coefficient.names for terms in self.rows.values() for term in terms if self._is_lag(term)]
         by_lag = frozenset().union(*lags)
         by_lag = by_lag.union(*(self.forces[name].names for name in by_lag & self.forces.keys()))
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
-        return {**self.parameters, **directed, **self.orientation, **self.thrust, **forces}
+        return {**self.parameters, **self.directed, **self.orientation, **self.thrust, **forces}
 
     @cached_property
     def rates(self) -> dict[str, Expression]:
@@ -218,8 +206,7 @@ class Equation:
     @cached_property
     def monitored(self) -> tuple[str, ...]:
         """The velocities whose reversals end a piece of a step."""
-        velocities = {directed.velocity for directed in self.directed.values()}
-        return tuple(name for name in self.states if name in velocities)
+        return tuple(name for name in self.states if any(Name(name) == x.args[0] for x in self.directed.values()))
 
 
 def rate_formula(terms: Iterable[Term]) -> Expression:
@@ -246,7 +233,7 @@ def equation_of(layout: Layout) -> Equation:
     rows |= attitude | table.pose()
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
-    if "cos_psi" in rows:
+    if TURN[0] in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     starts |= rotation
     return Equation(
@@ -285,7 +272,7 @@ class _Table:
         self._declared = [*forces_of(layout, names)]
         self.lags = lags_of(layout, names)
         self.parameters = _parameters(layout, self._mass, self.lags)
-        self.directed: dict[str, Directed] = {}
+        self.directed: dict[str, Operation] = {}
         self.forces = Formulas(names)
         for name, curve in layout.curve_of.items():
             if curve.has_rotors:
@@ -358,21 +345,29 @@ class _Table:
                 yield Term(self._named(total(parts), "arriving_loss", v, other, curve.name), (arrived, other))
 
     def _term(self, v: str, forces: Sequence[Force], inverse: Mapping[str, Name]) -> Term:
-        """Return the sum of forces with one effect and equal factors. They must agree in `velocity`."""
-        first = forces[0]
+        """Return the sum of forces with one effect and equal factors.
+
+        Raises ValueError if they depend on directions in a way that the equation cannot have.
+        """
+        first, directions = forces[0], {force.velocity for force in forces} - {""}
         ahead, astern = (
             total(force.along(inverse[force.axis], reverse=reverse) for force in forces) for reverse in (False, True)
         )
         own = first.effect.name, v, *(() if set(first.factors) == {v} else dict.fromkeys(first.factors))
-        if not first.velocity:
-            coefficient: Expression = self._named(ahead, *own)
-        elif self._is_constant(ahead):
-            coefficient = self.names(*own)
-            self.directed[coefficient.identifier] = Directed(first.velocity, ahead, astern)
-        else:
-            direction = self.names("direction", first.velocity)
-            self.directed[direction.identifier] = Directed(first.velocity, ONE, -ONE)
+        if not directions:
+            return Term(self._named(ahead, *own), first.factors, first.effect)
+        velocity, *others = map(Name, directions)
+        if others:
+            raise ValueError("a force with the direction of another velocity needs an effect of its own")
+        if self._is_constant(ahead):
+            coefficient: Expression = self.names(*own)
+            self.directed[self.names(*own).identifier] = Operation("directed", (velocity, ahead, astern))
+        elif all(force.along() == -force.along(reverse=True) for force in forces):
+            direction = self.names("direction", velocity.identifier)
+            self.directed[direction.identifier] = Operation("directed", (velocity, ONE, -ONE))
             coefficient = direction * self._named(ahead, *own)
+        else:
+            raise ValueError("a force whose size depends on a direction may contain coefficients alone")
         return Term(coefficient, first.factors, first.effect)
 
     def pose(self) -> dict[str, tuple[Term, ...]]:
@@ -481,7 +476,7 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
     for one in layout.identified:
         quantities: dict[tuple[str, ...], Expression] = {(one.name,): Name(one.name)} if one.name in limited else {}
         if one.name == EVERY_COMMAND:
-            quantities = {(one.name, t.name): call("abs", names("command", t.name)) for t in layout.thrusters}
+            quantities = {(one.name, t.name): abs(names("command", t.name)) for t in layout.thrusters}
         for owners, x in quantities.items():
             beyond = formulas.define(_beyond(x, one), "outside", *owners)
             largest = formulas.define(where(largest < beyond, beyond, largest), "largest", *owners)

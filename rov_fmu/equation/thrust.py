@@ -98,7 +98,7 @@ def _add_steady_thrust(formulas: Formulas, name: str, curve: Curve, health: Expr
             force = force * _by_voltage(curve, formulas.names)
         if "d" in curve.keys:
             at_voltage = [_of_speed(curve, formulas.names)] if "V_0" in curve.keys else []
-            loss = product(health, by_direction(command, curve, "d"), call("abs", command), *at_voltage, share)
+            loss = product(health, by_direction(command, curve, "d"), abs(command), *at_voltage, share)
             formulas.define(loss, "loss", name)
         if curve.tables:
             force = product(force, share)
@@ -152,7 +152,7 @@ def _from_coefficients(formulas: Formulas, name: str, curve: Curve, health: Expr
 def _beyond(formulas: Formulas, name: str, curve: Curve) -> Name:
     """Add and return the size of the part of a command that is beyond the dead band, which is negative within it."""
     command = formulas.names("command", name)
-    size: Expression = call("abs", command)
+    size: Expression = abs(command)
     return formulas.define(size - by_direction(command, curve, "c_0") if "c_0" in curve.keys else size, "beyond", name)
 
 
@@ -187,7 +187,7 @@ def _from_speed(formulas: Formulas, name: str, curve: Curve, health: Expression)
 
 def _per_speed(n: Name, direction: Name, curve: Curve, times: float = 1.0) -> Expression:
     a_t, b_t = (by_direction(direction, curve, key) for key in ("a_t", "b_t"))
-    return product(times, a_t, call("abs", n)) + b_t
+    return product(times, a_t, abs(n)) + b_t
 
 
 def _of_rotor(name: str, curve: Curve, names: Names, *factors: Expression) -> Expression:
@@ -204,7 +204,7 @@ def add_rotor(formulas: Formulas, name: str, curve: Curve, health: Name) -> None
     """
     names = formulas.names
     n, n_c = Name(curve.lagging(name)), names("speed", name)
-    heads = formulas.define(where(call("abs", n) > _FAINT * call("abs", n_c), n, n_c), "heads", name)
+    heads = formulas.define(where(abs(n) > _FAINT * abs(n_c), n, n_c), "heads", name)
     change, share = n_c - n, 1.0 / curve.n_thrusters
 
     def signed(key: str) -> Expression:
@@ -219,7 +219,7 @@ def add_rotor(formulas: Formulas, name: str, curve: Curve, health: Name) -> None
     formulas.define(of_rotor(signed("a_t"), change, change), "bend", name)
     if "d" in curve.keys:
         of_speed = [names("speed_by_voltage", name)] if "V_0" in curve.keys else []
-        loss = product(health, by_direction(heads, curve, "d"), call("abs", n), *of_speed, share)
+        loss = product(health, by_direction(heads, curve, "d"), abs(n), *of_speed, share)
         formulas.define(loss, "loss", name)
         formulas.define(product(health, signed("d"), change, *of_speed, share), "loss_rise", name)
 

@@ -1,66 +1,26 @@
-"""What people read about coefficients and variables, and where the vehicle file has the coefficients."""
-
-from collections.abc import Mapping
-from typing import NamedTuple
+"""What people read about variables."""
 
 from rov_fmu.io.messages import listed
 
-from .catalogue import (
-    CURVE,
-    FIN,
-    HEAVE,
-    LAGS,
-    SURGE,
-    SWAY,
-    THRUSTER,
-    TUNING,
-    Declaration,
-    axis_words,
-    cited,
-)
-from .parts import FAINT, Actuator, Curve, Fin, Thruster, VehicleAxis
+from .catalogue import HEAVE, LAGS, SURGE, SWAY, Declaration, cited
+from .parts import FAINT, Actuator, Curve, Fin, Thruster
 
 
-class CoefficientTable(NamedTuple):
-    """A table of the vehicle file with coefficients."""
-
-    place: tuple[str, ...]
-    """The tables around it, and its own name."""
-    names: Mapping[str, str]
-    """The names of its coefficients, by key."""
-    declarations: Mapping[str, Declaration]
-    words: Mapping[str, str]
-    """What fills the fields in their texts."""
-
-
-def table_of_curve(curve: Curve) -> CoefficientTable:
+def curve_words(curve: Curve) -> dict[str, str]:
+    """Return the texts of a curve for the fields of CURVE."""
     words = {"curve": curve.description or f"curve {curve.name}", "equation": cited(curve.equation)}
-    words["lag"] = LAGS[curve.lag]
-    names = {key: curve.coefficient(key) for key in CURVE if key in curve.keys}
-    return CoefficientTable(("curves", curve.name), names, CURVE, words)
+    return words | {"lag": LAGS[curve.lag]}
 
 
-def table_of_axis(vehicle_axis: VehicleAxis, declarations: Mapping[str, Declaration]) -> CoefficientTable:
-    names = {
-        key: vehicle_axis.coefficient(key) for key in declarations if declarations is TUNING or key in vehicle_axis.keys
-    }
-    return CoefficientTable(("axes", vehicle_axis.axis.name), names, declarations, axis_words(vehicle_axis.axis))
-
-
-def table_of_fin(fin: Fin) -> CoefficientTable:
-    names = {key: fin.coefficient(key) for key in FIN if key != "drag" or fin.has_drag}
-    return CoefficientTable(("fin", fin.name), names, FIN, {"fin": _words(fin)})
-
-
-def table_of_thruster(thruster: Thruster) -> CoefficientTable:
-    names = {key: thruster.coefficient(key) for key in THRUSTER}
-    return CoefficientTable(("thruster", thruster.name), names, THRUSTER, {"thruster": _words(thruster)})
-
-
-def _words(actuator: Actuator) -> str:
-    """Return what a thruster or a fin is called."""
+def actuator_words(actuator: Actuator) -> dict[str, str]:
+    """Return the text of a thruster or a fin for the field of THRUSTER or FIN: what it is called."""
     kind = "fin" if isinstance(actuator, Fin) else "thruster"
-    return actuator.description or f"{kind} {actuator.name}"
+    return {kind: actuator.description or f"{kind} {actuator.name}"}
+
+
+def name_in_words(actuator: Actuator) -> str:
+    """Return what a thruster or a fin is called."""
+    return " ".join(actuator_words(actuator).values())
 
 
 def _pushes(direction: tuple[float, float, float]) -> str:
@@ -74,11 +34,11 @@ def _pushes(direction: tuple[float, float, float]) -> str:
 
 
 def command_words(actuator: Actuator) -> str:
-    return f"Command u_{actuator.name}: {_words(actuator)}, positive {_pushes(actuator.direction.value)}"
+    return f"Command u_{actuator.name}: {name_in_words(actuator)}, positive {_pushes(actuator.direction.value)}"
 
 
 def thrust_declaration(thruster: Thruster, curve: Curve) -> Declaration:
-    words = f"Thrust F_{thruster.name}: {_words(thruster)}"
+    words = f"Thrust F_{thruster.name}: {name_in_words(thruster)}"
     share = {1: "", 2: ", half of the pair's"}.get(curve.n_thrusters, f", 1/{curve.n_thrusters} of their curve")
     rest = ", in water at rest" if "d" in curve.keys else ""
     return Declaration(

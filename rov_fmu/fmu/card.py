@@ -5,13 +5,13 @@ file documentation/model_card.txt, and in the annotations of modelDescription.xm
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import degrees
 from textwrap import fill
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.forces import EXPECTED, effects_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, VERDICT
@@ -74,7 +74,7 @@ def _in_words(known: Range) -> str:
     if known.name == EVERY_COMMAND:
         return ""
     unit = UNIT_OF_RANGE[known.name]
-    factor, shown = (degrees(1.0), unit.replace("rad", "deg")) if unit.startswith("rad") else (1.0, unit)
+    factor, shown = in_degrees(unit)
     velocities = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
     name = (velocities | {"phi": "roll", "theta": "pitch", "z": "depth"})[known.name]
     low, high = (significant(factor * end, 2) for end in (known.low, known.high))

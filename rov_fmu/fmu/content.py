@@ -21,11 +21,11 @@ from rov_fmu.c.source import generated_sources, unused_sources
 from rov_fmu.c.source import sources as motion_sources
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.model_description import build_description, model_description
+from rov_fmu.fmu.picture import read_png
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
 from rov_fmu.fmu.variables import interface_header, variables
 from rov_fmu.io.paths import LICENSE
-from rov_fmu.io.picture import read_png
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 

@@ -7,8 +7,9 @@ from rov_fmu.c.compile import UNITY_FILE
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.dependencies import parameters_of
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.card import card_text
-from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable, unit_of
+from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -72,34 +73,6 @@ def build_description(identifier: str) -> bytes:
     return render("buildDescription.xml.j2", identifier=identifier, file=UNITY_FILE).encode()
 
 
-_QUANTITIES = {
-    "m": "Length",
-    "m/s": "Velocity",
-    "m/s2": "Acceleration",
-    "rad": "Angle",
-    "rad/s": "Angular velocity",
-    "rad/s2": "Angular acceleration",
-    "kg": "Mass",
-    "kg.m": "Coupled mass",
-    "kg.m2": "Moment of inertia",
-    "N": "Force",
-    "N/s": "Rate of force",
-    "N.m": "Torque",
-    "N.s/m": "Linear damping",
-    "N.s2/m2": "Quadratic damping",
-    "N.m.s/rad": "Linear rotational damping",
-    "N.m.s2/rad2": "Quadratic rotational damping",
-    "N.s2/(m2.rad)": "Lift",
-    "N.s2/(m2.rad2)": "Induced drag",
-    "V": "Voltage",
-    "s": "Duration",
-    "us": "Pulse width",
-    "1": "Number",
-    "1/s": "Rate",
-}
-"""The quantity of each unit; a unit that is not here belongs to a coefficient that couples axes."""
-
-
 def _type_names(variables: Sequence[Variable]) -> dict[str, str]:
     """Return the name of the type of each variable by the variable's name: its quantity.
 
@@ -108,7 +81,7 @@ def _type_names(variables: Sequence[Variable]) -> dict[str, str]:
     types: dict[tuple[str, tuple[object, ...]], str] = {}
     names: dict[str, str] = {}
     for v in variables:
-        quantity = "Command" if v.display_unit == "%" else _QUANTITIES.get(v.unit, "Coupling coefficient")
+        quantity = "Command" if v.display_unit == "%" else unit_of(v.unit).quantity
         key = quantity, (v.unit, v.display_unit, v.minimum, v.maximum, v.nominal)
         count = sum(known == quantity for known, _ in types)
         names[v.name] = types.setdefault(key, f"{quantity} {count + 1}" if count else quantity)

@@ -9,20 +9,9 @@ from pathlib import Path
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.units import UNITS, unit_of
 from rov_fmu.io.templates import render
 
-_ELEMENTS = {
-    "1": "Generic",
-    "V": "Generic",
-    "us": "Generic",
-    "N": "Force",
-    "N.m": "Torque",
-    "m/s": "LinearVelocity",
-    "rad/s": "AngularVelocity",
-    "m": "LinearDisplacement",
-    "rad": "AngularDisplacement",
-}
-"""The element of a group by the unit of its variables, in the order of the schema."""
 _MAX_MEMBERS = 3
 """The largest number of variables in a group."""
 
@@ -66,21 +55,22 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
 
 
 def osp_model_description(layout: Layout) -> bytes:
-    """Return the XML document. Every input and output must be in exactly one group of `_groups`."""
-    unit_of = {
-        name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()
-    }
+    """Return the XML document. Every input and output is in one group; those that `_groups` lacks have their own."""
+    units = {name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()}
     groups = []
-    names = [name for name, _ in _groups(layout)]
-    for name, candidates in _groups(layout):
-        if members := {variable: candidates[variable] for variable in unit_of if variable in candidates}:
-            (unit,) = {unit_of[variable] for variable in members}
+    possible = [*_groups(layout)]
+    placed = {variable for _, members in possible for variable in members}
+    possible += [(variable, {variable: None}) for variable in units if variable not in placed]
+    names = [name for name, _ in possible]
+    for name, candidates in possible:
+        if members := {variable: candidates[variable] for variable in units if variable in candidates}:
+            (unit,) = {units[variable] for variable in members}
             # the name of a curve or a thruster may make a name that another group has
             unique = name if names.count(name) == 1 else "_".join((name, *members))
-            groups.append((_ELEMENTS[unit], unique, unit, members))
+            groups.append((unit_of(unit).element, unique, unit, members))
     grouped = [variable for *_, members in groups for variable in members]
-    assert sorted(grouped) == sorted(unit_of), "every variable must be in one group"
-    order = list(_ELEMENTS.values())
+    assert sorted(grouped) == sorted(units), "every variable must be in one group"
+    order = [unit.element for unit in UNITS.values()]
     groups.sort(key=lambda group: order.index(group[0]))
     return render("osp.xml.j2", groups=groups).encode()
 

@@ -6,6 +6,7 @@ terminalKind: the standard defines none, and our own kind would only prevent con
 
 from dataclasses import dataclass
 
+from rov_fmu.equation.catalogue import CURRENT, CURRENT_DOWN
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
 
@@ -30,14 +31,11 @@ class Terminal:
 
 
 def terminals(layout: Layout) -> list[Terminal]:
-    """Return the terminals of a vehicle. Every input and output is in exactly one.
-
-    All calculated variables except the Euler angles and `outside` are in the terminal `thrust`.
-    """
+    """Return the terminals of a vehicle. Every input and output is in exactly one."""
     battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(axis.external for axis in layout.bare_axes)
-    current = tuple(name for name in layout.inputs if name not in {*layout.commands, *loads, *battery})
-    thrust = tuple(name for name in layout.lagging | layout.calculated if name not in layout.angles | layout.outside)
+    current = tuple(name for name in CURRENT | CURRENT_DOWN if name in layout.inputs)
+    thrust = tuple(layout.lagging | layout.thrust)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     actuators = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
@@ -54,6 +52,10 @@ def terminals(layout: Layout) -> list[Terminal]:
             "validity", "output", "plug", "How far the motion is beyond what was identified", tuple(layout.outside)
         ),
     ]
+    placed = {name for terminal in groups for name in terminal.members}
+    for causality, declared in (("input", layout.inputs), ("output", layout.state | layout.calculated)):
+        rest = tuple(name for name in declared if name not in placed)
+        groups.append(Terminal(f"other_{causality}s", causality, "bus", f"Other {causality}s", rest))
     return [terminal for terminal in groups if terminal.members]
 
 

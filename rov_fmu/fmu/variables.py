@@ -6,58 +6,17 @@ commands that act after the dead time, coefficients, attitude at the start. The 
 place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
-from collections import Counter
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from math import isfinite
 from typing import Any
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import DISPLAYS, HEAVE, SURGE, SWAY, YAW, Declaration, rate_name
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration, rate_name
 from rov_fmu.equation.dependencies import dependencies_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
-
-
-@dataclass(frozen=True)
-class Unit:
-    """A unit: its exponents of the FMI base units, and a display unit; factor converts values to the latter."""
-
-    exponents: Mapping[str, int]
-    display: str | None = None
-    factor: float = 1.0
-    size: float = 1.0
-    """The unit in SI units."""
-
-
-_BASE = {
-    "kg": {"kg": 1},
-    "m": {"m": 1},
-    "s": {"s": 1},
-    "us": {"s": 1},
-    "rad": {"rad": 1},
-    "V": {"kg": 1, "m": 2, "s": -3, "A": -1},
-    "N": {"kg": 1, "m": 1, "s": -2},
-    "1": {},
-}
-"""The exponents of the FMI base units in each symbol of a unit."""
-_SIZES = {"us": 1e-6}
-"""The sizes of the units that are not SI units."""
-
-
-def unit_of(text: str) -> Unit:
-    """Return a unit that is written as N.m.s2/rad2 or N.s2/(m.rad). A power is a digit after its symbol."""
-    exponents: Counter[str] = Counter()
-    above, _, below = text.partition("/")
-    for sign, symbols in ((1, above), (-1, below.strip("()"))):
-        for symbol in filter(None, symbols.split(".")):
-            name = symbol.rstrip("23") if symbol != "1" else symbol
-            for base, exponent in _BASE[name].items():
-                exponents[base] += sign * exponent * int(symbol[len(name) :] or 1)
-    powers = {base: exponent for base, exponent in exponents.items() if exponent}
-    display, factor = DISPLAYS.get(text, (None, 1.0))
-    return Unit(powers, display, factor, _SIZES.get(text, 1.0))
 
 
 @dataclass(frozen=True)

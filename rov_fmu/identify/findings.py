@@ -11,6 +11,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, COUPLED_AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.identified_vehicle import tested_ranges
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES
 from rov_fmu.identify.likelihood.kinds import KINDS
@@ -41,7 +42,6 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank.arrays import rms, usual_range
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import HEADINGS, MISFITS, Finding, Heading, about
 from rov_fmu.tank.findings import sentences as sentences_by
 from rov_fmu.tank.folder import Folder

@@ -27,7 +27,7 @@ from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
-from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Estimated
+from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
@@ -111,14 +111,12 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     vehicle = replace(
         rov,
         **dict(tests.description.tables.vehicle or ()),
-        sources=sources,
+        basis={name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()},
         command_range=validity.command_range if validity else fit.command_range,
         tested=validity.tested if validity else {},
         alternatives={},
         data=None,
         limits=tests.description.limits,
-        intervals=intervals,
-        estimates=estimates,
         provenance=made,
         measured_from=_data(fit),
     )
@@ -143,12 +141,11 @@ def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
     }
     vehicle = vehicle.with_(layout)
     numbers = {**dict.fromkeys(kept, UNTUNED), **vehicle.coefficients}
-    sources = {**dict.fromkeys(kept, NOT_GIVEN), **vehicle.sources}
+    basis = {**dict.fromkeys(kept, Basis(NOT_GIVEN)), **vehicle.basis}
     return replace(
         vehicle,
         coefficients=numbers | {name: quantity.value for name, quantity in thrust.items()},
-        sources=sources | {name: quantity.source for name, quantity in thrust.items()},
-        intervals={**vehicle.intervals, **{name: q.interval for name, q in thrust.items() if q.interval}},
+        basis=basis | {name: Basis(quantity.source, quantity.interval) for name, quantity in thrust.items()},
         command_range=vehicle.command_range if tables.validity else (0.0, 1.0),
     )
 
@@ -180,18 +177,20 @@ def _rounded(vehicle: Vehicle, digits: int) -> Vehicle:
     def short(value: float) -> float:
         return float(f"{value:.{digits}g}")
 
-    low, high = vehicle.command_range
+    def ends(interval: tuple[float, float]) -> tuple[float, float]:
+        return short(interval[0]), short(interval[1])
+
+    def estimate(row: Estimated) -> Estimated:
+        correlation = {other: r for other, value in row.correlation.items() if (r := round(value, digits))}
+        return Estimated(error=short(row.error), correlation=correlation)
+
     return replace(
         vehicle,
         coefficients={name: short(value) for name, value in vehicle.coefficients.items()},
-        command_range=(short(low), short(high)),
-        intervals={name: (short(low), short(high)) for name, (low, high) in vehicle.intervals.items()},
-        estimates={
-            name: Estimated(
-                error=short(row.error),
-                correlation={other: r for other, value in row.correlation.items() if (r := round(value, digits))},
-            )
-            for name, row in vehicle.estimates.items()
+        command_range=ends(vehicle.command_range),
+        basis={
+            name: Basis(one.source, one.interval and ends(one.interval), one.estimate and estimate(one.estimate))
+            for name, one in vehicle.basis.items()
         },
     )
 

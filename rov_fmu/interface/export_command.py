@@ -16,7 +16,7 @@ from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.fmu.card import card
 from rov_fmu.io.file_kinds import GAZEBO_MODEL
 from rov_fmu.io.messages import InputError, listed
-from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 
@@ -149,7 +149,7 @@ def _exported_file(vehicle: Vehicle, to: str, path: Path, inputs: list[Path], op
         if to == "urdf"
         else gazebo_model(vehicle, in_world=options.in_world, explicit=options.added_mass == "plugin")
     )
-    written = write_whole(Output(path, model.text.encode()), force=options.force)
+    written = write_whole(Output(path, sealed(model.text, "export").encode()), force=options.force)
     following = shell_words("gz", "sim", "-r", path) if options.in_world else ""
     if to == "sdf" and not following:
         following = "include it in a world, or give --world"

@@ -8,7 +8,7 @@ from tempfile import mkdtemp
 from rov_fmu.fmu.content import web_module
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import print_message
-from rov_fmu.io.output import check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of
@@ -34,7 +34,7 @@ def write_fly_page(
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
     shown = [Flown(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)]
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
-    return write_whole(page_output(path, fly_page(shown, recording=flown), "fly"), force=force)
+    return write_whole(Output(path, sealed(fly_page(shown, recording=flown), "fly").encode()), force=force)
 
 
 def open_in_browser(path: Path, option: str) -> None:

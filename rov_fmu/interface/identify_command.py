@@ -9,7 +9,7 @@ from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, is_mcap
 from rov_fmu.io.messages import InputError, Progress
-from rov_fmu.io.output import Output, check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.vehicle.writer import check_report, vehicle_output
@@ -64,7 +64,7 @@ def identify_tests(
         from rov_fmu.report.report import report_page  # imports Matplotlib, which takes a second
 
         page = report_page(identification, begin("drawing the report"))
-        outputs.append(page_output(report, page, "identify"))
+        outputs.append(Output(report, sealed(page, "identify").encode()))
     if mcap:
         from rov_fmu.bridges.mcap_logs import identification_mcap
 

@@ -8,7 +8,7 @@ from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.inspection.inspected import Inspected, inspect_logs
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.output import check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.folder import folder_and_files
 
 
@@ -26,7 +26,7 @@ def inspect_tests(
     if report:
         from rov_fmu.report.inspection_page import inspection_page  # imports Matplotlib, which takes a second
 
-        outputs.append(page_output(report, inspection_page(inspected), "inspect"))
+        outputs.append(Output(report, sealed(inspection_page(inspected), "inspect").encode()))
     if drafts and inspected.text:
         outputs.append(inspected.completed)
     written = write_whole(*outputs, force=True)

@@ -12,7 +12,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import Progress, ProofError, listed
-from rov_fmu.io.output import check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
@@ -87,7 +87,7 @@ def prove_with_report(
     proof = prove_claims(
         fmu, options.interface, options.tolerance, options.time_limit, options.key, CLAIMS_OF_VEHICLES, on_progress
     )
-    return proof, write_whole(page_output(report, proof_page(proof), "prove"), force=options.force)
+    return proof, write_whole(Output(report, sealed(proof_page(proof), "prove").encode()), force=options.force)
 
 
 def conservation(subject: Subject) -> Evidence:

@@ -9,27 +9,14 @@ from numpy.typing import NDArray
 
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.units import in_degrees, unit_of
 from rov_fmu.io.messages import InputError, UnknownNameError, only
-from rov_fmu.tank.columns import in_degrees
 
 if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
 Array = NDArray[np.float64]
-_QUANTITIES = {
-    "m/s": "velocity",
-    "deg/s": "rate of turn",
-    "m": "position",
-    "deg": "angle",
-    "m/s2": "acceleration",
-    "deg/s2": "angular acceleration",
-    "N": "force",
-    "N.m": "torque",
-    "1": "command",
-    "us": "command",
-}
-"""What a variable is, by its unit."""
 _SMALL = ("thrust", "command")
 """The quantities of all thrusters, which share a small panel."""
 _WORDS = {axis.velocity: axis.name for axis in AXES.values()} | {
@@ -145,7 +132,7 @@ class Result(Mapping[str, Array]):
         for name in dict.fromkeys(chosen):
             values = self[name]
             factor, unit = in_degrees(self.units[name])
-            quantity = "thrust" if name.startswith("F_") and unit == "N" else _QUANTITIES.get(unit, "")
+            quantity = "thrust" if name.startswith("F_") and unit == "N" else unit_of(self.units[name]).words
             panels.setdefault((quantity, unit), {})[name] = factor * values
         commands = {name: values for name, values in self.commands.items() if names is None and np.any(values)}
         heights = [0.6 if quantity in _SMALL else 1.0 for quantity, _ in panels] + [0.6] * bool(commands)

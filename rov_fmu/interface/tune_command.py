@@ -7,7 +7,8 @@ from pathlib import Path
 
 from rov_fmu.equation.catalogue import TUNING, Axis
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, impossible, tune
-from rov_fmu.io.csv_table import DataFileError, read_columns
+from rov_fmu.io.columns import read_columns
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.file_kinds import VEHICLE_FILE
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import check_targets

@@ -5,19 +5,16 @@ import hashlib
 import os
 import re
 import tempfile
-import warnings
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-from platformdirs import user_state_path
-
 from rov_fmu.io.file_kinds import check_written
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.reading import hash_of, open_file, read_text
+from rov_fmu.io.reading import open_file, read_text
 
 
 class WriteError(OSError):
@@ -105,7 +102,6 @@ def write_whole(
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
-            _note(outputs)
     return replaced
 
 
@@ -147,24 +143,20 @@ def _errors_about(path: Path) -> Iterator[None]:
 
 # ---- Whose file it is ------------------------------------------------------------------------------------------------
 #
-# A file may be replaced if this program wrote it and nobody has changed it since. A list in the user's folder has the
-# digests of what was written, which does for every format. Some files prove it themselves, on any machine: those with a
-# digest in their first line, and FMUs, which have the digests of their parts.
+# A file may be replaced if it proves that this program wrote it and that nobody has changed it since: by a digest in
+# its first line, or as an FMU does by the digests of its parts. Other files are replaced with `force` alone.
 
-_SEAL = re.compile(r"(?:#|<!--) rov-fmu \w+ wrote this file\. SHA-256 of the lines below: ([0-9a-f]{64})(?: -->)?")
-_LARGEST_LIST = 4_000_000
-"""The largest list of digests, in bytes. Beyond it, the older half is forgotten."""
-
-
-def sealed(text: str, comment: str, command: str) -> str:
-    """Return the text with a first line that has its digest. `comment` is how this kind of file writes one: `# {}`."""
-    words = f"rov-fmu {command} wrote this file. SHA-256 of the lines below: {_digest(text)}"
-    return f"{comment.format(words)}\n{text}"
+_SEAL = re.compile(r"(?:#|<!--) rov-fmu(?: \w+)? wrote this file\. SHA-256 of the lines below: (\w{64})(?: -->)?")
+_XML = re.compile(r"<\?xml[^\n]*\n")
+"""The line that must be the first one of a file in XML. The seal stands below it."""
 
 
-def page_output(path: Path, page: str, command: str) -> Output:
-    """Return the file of a page (HTML) that a command writes."""
-    return Output(path, sealed(page, "<!-- {} -->", command).encode())
+def sealed(text: str, command: str = "") -> str:
+    """Return the text of a page, a file in XML or in TOML with a line at its beginning that has its digest."""
+    head = match[0] if (match := _XML.match(text)) else ""
+    text = text.removeprefix(head)
+    words = f"{f'rov-fmu {command}'.strip()} wrote this file. SHA-256 of the lines below: {_digest(text)}"
+    return f"{head}{f'<!-- {words} -->' if text.startswith('<') else f'# {words}'}\n{text}"
 
 
 def without_seal(text: str) -> str:
@@ -189,48 +181,13 @@ def _foreign(path: Path) -> str:
     """Return why a file may be the work of somebody else, or an empty text if it is as this program wrote it."""
     try:
         with open_file(path) as file:
-            digest = hash_of(file, "sha256").hex()
-            if digest in _written():
-                return ""
-            file.seek(0)
-            seal = _SEAL.match(file.readline(300).decode(errors="replace").removeprefix("\ufeff"))
-        if not seal:
+            begins = _XML.sub("", file.read(500).decode(errors="replace").removeprefix("\ufeff"), count=1)
+        if not (seal := _SEAL.match(begins)):
             return "is not as rov-fmu wrote it: it may have been made or changed by hand"
-        return "" if seal[1] == _digest(read_text(path).partition("\n")[2]) else "has changed since rov-fmu wrote it"
+        below = _XML.sub("", read_text(path), count=1).partition("\n")[2]
+        return "" if seal[1] == _digest(below) else "has changed since rov-fmu wrote it"
     except FileError as error:
         return str(error).removeprefix(f"{path}: ")
-
-
-def _list() -> Path:
-    """Return the path of the list of digests, one in each line."""
-    return user_state_path("rov-fmu", appauthor=False) / "written"
-
-
-def _written() -> str:
-    """Return the list of digests, which is empty where there is none."""
-    with suppress(FileError, RuntimeError):  # RuntimeError: the user has no folder
-        return read_text(_list())
-    return ""
-
-
-def _note(outputs: Iterable[Output]) -> None:
-    """Add the digests of files to the list. Warns if that fails, because the next command will ask for --force."""
-    path = Path("the user's state folder")
-    try:
-        path = _list()
-        path.parent.mkdir(parents=True, exist_ok=True)
-        lines = "".join(f"{hashlib.sha256(output.content).hexdigest()}\n" for output in outputs)
-        if path.exists() and path.stat().st_size > _LARGEST_LIST:
-            old = _written()
-            shorter = path.with_name(f"{path.name}-{os.getpid()}")
-            shorter.write_text(old[old.index("\n", len(old) // 2) + 1 :], encoding="utf-8")
-            shorter.replace(path)
-        with path.open("a", encoding="utf-8") as file:
-            file.write(lines)
-    except (OSError, RuntimeError) as error:  # RuntimeError: the user has no folder
-        reason = getattr(error, "strerror", None) or error
-        words = "the list of the files that rov-fmu wrote cannot be written, so that replacing them will need --force"
-        warnings.warn(f"{path}: {words}: {reason}", UserWarning, stacklevel=3)
 
 
 def _digest(text: str) -> str:

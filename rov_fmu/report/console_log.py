@@ -5,10 +5,10 @@ from math import isfinite
 
 from rich.table import Table
 
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.inspection.inspected import Inspected
 from rov_fmu.io.messages import first_of, print_message
 from rov_fmu.report.console import console, paragraph, print_table, table, text
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import Inspection, Signal
 

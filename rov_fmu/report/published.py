@@ -10,7 +10,8 @@ from decimal import Decimal
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.io.csv_table import Column, DataFileError, read_columns
+from rov_fmu.io.columns import Column, read_columns
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.description import TABLES
 from rov_fmu.vehicle.vehicle import Vehicle
 

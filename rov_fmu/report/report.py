@@ -6,6 +6,7 @@ from itertools import count
 
 from markupsafe import Markup
 
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
 from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
@@ -14,7 +15,6 @@ from rov_fmu.report.plots.identification import plot_answers, plot_forces
 from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.log import Log
 from rov_fmu.vehicle.vehicle import Vehicle
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rov_fmu.interface.model import load
 from rov_fmu.io.messages import FileError, StudyError
-from rov_fmu.io.output import Output, check_targets, page_output, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import print_end
 from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
@@ -42,7 +42,7 @@ def study_plan(
             lambda message: shown.print(f"warning: {message}"),
             force=force,
         )
-    written = write_whole(page_output(output / PAGE, study_page(results), "study"), force=force)
+    written = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
         content = _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))

@@ -17,7 +17,7 @@ from unicodedata import combining, normalize
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
-from rov_fmu.io.csv_table import Column
+from rov_fmu.io.columns import Column
 from rov_fmu.tank.arrays import Array, Flags
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}

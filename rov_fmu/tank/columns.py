@@ -13,7 +13,7 @@ from pydantic import TypeAdapter
 
 from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.io.csv_table import (
+from rov_fmu.io.columns import (
     COMMANDS,
     FORCE_UNITS,
     NEUTRAL,
@@ -22,14 +22,14 @@ from rov_fmu.io.csv_table import (
     Column,
     Columns,
     Conversion,
-    DataFileError,
     KnownColumns,
     pulses,
 )
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import ANGLES, FORCE, QUANTITIES, TIMES, TORQUE, Quantity
+from rov_fmu.tank.catalogue import FORCE, QUANTITIES, TIMES, TORQUE, Quantity
 from rov_fmu.tank.commands import NO_KEYS, LogKeys
 from rov_fmu.tank.description import RovTables
 
@@ -61,12 +61,6 @@ def logged_command(keys: LogKeys = NO_KEYS) -> Column:
     usual = (NEUTRAL if keys.neutral is None else keys.neutral, keys.span or SPAN)
     of_keys = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual))
     return replace(FRACTION, optional=True, conversions={**COMMANDS, **of_keys})
-
-
-def in_degrees(unit: str) -> tuple[float, str]:
-    """Return the factor from an SI unit to the printed unit, and the name of the printed unit. Angles are printed in
-    degrees."""
-    return (ANGLES["deg"], unit.replace("rad", "deg")) if "rad" in unit else (1.0, unit)
 
 
 TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}

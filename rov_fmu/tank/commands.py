@@ -24,7 +24,8 @@ import numpy as np
 from pydantic import Field
 
 from rov_fmu.equation.parts import BodyForce
-from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, SPAN, DataFileError
+from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, SPAN
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import Finite, Strict
 from rov_fmu.tank.arrays import Array, spread

@@ -435,11 +435,9 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     """Return the coefficients that a vehicle's file gives."""
     declarations = vehicle.layout.coefficients
     return {
-        name: Quantity(
-            value=vehicle[name], unit=declarations[name].unit, source=source, interval=vehicle.intervals.get(name)
-        )
-        for name, source in vehicle.sources.items()
-        if source != NOT_GIVEN
+        name: Quantity(value=vehicle[name], unit=declarations[name].unit, source=one.source, interval=one.interval)
+        for name, one in vehicle.basis.items()
+        if one.source != NOT_GIVEN
     }
 
 

@@ -20,6 +20,7 @@ from pathlib import Path
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
 from rov_fmu.io.file_kinds import OWN_SUFFIXES, TESTS, check_suffix
 from rov_fmu.io.messages import FileError, brief, did_you_mean, lines_on, listed, only
@@ -27,7 +28,7 @@ from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, in_degrees, names_of
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, names_of
 from rov_fmu.tank.description import ROV_FILE, Dive, Draft, Requests, RovFile, RovTables, read_description
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Commands, Log

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.agreement import Disagreement, disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, spread
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Commands, Log
 

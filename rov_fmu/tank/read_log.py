@@ -12,7 +12,8 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import BodyForce
-from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, DataFileError
+from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array

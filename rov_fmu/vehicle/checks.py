@@ -74,12 +74,11 @@ def check_distinct_names(layout: Layout) -> Iterator[str]:
     """
     places = {f"F_{thruster.name}": f"thruster.{thruster.name}" for thruster in layout.thrusters}
     places |= {layout.curve_of[name].lagging(name): f"thruster.{name}" for name in layout.curve_of}
-    for table in layout.coefficient_tables:
-        for key, name in table.names.items():
-            place = ".".join((*table.place, key))
-            if (first := places.setdefault(name, place)) != place:
-                yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
-                return
+    for name, keys, _ in layout.declared:
+        place = ".".join(keys)
+        if (first := places.setdefault(name, place)) != place:
+            yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
+            return
 
 
 def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:

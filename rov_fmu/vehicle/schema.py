@@ -11,7 +11,7 @@ from itertools import pairwise
 from math import hypot
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
 from pydantic_core import ErrorDetails
@@ -367,7 +367,7 @@ class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
 
     def for_model(self) -> parts.Fin:
         """Return the fin of the model."""
-        return parts.Fin(**self.in_model, has_drag=self.drag is not None)
+        return parts.Fin(**self.in_model, keys=_coefficient_keys(self, FIN))
 
 
 class Battery(Strict):
@@ -408,13 +408,21 @@ class Estimated(Strict):
     """The correlations with other coefficients. Each pair is given once; without it, the correlation is 0."""
 
 
-def some_estimates(estimates: Mapping[str, Estimated], kept: Container[str]) -> dict[str, Estimated]:
-    """Return the estimates of the coefficients that are kept, with their correlations with each other."""
-    return {
-        name: row.model_copy(update={"correlation": {k: r for k, r in row.correlation.items() if k in kept}})
-        for name, row in estimates.items()
-        if name in kept
-    }
+class Basis(NamedTuple):
+    """What the value of a coefficient rests on."""
+
+    source: str
+    interval: tuple[float, float] | None = None
+    """The 95 % confidence interval of an identified coefficient."""
+    estimate: Estimated | None = None
+    """Its standard error, and its correlations with others."""
+
+    def among(self, names: Container[str]) -> "Basis":
+        """Return this without the correlations with coefficients that have other names."""
+        if self.estimate is None:
+            return self
+        correlation = {name: r for name, r in self.estimate.correlation.items() if name in names}
+        return self._replace(estimate=self.estimate.model_copy(update={"correlation": correlation}))
 
 
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]

@@ -6,7 +6,8 @@ from pathlib import Path
 from statistics import fmean
 
 from rov_fmu.equation.parts import CurrentTable, ThrustTable
-from rov_fmu.io.csv_table import BEYOND, COMMANDS, FORCE_UNITS, Column, DataFileError, read_columns
+from rov_fmu.io.columns import BEYOND, COMMANDS, FORCE_UNITS, Column, read_columns
+from rov_fmu.io.csv_table import DataFileError
 
 _COMMAND = Column({"1": 1.0, "%": 100.0}, minimum=-1.0, maximum=1.0, also=("pulse", "pwm"), conversions=COMMANDS)
 _THRUST = Column(FORCE_UNITS, also=("force",), minimum=-1e6, maximum=1e6)

@@ -8,7 +8,7 @@ from itertools import chain
 from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from typing_extensions import Self
 
@@ -29,7 +29,7 @@ from rov_fmu.vehicle.checks import check_parts, no_thrust
 from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Estimated, File, read_tables, some_estimates
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Basis, Estimated, File, read_tables
 
 if TYPE_CHECKING:
     from numpy import float64
@@ -49,7 +49,6 @@ class VehicleFileError(FileError):
 
 
 Values = Mapping[str, float]
-_Value = TypeVar("_Value")
 
 
 class _Formulas:
@@ -101,8 +100,8 @@ class Vehicle:
     version: str = ""
     description: str = ""
     source: str = ""
-    sources: Mapping[str, str] = field(default_factory=dict)
-    """The sources of the coefficients by name."""
+    basis: Mapping[str, Basis] = field(default_factory=dict)
+    """What the coefficients rest on, by name."""
     command_range: tuple[float, float] = (0.0, 1.0)
     """The weakest and the strongest thruster command for which the model was identified."""
     tested: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -115,10 +114,6 @@ class Vehicle:
     """The folder with the vehicle's own PICTURES, any of which may be missing."""
     limits: tuple[str, ...] = ()
     """Known effects on the vehicle that the model leaves out, in sentences."""
-    intervals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    """The 95 % confidence intervals of identified coefficients, by name."""
-    estimates: Mapping[str, Estimated] = field(default_factory=dict)
-    """The standard errors and correlations of identified coefficients, by name."""
     provenance: Provenance | None = None
     measured_from: str = field(default="measurements", compare=False)
     """What the vehicle was identified from, in words. A vehicle file has it in a comment only."""
@@ -139,6 +134,21 @@ class Vehicle:
         return isinstance(other, Vehicle) and all(getattr(self, name) == getattr(other, name) for name in compared)
 
     __hash__ = None  # type: ignore[assignment]  # it has mappings, whose order does not matter
+
+    @property
+    def sources(self) -> dict[str, str]:
+        """The sources of the coefficients by name."""
+        return {name: one.source for name, one in self.basis.items()}
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """The 95 % confidence intervals of identified coefficients, by name."""
+        return {name: one.interval for name, one in self.basis.items() if one.interval}
+
+    @property
+    def estimates(self) -> dict[str, Estimated]:
+        """The standard errors and correlations of identified coefficients, by name."""
+        return {name: one.estimate for name, one in self.basis.items() if one.estimate}
 
     @property
     def file_content(self) -> bytes | None:
@@ -170,28 +180,18 @@ class Vehicle:
         changed = {**vehicle.coefficients, **values}
         if values and (mistake := next(_contradictions(vehicle.layout, changed), None)):
             raise InputError(mistake)
-        return replace(
-            vehicle,
-            coefficients=changed,
-            sources={**vehicle.sources, **dict.fromkeys(values, BY_HAND)},
-            intervals={name: interval for name, interval in vehicle.intervals.items() if name not in values},
-            estimates=some_estimates(vehicle.estimates, vehicle.coefficients.keys() - values.keys()),
-        )
+        others = vehicle.coefficients.keys() - values.keys()
+        basis = {name: one.among(others) for name, one in vehicle.basis.items()}
+        return replace(vehicle, coefficients=changed, basis=basis | dict.fromkeys(values, Basis(BY_HAND)))
 
     def _with_layout(self, layout: Layout) -> Self:
         """Return the vehicle with another layout, and with those of its coefficients that this layout has, too."""
         names = layout.coefficients.keys()
-
-        def kept(values: Mapping[str, _Value]) -> dict[str, _Value]:
-            return {name: value for name, value in values.items() if name in names}
-
         return replace(
             self,
             layout=layout,
-            coefficients=kept(self.coefficients),
-            sources=kept(self.sources),
-            intervals=kept(self.intervals),
-            estimates=some_estimates(self.estimates, names),
+            coefficients={name: value for name, value in self.coefficients.items() if name in names},
+            basis={name: one.among(names) for name, one in self.basis.items() if name in names},
         )
 
     def __repr__(self) -> str:
@@ -208,9 +208,8 @@ class Vehicle:
     def _by_hand(self, before: str, after: str = "") -> str:
         """Return the list of coefficients that were set by hand, or an empty text if there are none."""
         coefficients = self.layout.coefficients.items()
-        items = [
-            f"{name} = {one.written(self[name])}" for name, one in coefficients if self.sources.get(name) == BY_HAND
-        ]
+        sources = self.sources
+        items = [f"{name} = {one.written(self[name])}" for name, one in coefficients if sources.get(name) == BY_HAND]
         return f"{before}{BY_HAND}: {', '.join(items)}{after}" if items else ""
 
     @property
@@ -521,13 +520,14 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
         layout,
         coefficients,
         **dict(head),
-        sources={name: q.source if q else NOT_GIVEN for name, q in quantities.items()},
+        basis={
+            name: Basis(q.source, q.interval, file.estimates.get(name)) if q else Basis(NOT_GIVEN)
+            for name, q in quantities.items()
+        },
         command_range=validity.command_range,
         tested=validity.tested,
         alternatives=file.alternatives,
         limits=validity.limits,
-        intervals={name: q.interval for name, q in quantities.items() if q and q.interval},
-        estimates=file.estimates,
         provenance=file.provenance,
     )
     return replace(vehicle, file=VehicleFile(path, content, vehicle))

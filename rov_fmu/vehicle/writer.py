@@ -18,7 +18,7 @@ from rov_fmu.io.paths import inside_or_shipped, name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, toml_text
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, FileHead, why_no_identifier
-from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, Estimated
+from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
@@ -41,7 +41,7 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         if table:
             document[name] = _item(table, folder, _DEPTHS.get(name, 1))
     text: str = tomlkit.dumps(document)
-    return sealed(text, "# {}", "identify") if made else text
+    return sealed(text, "identify") if made else text
 
 
 def _tables(vehicle: Vehicle) -> dict[str, Any]:
@@ -72,12 +72,17 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "cross": {},
         "inputs": layout.mix,
         "alternatives": {name: one.model_dump() for name, one in vehicle.alternatives.items()},
-        "estimates": {name: _estimated(row) for name, row in vehicle.estimates.items()},
+        "estimates": {
+            name: {"error": row.error, "correlation": row.correlation or None}
+            for name, row in vehicle.estimates.items()
+        },
         "provenance": made.model_dump() if made else {},
     }
     for name, (*above, key) in layout.keys_in_file.items():
-        if vehicle.sources.get(name, NOT_GIVEN) != NOT_GIVEN:
-            _table_at(tables, above)[key] = _quantity(vehicle, name)
+        basis = vehicle.basis.get(name)
+        if basis and basis.source != NOT_GIVEN:
+            value = {"value": vehicle[name], "unit": layout.coefficients[name].unit}
+            _table_at(tables, above)[key] = value | {"interval": basis.interval or (), "source": basis.source}
     return tables
 
 
@@ -278,21 +283,10 @@ def _checked(path: Path, text: str, coming: Path | None = None) -> Output:
             warnings.warn(named(warning.message), warning.category, stacklevel=2)
 
     try:
-        return Output(path, text.encode(), check)
+        return Output(path, (sealed(text) if text == without_seal(text) else text).encode(), check)
     except UnicodeEncodeError as error:
         part = shown(text[max(error.start - 20, 0) : error.end])
         raise VehicleFileError(f"{path}: {part}: the name of a file that is not Unicode cannot stand here") from error
-
-
-def _quantity(vehicle: Vehicle, name: str) -> dict[str, Any]:
-    """Return the table of a coefficient."""
-    interval, unit = vehicle.intervals.get(name, ()), vehicle.layout.coefficients[name].unit
-    return {"value": vehicle[name], "unit": unit, "interval": interval, "source": vehicle.sources[name]}
-
-
-def _estimated(row: Estimated) -> dict[str, Any]:
-    """Return the table of a standard error and of the correlations."""
-    return {"error": row.error, "correlation": row.correlation or None}
 
 
 def _inline_table(entries: Mapping[str, Any]) -> InlineTable:

@@ -17,11 +17,13 @@ import yaml
 from numpy.typing import NDArray
 
 import rov_fmu
+from rov_fmu.bridges.allocation import allocation_files
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import BARE, ROOT
+from tests.vehicles import FINNED, a_vehicle
 
 Array = NDArray[np.float64]
 VEHICLES = {
@@ -118,6 +120,12 @@ def test_the_wrench_that_is_asked_is_the_wrench_that_acts(name: str, tmp_path: P
         off = np.abs(accelerations(vehicle, {**others, **commands}) - rest - by_wrench)
         worst = max(worst, float((off / (np.abs(scale) + 1e-9)).max()))
     assert worst < 1e-3
+
+
+def test_what_the_files_lack_is_told_from_what_they_have() -> None:
+    text = allocation_files(a_vehicle(FINNED))["allocation.yaml"]
+    assert "# Left out: the fins.\n" in text
+    assert "drag" not in text, "the hull has its drag whatever the thrusters do"
 
 
 def test_the_table_has_the_rows_of_the_yaml_and_both_rise(tmp_path: Path) -> None:

@@ -25,7 +25,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub
 from tests.bridges.test_sitl import served, setup_of
-from tests.vehicles import FINNED
+from tests.vehicles import FINNED, with_intervals
 from verification.references.autopilot.ardusub import VECTORED, VECTORED_6DOF, Hold
 
 SIX, HEAVY, VIDEORAY = (load_vehicle(SHIPPED[name]) for name in ("bluerov2", "bluerov2_heavy", "videoray"))
@@ -216,8 +216,8 @@ def test_gains_are_lowered_until_nothing_chatters_for_all_that_the_estimates_all
 ) -> None:
     """A lag of 0.05 s asks for 25/s, and with one of 0.25 s, which its interval allows, the loop chatters."""
     monkeypatch.setattr("rov_fmu.bridges.ardusub.gains._DRAWS", 1)
-    sure = replace(GREBE.with_(T_t200=0.05), intervals={"m_rov": (13.0, 13.2)})
-    unsure = replace(sure, intervals={"T_t200": (0.001, 1.2)})
+    sure = with_intervals(GREBE.with_(T_t200=0.05), {"m_rov": (13.0, 13.2)})
+    unsure = with_intervals(sure, {"T_t200": (0.001, 1.2)})
     certain, lowered = tuned(sure), tuned(unsure)
     assert not certain.notes
     (note,) = lowered.notes

@@ -8,8 +8,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
-from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
 
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -25,6 +23,7 @@ from tests.commands import (
     TESTS,
     WRITING,
     Command,
+    make_key,
     run_elsewhere,
     without_progress,
 )
@@ -223,8 +222,7 @@ def reading(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "study.json": 'vehicle = "videoray.toml"\nstop_time = 1.0\n',
         **dict.fromkeys(("logs.mcap", "videoray.fmu", "key.pub"), "is read once the output is checked"),
     }
-    key = Ed25519PrivateKey.generate().private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
-    (folder / "key.fmu").write_bytes(key)
+    make_key(folder / "key.fmu")
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     return folder

@@ -14,8 +14,8 @@ import pytest
 
 import rov_fmu
 from rov_fmu.bridges import gym, mujoco
+from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.build import build
-from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.alone import steady_velocity, time_constant
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.prove.proof import prove

@@ -10,7 +10,6 @@ from mpmath import mp
 from scipy.integrate import quad
 
 from rov_fmu.equation.alone import RISE, AxisAlone, steady_velocity, time_constant
-from rov_fmu.equation.forces import Effect, Force
 from tests.motions import DISTANCE, SMALLEST, VELOCITY, Case, step_alone
 from tests.often import often
 from verification.references.reference import axis, time_to_rest
@@ -123,8 +122,3 @@ def test_drag_of_its_own_in_reverse_holds_for_negative_velocities_and_forces() -
     assert AxisAlone(2.0, 3.0, -5.0).drag(-1.0) == (2.0, 3.0)
     assert astern.stopping_distance(-1.5, 0.1) == pytest.approx(quad(lambda v: 1.0 / (0.5 * v + 1.0), 0.15, 1.5)[0])
     assert pytest.approx(0.6321205588285577, rel=1e-15) == RISE
-
-
-def test_a_force_of_three_states_is_refused_because_the_equation_is_quadratic() -> None:
-    with pytest.raises(ValueError, match=r"^cubic drag: at most two states may multiply a coefficient \(terms.py\)$"):
-        Force(Effect("cubic", "cubic drag"), "u", -1, (), ("u", "u", "u"))

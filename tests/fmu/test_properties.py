@@ -14,10 +14,11 @@ from lxml import etree
 from rov_fmu.c import compile as build_options
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.model_description import build_description, model_description
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals_and_icons
-from rov_fmu.fmu.variables import unit_of, variables
+from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import (
     EVERYTHING,

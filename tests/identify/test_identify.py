@@ -115,7 +115,8 @@ def check_file(found: Identification, path: Path) -> Vehicle:
         assert read_again.intervals[name] == pytest.approx(interval, rel=1e-5)
     assert read_again.uncertainty.errors == pytest.approx(made.uncertainty.errors, rel=1e-5)
     assert read_again.uncertainty.correlation == pytest.approx(made.uncertainty.correlation, abs=2e-6)
-    same = {key: getattr(made, key) for key in ("layout", "coefficients", "intervals", "estimates")}
+    assert read_again.sources == made.sources
+    same = {key: getattr(made, key) for key in ("layout", "coefficients", "basis")}
     assert replace(read_again, **same) == made
     return read_again
 

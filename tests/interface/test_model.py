@@ -12,8 +12,8 @@ import pandas as pd
 import pytest
 
 import rov_fmu
+from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.build import build
-from rov_fmu.c.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.content import native_content

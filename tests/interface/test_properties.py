@@ -11,6 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.tuning import Target, tune
+from rov_fmu.io.output import sealed
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
@@ -39,7 +40,9 @@ def _tuned(path: Path) -> None:
 FUNCTIONS: dict[tuple[str, str], Callable[[Path], object]] = {
     ("build", "output"): lambda path: rov_fmu.load(BARE).build(path, platforms="host"),
     ("simulate", "output"): _simulated,
-    ("export", "output"): lambda path: path.write_text(gazebo_model(rov_fmu.load(BARE)).text, encoding="utf-8"),
+    ("export", "output"): lambda path: path.write_text(
+        sealed(gazebo_model(rov_fmu.load(BARE)).text, "export"), encoding="utf-8"
+    ),
     ("identify", "output"): lambda path: write_vehicle(identify(load_tests(FEW_TESTS)).vehicle, path),
     ("tune", "output"): _tuned,
 }

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.io.csv_table import LARGEST, Column, Columns, DataFileError, read_columns, read_header, read_series
+from rov_fmu.io.columns import Column, Columns, read_columns
+from rov_fmu.io.csv_table import LARGEST, DataFileError, read_series
+from rov_fmu.tank.readers.tables import grown_rows, read_start
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import often
@@ -127,7 +129,7 @@ def test_a_row_is_never_skipped(tmp_path: Path) -> None:
     path = _file(tmp_path, "long,late\n1,2\n3,4\nlength [m],time [s]\n5,6\n")
     with pytest.raises(DataFileError, match="line 1, column 1 = 'long'"):
         read_columns(path, {"length": LENGTH, "time": MAYBE})
-    assert read_header(_file(tmp_path, "Timestamp,depth\n,\n--.--,-\ns,m\n2024-05-11 10:00:00.1,--.--\n")) == [
+    assert _header(_file(tmp_path, "Timestamp,depth\n,\n--.--,-\ns,m\n2024-05-11 10:00:00.1,--.--\n")) == [
         "Timestamp",
         "depth",
     ]
@@ -146,6 +148,10 @@ def test_what_is_in_no_encoding_is_refused(content: bytes, tmp_path: Path) -> No
 
 TITLES = ("time [s]", "roll [deg]", "mode", "depth [m]", "volts [V]", "fix")
 SI = {name: Column({unit: 1.0}) for name, unit in (("time", "s"), ("roll", "deg"), ("depth", "m"), ("volts", "V"))}
+
+
+def _header(path: Path) -> list[str]:
+    return read_start(path, None, 1)[0]
 
 
 def _cells(n: int) -> list[str]:
@@ -178,7 +184,7 @@ def test_columns_that_are_inserted_later_leave_the_others_right_or_blank(
     start: int, place: int, tmp_path: Path
 ) -> None:
     """A cell is never taken for that of another column. All that are far from the insertion are read."""
-    table = read_columns(_file(tmp_path, _grown(90, (start, place, 2))), SI, others=True, loose=True)
+    table = read_columns(_file(tmp_path, _grown(90, (start, place, 2))), SI, others=True, loose=True, grown=grown_rows)
     wanted = [_cells(n) for n in range(90)]
     for column, name in ((0, "time"), (1, "roll"), (3, "depth"), (4, "volts")):
         read = [(value, float(row[column])) for value, row in zip(table.values[name], wanted, strict=True)]
@@ -191,7 +197,7 @@ def test_columns_that_are_inserted_later_leave_the_others_right_or_blank(
 
 def test_columns_may_be_inserted_twice_and_a_row_cut(tmp_path: Path) -> None:
     text = _grown(120, (20, 5, 1), (70, 6, 2), short=100)
-    table = read_columns(_file(tmp_path, text), SI, others=True, loose=True)
+    table = read_columns(_file(tmp_path, text), SI, others=True, loose=True, grown=grown_rows)
     rows = [n for n in range(120) if n != 100]
     assert [*table.values["time"]] == [float(_cells(n)[0]) for n in rows]
     assert [*table.values["depth"]] == [float(_cells(n)[3]) for n in rows]
@@ -207,18 +213,20 @@ def test_rows_that_cannot_be_assigned_are_left_out_or_refused_in_one_line(tmp_pa
         path = _file(tmp_path, "\n".join(["time [s],length [m],x", *map(",".join, rows)]))
         columns = {"time": MAYBE, "length": LENGTH}
         if n == 80:
-            table = read_columns(path, columns, others=True, loose=True)
+            table = read_columns(path, columns, others=True, loose=True, grown=grown_rows)
             assert (table.torn, len(table.lines), table.assumed) == (20, 80, {})
             continue
         with pytest.raises(DataFileError) as error:
-            read_columns(path, columns, others=True, loose=True)
+            read_columns(path, columns, others=True, loose=True, grown=grown_rows)
         rest = "'1': there is no such column (are these decimal commas? They need ; between the columns, or quotes)"
         more = "and 99 rows have more cells than the header, which has 3. Complete the header"
         assert str(error.value) == f"{path}, line 3, column 4 = {rest}, {more}"
     ragged = [",".join(_cells(n) + ["1", "2"] * (n % 2)) for n in range(41)]
-    table = read_columns(_file(tmp_path, "\n".join([",".join(TITLES), *ragged])), SI, others=True, loose=True)
+    table = read_columns(
+        _file(tmp_path, "\n".join([",".join(TITLES), *ragged])), SI, others=True, loose=True, grown=grown_rows
+    )
     assert (table.torn, table.assumed) == (20, {})
-    table = read_columns(_file(tmp_path, _grown(90, (88, 2, 2))), SI, others=True, loose=True)
+    table = read_columns(_file(tmp_path, _grown(90, (88, 2, 2))), SI, others=True, loose=True, grown=grown_rows)
     assert (table.torn, table.assumed) == (2, {})
 
 
@@ -284,7 +292,7 @@ def test_a_log_takes_at_most_six_times_its_size_in_memory(rows: int, tmp_path: P
     size = _log(path, rows)
     read_log(path, layout)  # imports modules, which should not count
     columns = {"time": Column({"s": 1.0}), "depth": Column({"m": 1.0})}
-    assert _peak(lambda: read_columns(path, columns, others=True, loose=True)) < 3 * size
+    assert _peak(lambda: read_columns(path, columns, others=True, loose=True, grown=grown_rows)) < 3 * size
     assert _peak(lambda: read_log(path, layout)) < 6 * size
 
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.io.csv_table import Column, DataFileError, read_columns
+from rov_fmu.io.columns import Column, read_columns
+from rov_fmu.io.csv_table import DataFileError
 from tests.often import often
 
 BEFORE = {  # what may stand before the header, and the number of lines that are told

@@ -8,8 +8,6 @@ from pathlib import Path
 
 import pytest
 import tomlkit
-from cryptography.hazmat.primitives import serialization
-from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 from lxml import html
 from pythonfmu import FmuBuilder
 
@@ -23,6 +21,7 @@ from rov_fmu.prove.measures import Evidence
 from rov_fmu.prove.subject import Subject, opened
 from rov_fmu.report.proof_page import proof_page
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.commands import make_key
 from verification.references.vehicles import IDENTIFIED
 
 Texts = Mapping[str, str]
@@ -121,11 +120,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("identified")
     text = re.sub(r"yaw: good\.[^\"]*", _YAW, IDENTIFIED.read_text("utf-8"))
     (folder / "vehicle.toml").write_text(text, "utf-8")
-    (folder / "key").write_bytes(
-        Ed25519PrivateKey.from_private_bytes(bytes(32)).private_bytes(
-            serialization.Encoding.PEM, serialization.PrivateFormat.OpenSSH, serialization.NoEncryption()
-        )
-    )
+    make_key(folder / "key")
     vehicle, path = load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu"
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("rov_fmu.build.web_module", lambda _: b"")  # no question is about the page that flies

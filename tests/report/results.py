@@ -39,6 +39,7 @@ from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.description import Provenance
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import with_intervals
 
 FILES = ("log_1.csv", "log_2.csv")
 TIME = np.arange(0.0, 60.0, 0.1)
@@ -119,7 +120,7 @@ def without_findings() -> Identification:
     """Return the result before anything is told about it."""
     base = load_vehicle(VIDEORAY)
     vehicle = replace(
-        base,
+        with_intervals(base, {"a_d_u": (9.0, 11.0)}),
         name="Tadpole",
         identifier="tadpole",
         version="1",
@@ -127,7 +128,6 @@ def without_findings() -> Identification:
         source="Two dives in a pond",
         provenance=Provenance(tool="rov-fmu", method="A result made by hand", inputs={}),
         measured_from="two dive logs",
-        intervals={"a_d_u": (9.0, 11.0)},
         data=None,
         pictures=None,
     )

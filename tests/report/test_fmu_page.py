@@ -18,6 +18,7 @@ from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.pages import check_is_whole, check_refers_to_itself_alone, rows, text_of
+from tests.vehicles import with_intervals
 
 ODD_NAME = 'Größe <b>$1</b> & "Söhne"'
 
@@ -91,7 +92,7 @@ def test_text_of_the_vehicle_file_is_escaped(vehicle: Vehicle) -> None:
 
 @pytest.fixture(scope="module")
 def heavy_page(heavy: Vehicle) -> str:
-    return page_without_plots(replace(heavy, intervals={"a_d_u": (130.5, 151.5)}))
+    return page_without_plots(with_intervals(heavy, {"a_d_u": (130.5, 151.5)}))
 
 
 @pytest.mark.parametrize("content_of", [native_content, python_content])

@@ -14,7 +14,8 @@ from rov_fmu import load
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, Axis
 from rov_fmu.fmu.variables import variables
-from rov_fmu.io.csv_table import PULSES, DataFileError
+from rov_fmu.io.columns import PULSES
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.report.published import load_tables
 from rov_fmu.tank.columns import Names, columns_of_log
 from rov_fmu.tank.log import Log

@@ -15,7 +15,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.fmu.content import native_content, python_content
 from rov_fmu.identify.findings import driven_aside
-from rov_fmu.io.output import page_output, write_whole
+from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.report import report_page
 from rov_fmu.report.templates import today
@@ -170,7 +170,7 @@ def identified(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A vehicle file that names its report, which is in a folder of its own."""
     leave_plots_out(monkeypatch)
     (tmp_path / "pages").mkdir()
-    page = page_output(tmp_path / "pages" / "report.html", report_page(example()), "identify")
+    page = Output(tmp_path / "pages" / "report.html", sealed(report_page(example()), "identify").encode())
     vehicle = load_vehicle(VIDEORAY)
     made = example().vehicle.provenance
     assert made

@@ -20,14 +20,14 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import FROZEN_REFIT, without_progress
 from tests.folders import beside
+from tests.vehicles import with_intervals
 
 REFITTED = load_vehicle(FROZEN_REFIT)
 ROWS = {"a_d_u": (9.0, 0.5, {}), "b_d_u": (5.0, 0.3, {"a_d_u": -0.8}), "a_d_w": (18.0, 0.6, {})}
-MADE = replace(
-    REFITTED,
-    coefficients={**REFITTED.coefficients, **{name: value for name, (value, _, _) in ROWS.items()}},
-    intervals={name: (value - 1.96 * error, value + 1.96 * error) for name, (value, error, _) in ROWS.items()},
-    estimates={name: Estimated(error=error, correlation=others) for name, (_, error, others) in ROWS.items()},
+MADE = with_intervals(
+    replace(REFITTED, coefficients={**REFITTED.coefficients, **{name: value for name, (value, _, _) in ROWS.items()}}),
+    {name: (value - 1.96 * error, value + 1.96 * error) for name, (value, error, _) in ROWS.items()},
+    {name: Estimated(error=error, correlation=others) for name, (_, error, others) in ROWS.items()},
 )
 """A vehicle whose coefficients are far from their bounds, so that all distributions are normal."""
 
@@ -90,7 +90,7 @@ def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
 def test_a_reader_is_warned_of_what_he_may_not_expect() -> None:
     for words, (_, estimates) in {
         "no row in [estimates] of its.toml: a_d_u, b_d_u and a_d_w vary as if correlated with nothing": _estimates(
-            replace(MADE, estimates={})
+            with_intervals(MADE, MADE.intervals)
         ),
         "the plan gives a_d_u: its correlation with b_d_u in its.toml is left out": _estimates(
             MADE, set={"a_d_u": 9.0}
@@ -106,7 +106,7 @@ def test_a_reader_is_warned_of_what_he_may_not_expect() -> None:
 
 
 def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
-    made = replace(MADE, intervals={name: MADE.intervals[name] for name in ("a_d_u", "b_d_u")})
+    made = with_intervals(MADE, {name: MADE.intervals[name] for name in ("a_d_u", "b_d_u")}, MADE.estimates)
     has = _has(MADE)
     without = {name: variable for name, variable in has.items() if name != "a_d_u"}
     narrow = has | {"b_d_u": replace(has["b_d_u"], minimum=6.0, maximum=7.0)}

@@ -10,7 +10,8 @@ import pytest
 from rov_fmu.equation.catalogue import AXES, HEAVE, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
-from rov_fmu.io.csv_table import DataFileError, read_columns
+from rov_fmu.io.columns import read_columns
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
 from rov_fmu.tank.columns import TIME, Names, columns_of, columns_of_log, known_columns

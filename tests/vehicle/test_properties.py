@@ -21,7 +21,7 @@ from tests.commands import REFIT
 from tests.damage import changed_bytes, changed_lines, changed_numbers, changed_toml, fuzz
 from tests.often import often
 from tests.vehicle.test_vehicle import refusal
-from tests.vehicles import EVERYTHING, SIX_AXES
+from tests.vehicles import EVERYTHING, SIX_AXES, bases
 
 TEXT = VIDEORAY.read_text(encoding="utf-8")
 SOURCES = [path.read_bytes() for path in (VIDEORAY, REFIT, EVERYTHING, EVERYTHING)]
@@ -108,13 +108,15 @@ def drawn(path: Path, rng: random.Random) -> Vehicle:
     return replace(
         rov,
         coefficients=values,
-        sources=dict.fromkeys(values, rng.choice(TEXTS)),
+        basis=bases(
+            dict.fromkeys(values, rng.choice(TEXTS)),
+            {**rov.intervals, **{n: (values[n] * (1.0 - 1e-9) / 3.0, 3.0 * values[n]) for n in known}},
+            {n: row.model_copy(update={"error": row.error * 1.1}) for n, row in rov.estimates.items()},
+        ),
         name=rng.choice(TEXTS),
         data=None,
         pictures=None,
         alternatives={},
-        intervals={**rov.intervals, **{n: (values[n] * (1.0 - 1e-9) / 3.0, 3.0 * values[n]) for n in known}},
-        estimates={n: row.model_copy(update={"error": row.error * 1.1}) for n, row in rov.estimates.items()},
         provenance=Provenance(
             tool="tool", method="heave: a\nyaw: b", inputs={"ä.csv": HASH}, warnings=("a warning",), facts=("b", "c")
         ),

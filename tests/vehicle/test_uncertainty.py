@@ -22,6 +22,7 @@ from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import ALONE, FROZEN_REFIT
 from tests.identify.scenarios.catalogue import USUAL
 from tests.identify.scenarios.tank import Logs, Tank, flights, moved, true_values
+from tests.vehicles import with_intervals
 
 TEXT = FROZEN_REFIT.read_text(encoding="utf-8")
 
@@ -81,9 +82,9 @@ def test_estimates_read_back_as_they_were_written(refit: Vehicle, tmp_path: Path
         "beta_w": Estimated(error=0.5, correlation={"a_d_u": 0.123456, "b_d_u": -0.123456}),
     }
     rows["b_d_w"] = Estimated(error=4.0, correlation={"a_d_u": -4e-7})
-    write_vehicle(replace(refit, estimates=rows), tmp_path / "made.toml")
+    write_vehicle(with_intervals(refit, refit.intervals, rows), tmp_path / "made.toml")
     assert load_vehicle(tmp_path / "made.toml").estimates == rows
-    write_vehicle(replace(refit, estimates={}), tmp_path / "none.toml")
+    write_vehicle(with_intervals(refit, refit.intervals), tmp_path / "none.toml")
     assert "estimates" not in (tmp_path / "none.toml").read_text(encoding="utf-8")
 
 
@@ -174,7 +175,7 @@ def test_an_interval_without_estimates_is_normal_and_uncorrelated(tmp_path: Path
     assert found.errors == pytest.approx([0.1, 0.2, 1.1 * log(1.331) / 3.92], rel=1e-4)
     vehicle = load_vehicle(path)
     gamma = vehicle.layout.coefficients["gamma"]
-    between_bounds = replace(vehicle, intervals={"gamma": (gamma.minimum, gamma.maximum)}).uncertainty
+    between_bounds = with_intervals(vehicle, {"gamma": (gamma.minimum, gamma.maximum)}).uncertainty
     assert between_bounds.errors == pytest.approx([(gamma.maximum - vehicle["gamma"]) / 1.96], rel=1e-4)
     drawn = found.drawn(qmc.Sobol(3, scramble=False).random(1024))
     assert kstest(drawn[1:, 0], norm(6.57, 0.1).cdf).statistic < 0.002

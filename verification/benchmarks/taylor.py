@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.expression import Expression, compiled
-from rov_fmu.equation.terms import ONE, Term, equation_of
+from rov_fmu.equation.expression import ONE, Expression, compiled
+from rov_fmu.equation.terms import Term, equation_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, digits, duration
@@ -116,9 +116,10 @@ class Heyoka:
         for name, formula in {**equation.program, **equation.forces}.items():
             at[name] = _value(formula, at)
         for name, directed in equation.directed.items():  # a velocity at rest goes where its force pushes it
-            v = directed.velocity
+            subject, ahead, astern = directed.args
+            (v,) = subject.names
             is_reverse = at[v] < 0.0 or (at[v] == 0.0 and at[f"constant_{v}"] < 0.0)
-            at[name] = _value(directed.reverse if is_reverse else directed.forward, at)
+            at[name] = _value(astern if is_reverse else ahead, at)
         return at
 
 

@@ -8,11 +8,11 @@ from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
 
-from ..attitude import QUATERNION, entry, quaternion_rates, start_formulas
+from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
 from ..catalogue import AXES
-from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
+from ..expression import FUNCTIONS, PYTHON, Expression, Name, of, total, written
 from ..layout import Layout
-from ..terms import Equation, equation_of, mass_matrix, rate_formula
+from ..terms import Equation, Term, equation_of, mass_matrix, rate_formula
 from .step import interpolated
 
 _IMPORTED = ["expm1", "inf", "log1p", *(name for name in FUNCTIONS if name != "abs")]
@@ -46,8 +46,7 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    entries = [entry(row, column) for row in (1, 2, 3) for column in (1, 2, 3)]
-    alike = ("uvwpqr", ("x", "y", "z", "psi"), entries, quaternion)
+    alike = ("uvwpqr", ("x", "y", "z", "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
@@ -113,12 +112,30 @@ def printed_accelerations(layout: Layout, step: str) -> str:
     return _module(words, step, accelerations_text(layout))
 
 
+_KNOWN = (*(axis.velocity for axis in AXES.values()), *ROTATION[6:])
+"""The states that the simulator gives: the velocities through the water, and the third row of the rotation matrix."""
+
+
+def _terms_of_known(equation: Equation, layout: Layout) -> tuple[dict[str, list[Term]], list[str]]:
+    """Return the terms of the accelerations that contain no other state, and the words of the effects of the others."""
+    known = {*_KNOWN, *(lag.arrived for lag in equation.lags)}
+    terms = {v: [term for term in equation.rows[v] if known.issuperset(term.factors)] for v in layout.velocities}
+    lacking = (term.effect for v, own in terms.items() for term in equation.rows[v] if term not in own)
+    return terms, [effect.words for effect in dict.fromkeys(lacking) if effect]
+
+
+def left_out_of_accelerations(layout: Layout) -> list[str]:
+    """Return the words of the effects that need another state than those that the simulator gives."""
+    return _terms_of_known(equation_of(layout), layout)[1]
+
+
 def accelerations_text(layout: Layout) -> str:
     """Return this module without its imports."""
     equation = equation_of(layout)
     every = [axis.velocity for axis in AXES.values()]
-    states = [*every, *(entry(3, column) for column in (1, 2, 3))]
-    rates = {v: rate_formula(equation.rows[v]) for v in layout.velocities}
+    states = [*_KNOWN]
+    terms, _ = _terms_of_known(equation, layout)
+    rates = {v: rate_formula(own) for v, own in terms.items()}
     formulas = {**equation.program, **equation.forces}
     numbers = {name: x for name, x in formulas.items() if name not in equation.orientation}
     mass = mass_matrix(layout, equation.names)
@@ -189,8 +206,8 @@ def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
 
 def _sizes(equation: Equation, layout: Layout, states: list[str]) -> str:
     """Print the function of the sizes of the terms in the rates."""
-    formulas = {name: total(call("abs", term.formula) for term in terms) for name, terms in equation.rows.items()} | {
-        name: call("abs", rate) for name, rate in _quaternion_rates(layout, states).items()
+    formulas = {name: total(abs(term.formula) for term in terms) for name, terms in equation.rows.items()} | {
+        name: abs(rate) for name, rate in _quaternion_rates(layout, states).items()
     }
     sizes = "".join(f"        {written(x, PYTHON)},  # {name}\n" for name, x in formulas.items())
     return f"""\

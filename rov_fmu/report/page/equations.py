@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 from markupsafe import escape
 
+from rov_fmu.equation.attitude import TURN
 from rov_fmu.equation.catalogue import REVERSE, YAW, delayed_name
 from rov_fmu.equation.expression import (
     Expression,
@@ -173,7 +174,7 @@ def _with_sign(x: Expression) -> Expression:
 
 def _times_sign(c: Expression, factors: Sequence[Expression]) -> list[Expression]:
     """Return the factors of a product times sgn(c): the last |c| becomes c, if there is one."""
-    size = call("abs", c)
+    size = abs(c)
     if size not in factors:
         return [call("sgn", c), *factors]
     last = max(place for place, factor in enumerate(factors) if factor == size)
@@ -216,7 +217,7 @@ def _inlined(layout: Layout, equation: Equation) -> dict[str, Expression]:
         "arm",
         "constant",
     )
-    inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {"cos_psi", "sin_psi"}
+    inlined = {name.identifier for kind in kinds for name in names.of_kind(kind)} | {*TURN}
     full = {t.name for t in layout.thrusters if "c_0" not in layout.curve_of[t.name].keys}  # without a dead band
     inlined |= {name.identifier for name in names.of_kind("beyond") if full.issuperset(name.owners)}
     mixed = [name for name in names.of_kind("mixed") if name.identifier in equation.thrust]

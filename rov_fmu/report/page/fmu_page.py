@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from rov_fmu.c.compile import INTERFACES
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmu.archive import CARD
 from rov_fmu.fmu.card import card, card_text, reversing
 from rov_fmu.fmu.content import REPORT
@@ -39,7 +40,6 @@ from rov_fmu.report.plots.steps import (
 from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes
 from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.report.templates import page
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches

@@ -7,10 +7,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.result import Answer, AxisResult, Point
 from rov_fmu.report.plots.logs import draw_band
 from rov_fmu.report.plots.svg import LIGHT, add_legend, name_axes
-from rov_fmu.tank.columns import in_degrees
 
 
 def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "Tau"]) -> None:

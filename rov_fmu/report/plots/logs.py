@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.result import Prediction
 from rov_fmu.io.groups import grouped
 from rov_fmu.report.plots.svg import LIGHT, draw_commands, name_axes
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.tank.log import Channel, Log
 from rov_fmu.tank.quality import gaps, unwrapped
 from rov_fmu.vehicle.uncertainty import NORMAL

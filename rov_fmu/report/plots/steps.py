@@ -13,9 +13,9 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
+from rov_fmu.equation.units import in_degrees
 from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes
 from rov_fmu.report.published import ResponseTable, load_tables
-from rov_fmu.tank.columns import in_degrees
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = TypeVar("Number", float, Decimal)

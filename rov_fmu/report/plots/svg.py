@@ -27,9 +27,9 @@ from matplotlib.style import context
 from matplotlib.text import Text
 from matplotlib.ticker import MaxNLocator
 
+from rov_fmu.fmu.picture import read_svg
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, reason_of
-from rov_fmu.io.picture import read_svg
 from rov_fmu.report.palette import PALETTE
 from rov_fmu.report.templates import in_words
 

@@ -13,7 +13,8 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
-from rov_fmu.io.csv_table import NEUTRAL, NO_OUTPUT, PULSES, DataFileError, KnownColumns
+from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, PULSES, KnownColumns
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
     COMMANDS,

@@ -14,7 +14,8 @@ import numpy as np
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
-from rov_fmu.io.csv_table import Column, DataFileError, KnownColumns, OpenStream, read_columns, read_start
+from rov_fmu.io.columns import Column, KnownColumns, read_columns
+from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
@@ -27,6 +28,7 @@ from rov_fmu.tank.quality import checked, gaps, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
+from rov_fmu.tank.readers.tables import grown_rows, read_start
 from rov_fmu.tank.readers.tank_tables import read_rows
 from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, time_columns
 
@@ -235,7 +237,9 @@ def _numbers(path: Path, titles: Sequence[str], open_stream: OpenStream) -> tupl
     places = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
     columns = {place: Column({"1": 1.0}, True, True) for place in map(str, range(len(titles)))}
     renamed = {title: f"{place} [1]" for title, place in places.items()}
-    table = read_columns(path, columns, others=True, loose=True, renamed=renamed, open_stream=open_stream)
+    table = read_columns(
+        path, columns, others=True, loose=True, renamed=renamed, grown=grown_rows, open_stream=open_stream
+    )
     numbers, ranges = dict.fromkeys(titles, np.empty(0)), dict.fromkeys(titles, "")
     for title, place in places.items():
         values = np.frombuffer(table.values[place])

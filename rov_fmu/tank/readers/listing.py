@@ -2,13 +2,16 @@
 
 import os
 import re
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import partial
+from io import StringIO
 from itertools import groupby
 from pathlib import Path
 
-from rov_fmu.io.csv_table import EMPTY, DataFileError, looks_like_table
+from rov_fmu.io.csv_table import EMPTY, CsvFile, DataFileError
 from rov_fmu.io.file_kinds import IDENTIFIED, LOG_SUFFIXES, OWN_SUFFIXES, TABLE_SUFFIXES
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.findings import Finding, about
@@ -25,6 +28,8 @@ _OF_DATABASE = (WAL, "-shm", "-journal")
 NOT_OPENED = "a device, a pipe or a link that leads nowhere is not opened"
 _NO_TABLE = "a table needs a header, and rows of numbers with commas, semicolons or tabs between the columns"
 _IN_FOLDER = "logs and tables in another folder do not count. If they belong to the tests, move them beside rov.toml"
+_START = 100_000
+"""The number of bytes at the beginning of a text that tell whether it is a table."""
 _MOST_NAMES = 3
 """The largest number of files with the same suffix that a sentence names one by one."""
 
@@ -128,7 +133,15 @@ def _why_not_read(path: Path) -> str:
         is_text = format_of(path) is TABLE
     except DataFileError as error:
         return str(error).removeprefix(f"{path}: ")
-    return _NO_TABLE if is_text and not looks_like_table(path) else ""
+    return _NO_TABLE if is_text and not _looks_like_table(path) else ""
+
+
+def _looks_like_table(path: Path) -> bool:
+    """Return True if a text has a row of numbers below a header with as many columns. Only its beginning is read."""
+    with path.open("rb") as file:
+        start = file.read(_START)
+    encoding = "utf-16" if start.startswith((BOM_UTF16_LE, BOM_UTF16_BE)) else "utf-8-sig"
+    return CsvFile(path, partial(StringIO, start.decode(encoding, "replace"))).has_rows
 
 
 def named(paths: Iterable[Path]) -> str:

@@ -25,7 +25,8 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.io.csv_table import Column, KnownColumns
+from rov_fmu.equation.units import in_degrees
+from rov_fmu.io.columns import Column, KnownColumns
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.tank.catalogue import (
@@ -40,7 +41,7 @@ from rov_fmu.tank.catalogue import (
 )
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
-from rov_fmu.tank.columns import Entry, LogColumn, Names, in_degrees, known_columns
+from rov_fmu.tank.columns import Entry, LogColumn, Names, known_columns
 from rov_fmu.tank.findings import Finding, about
 
 _OUTERMOST, _LEAST_OTHERS = 2, 10

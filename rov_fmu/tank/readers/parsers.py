@@ -22,7 +22,7 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
-from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text, read_header
+from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text
 from rov_fmu.io.messages import FileError, brief, listed, reason_of
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
@@ -31,7 +31,7 @@ from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.mavlink import read_dataflash, read_dataflash_text, read_telemetry
 from rov_fmu.tank.readers.other_files import reason_against
 from rov_fmu.tank.readers.recordings import ZSTD
-from rov_fmu.tank.readers.tables import open_matlab
+from rov_fmu.tank.readers.tables import open_matlab, read_start
 from rov_fmu.tank.readers.ulog import read_ulog
 
 
@@ -262,7 +262,7 @@ def _format_of_unpacked(file: Path, shown: str) -> Format:
 def header_of(path: Path) -> list[str] | None:
     """Return the headers of a table; None for another log. Raises DataFileError."""
     lines = open_table(path)
-    return read_header(path, lines) if lines else None
+    return read_start(path, lines, 1)[0] if lines else None
 
 
 @guarded

@@ -6,11 +6,12 @@ that cannot be used are left out and counted.
 """
 
 import re
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from io import StringIO
+from itertools import islice, pairwise
 from pathlib import Path
 from typing import Any
 
@@ -19,22 +20,19 @@ from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
+from rov_fmu.io.columns import COMMANDS, NEUTRAL, NO_OUTPUT, PULSES, SPAN, Columns, read_columns
 from rov_fmu.io.csv_table import (
-    COMMANDS,
     MOST_BEFORE,
-    NEUTRAL,
-    NO_OUTPUT,
     NUMBER,
-    PULSES,
     QUOTED_NUMBER,
-    SPAN,
     THOUSANDS,
     VALUE,
-    Columns,
+    CsvFile,
     DataFileError,
+    Grown,
+    Lines,
     OpenStream,
-    read_columns,
-    read_start,
+    is_missing,
 )
 from rov_fmu.io.messages import did_you_mean, listed, shown, similar
 from rov_fmu.tank.arrays import Array
@@ -106,6 +104,11 @@ def rules_of_page() -> dict[str, Any]:
     }
 
 
+def read_start(path: Path, open_stream: OpenStream | None, count: int) -> list[list[str]]:
+    """Return the cells of the header and of the first rows, at most `count` of all. Raises DataFileError."""
+    return [cells for _, cells in islice(CsvFile(path, open_stream), count)]
+
+
 def read_table(
     path: Path,
     layout: Layout,
@@ -131,6 +134,7 @@ def read_table(
         known_columns(known),
         others=True,
         loose=True,
+        grown=grown_rows,
         renamed={**names.columns, **{title: f"{name} [1]" for name, title in flags.items()}},
         hint=RENAMING,
         check_header=check,
@@ -388,3 +392,103 @@ def _vectors(place: str, value: Any) -> Iterator[tuple[str, Array]]:
         for name, inner in value.items():
             if not name.startswith("__"):
                 yield from _vectors(f"{place}.{name}" if place else name, inner)
+
+
+# ---- Columns that a logger inserted ----------------------------------------------------------------------------------
+
+_COMPARED_ROWS = 50
+"""The number of rows before and after an insertion of columns that tell its place."""
+_FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
+"""The least number of rows before and after an insertion, the largest share of rows after it with yet another number of
+cells, and the largest share of columns that do not go on as before."""
+
+
+@dataclass
+class _Part:
+    """Rows of a file with the same number of cells."""
+
+    line: int
+    """The line of the first one."""
+    width: int
+    count: int = 0
+    first: list[list[str]] = field(default_factory=list)
+    last: deque[list[str]] = field(default_factory=lambda: deque(maxlen=_COMPARED_ROWS))
+
+    def add(self, row: list[str]) -> None:
+        """Add a row. Only the first and the last ones are kept."""
+        self.count += 1
+        self.last.append(row)
+        if len(self.first) < _COMPARED_ROWS:
+            self.first.append(row)
+
+
+def _where_inserted(before: _Part, after: _Part) -> tuple[int, int]:
+    """Return the first and the last place at which the cells may have been inserted that make the rows longer.
+
+    A place is judged by the number of columns that would not go on as before. One of them is no proof, because a sensor
+    may begin or end just then.
+    """
+    more = after.width - before.width
+    old, new = [*zip(*before.last, strict=True)], [*zip(*after.first, strict=True)]
+    stay = [_differ(column, new[n]) for n, column in enumerate(old)]
+    move = [_differ(column, new[n + more]) for n, column in enumerate(old)]
+    misfits = [sum(stay[:place]) + sum(move[place:]) for place in range(before.width + 1)]
+    if min(misfits) > _MOST_MISFITS * before.width:
+        return 0, before.width
+    likely = [place for place, count in enumerate(misfits) if count <= min(misfits) + 1]
+    return likely[0], likely[-1]
+
+
+def _differ(old: Sequence[str], new: Sequence[str]) -> bool:
+    """Return True if cells can hardly be of the same column: they have other forms, or their numbers lie far apart."""
+    filled = [[cell for cell in cells if not is_missing(cell)] for cells in (old, new)]
+    forms = [{_form(cell) for cell in cells} for cells in filled]
+    if not all(forms) or forms[0].isdisjoint(forms[1]):
+        return all(forms)
+    numbers = [[float(cell) for cell in cells if NUMBER.fullmatch(cell)] for cells in filled]
+    if not all(numbers):
+        return False
+    (low, high), (least, most) = ((min(own), max(own)) for own in numbers)
+    return max(least - high, low - most) > (high - low) + (most - least)
+
+
+def _form(cell: str) -> tuple[str, int]:
+    """Return the form of a cell: its characters that are no digits, and the number of decimals."""
+    whole, _, decimals = cell.lstrip("+-").rpartition(".") if "." in cell else (cell.lstrip("+-"), "", "")
+    return re.sub("[0-9]+", "9", whole), len(decimals)
+
+
+def grown_rows(rows: Lines) -> Grown | None:
+    """Return where the columns of the header are in rows that have more cells from some line on, or None.
+
+    A logger may write the header before it knows all columns, and insert the others later. What stands in the rows
+    before and after tells where. A few rows may have yet another number of cells.
+    """
+    width = len(next(rows)[1])
+    parts = [_Part(0, width)]
+    odd = 0
+    for line, row in rows:
+        if len(row) > parts[-1].width:
+            parts.append(_Part(line, len(row)))
+        if len(row) == parts[-1].width:
+            parts[-1].add(row)
+        elif len(parts) > 1:
+            odd += 1
+    if (
+        len(parts) == 1
+        or any(part.count < _FEWEST for part in parts)
+        or odd > _MOST_ODD * sum(part.count for part in parts[1:])
+    ):
+        return None
+    places: list[int | None] = [*range(width)]
+    by_width = {}
+    for before, after in pairwise(parts):
+        low, high = _where_inserted(before, after)
+        moved = [*range(low), *[None] * (high - low), *range(high + after.width - before.width, after.width)]
+        places = [None if place is None else moved[place] for place in places]
+        by_width[after.width] = places
+    first = sum(place == n for n, place in enumerate(places))
+    last = sum(place == n for n, place in enumerate(places, start=parts[-1].width - width))
+    counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
+    words = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
+    return Grown(by_width, odd, words) if first + last else None

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.io.csv_table import BEYOND, DataFileError, KnownColumns, read_columns
+from rov_fmu.io.columns import BEYOND, KnownColumns, read_columns
+from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import MOST
 from rov_fmu.tank.columns import RENAMING, TABLES, columns_of, refuse_slips
 from rov_fmu.tank.findings import Finding, about

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.csv_table import Columns, KnownColumns
+from rov_fmu.io.columns import Columns, KnownColumns
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import meanings, words_for, words_in
 from rov_fmu.tank.columns import DATE, TIME

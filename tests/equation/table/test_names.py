@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rov_fmu.c.jacobian import step_jacobian
+from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.c.simulation import simulate
 from rov_fmu.c.source import sources
 from rov_fmu.equation.catalogue import HEAVE

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from rov_fmu.bridges import arrays
-from rov_fmu.c.jacobian import step_jacobian
+from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.thrust.test_thrust_effects import NOW, ROV
