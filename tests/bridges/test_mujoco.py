@@ -463,10 +463,12 @@ def test_contacts_under_random_commands_stay_finite(name: str) -> None:
     assert contacts
 
 
-@pytest.mark.long
+@pytest.mark.parametrize(
+    "steps", [pytest.param(20_000, marks=pytest.mark.long), pytest.param(100_000, marks=pytest.mark.weekly)]
+)
 @pytest.mark.parametrize("name", FILES)
-def test_contacts_stay_finite_for_1e5_steps(name: str) -> None:
-    fastest, contacts = tumble(name, 100_000)
+def test_contacts_stay_finite_for_many_steps(name: str, steps: int) -> None:
+    fastest, contacts = tumble(name, steps)
     assert fastest < 20.0
     assert contacts
 

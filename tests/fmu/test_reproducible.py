@@ -48,10 +48,8 @@ def test_the_order_of_sets_changes_no_byte(tmp_path: Path) -> None:
     assert len(made) == 1
 
 
-@pytest.mark.parametrize(
-    "order",
-    [pytest.param(1, marks=pytest.mark.long, id="oldest"), pytest.param(-1, marks=pytest.mark.weekly, id="newest")],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("order", [pytest.param(1, id="oldest"), pytest.param(-1, id="newest")])
 def test_built_by_another_python_from_the_wheel(pinned: dict[str, str], tmp_path: Path, order: int) -> None:
     """The Pythons are the oldest and the newest on this machine."""
     others = [f"3.{minor}" for minor in range(_OLDEST, _NEWEST + 1) if minor != sys.version_info.minor]

@@ -16,8 +16,6 @@ from tests.commands import ROOT
 from tests.frozen import test_known_results
 from verification.fresh_environment import environment
 
-pytestmark = pytest.mark.long
-
 SIMD = np.show_config(mode="dicts")["SIMD Extensions"]
 """What NumPy uses of this processor; its versions have other names for the same."""
 FOUND = {*SIMD["baseline"], *SIMD["found"]}
@@ -33,13 +31,18 @@ TOOLS = ("filelock", "hypothesis", "mpmath", "pytest", "pytest-xdist")
 """What the tests of known results import besides the dependencies."""
 
 
-@pytest.mark.parametrize(("kernels", "needed"), KERNELS.values(), ids=KERNELS)
-def test_the_fits_end_alike_with_other_kernels(kernels: dict[str, str], needed: object) -> None:
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.weekly if name == "Haswell" else pytest.mark.long) for name in KERNELS],
+)
+def test_the_fits_end_alike_with_other_kernels(name: str) -> None:
+    kernels, needed = KERNELS[name]
     if not needed:
         pytest.skip("this processor does not have what they use")
     check_fits(sys.executable, **kernels)
 
 
+@pytest.mark.long
 def test_the_fits_end_alike_with_the_lowest_versions(tmp_path: Path) -> None:
     python = next(filter(None, map(interpreter, ("3.10", "3.11", "3.12", "3.13"))), None)
     if python is None:

@@ -100,9 +100,13 @@ def names(lines: Sequence[str], file: str, words: str) -> bool:
     return any(re.search(words, line.replace(file, ""), re.IGNORECASE) for line in about)
 
 
-@pytest.mark.parametrize("how_many", ["one of three", pytest.param("all", marks=pytest.mark.long)])
 @pytest.mark.parametrize(
-    "kind", [pytest.param(kind, marks=[pytest.mark.long] * (n >= BY_DEFAULT)) for n, kind in enumerate(SLIPS)]
+    ("kind", "how_many"),
+    [
+        *((kind, "one of three") for kind in [*SLIPS][:BY_DEFAULT]),
+        *(pytest.param(kind, "one of three", marks=pytest.mark.weekly) for kind in [*SLIPS][BY_DEFAULT:]),
+        *(pytest.param(kind, "all", marks=pytest.mark.long) for kind in SLIPS),
+    ],
 )
 def test_a_slip_is_named_or_refused(kind: str, how_many: str, tmp_path: Path) -> None:
     slip = SLIPS[kind]

@@ -65,7 +65,7 @@ def test_no_bit_of_an_archive_can_be_changed(stride: int, small: bytes, tmp_path
                 assert is_refused(flipped(small, place, bit), path), (place, bit)
 
 
-@often("count", 30, 2000)
+@often("count", 30, 500, 2000)
 def test_no_bit_of_the_shipped_fmu_can_be_changed(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
     content, draws = videoray_fmu.read_bytes(), random.Random(count)
     assert not is_refused(content, tmp_path / "videoray.fmu")
@@ -365,7 +365,7 @@ def test_extra_fields_without_a_name_are_accepted_in_either_header(fields: bytes
         assert (tmp_path / str(n) / "modelDescription.xml").read_bytes() == b"<a/>"
 
 
-@often("count", 100, 20_000)
+@often("count", 100, 4000, 20_000)
 def test_two_damaged_bytes_are_one_line(count: int, small: bytes, tmp_path: Path) -> None:
     """Such as an offset that lies outside the file, where reading would raise an OSError."""
     draws = random.Random(count)
