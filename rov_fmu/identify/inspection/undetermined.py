@@ -9,7 +9,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
 from rov_fmu.identify.findings import LOG_OUTPUTS, UNLOGGED, how_to_measure, how_to_record, is_unlogged, sentences
 from rov_fmu.identify.given import thrusters_along_no_other
-from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words, thrusters_alike
 from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
 from rov_fmu.identify.result import without
 from rov_fmu.io.groups import grouped
@@ -17,7 +17,7 @@ from rov_fmu.io.messages import brief, listed
 from rov_fmu.io.numbers import percent
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import ROV_FILE, Description
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.inspection.headers import may_be_velocity
 from rov_fmu.tank.log import Commands, Log
 
@@ -79,6 +79,11 @@ def undetermined(
                 weak.append(f"{percent(largest)} in {axis.name}")
         if weak:
             yield f"speeds beyond the strongest commands, {listed(weak)}, are extrapolated"
+        of_dives = [log.commands for log in logs if log.commands and not log.follows_axis]
+        values = [dict(zip(one.thrusters, one.at(one.rows).T, strict=True)) for one in of_dives]
+        for group in thrusters_alike(layout, values):
+            if len(group) > 1:
+                yield from sentences([about("", "not told apart", of=listed(group))])
         for log in logs:
             logged = layout_of(log, layout if not log.axis else description.layout)
             if log.commands and (lost := lost_between_rows(log, logged)):

@@ -13,6 +13,7 @@ from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
 from rov_fmu.identify.result import ALARM
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant
 from rov_fmu.tank.arrays import Array
@@ -223,12 +224,8 @@ def _of_twins(known: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
 
 def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that the logs command, one of those that no log tells apart."""
-    seen = list[Array]()
-    for thruster in known.layout.thrusters:
-        shown = _signature(known, logs, thruster.name)
-        if shown is not None and not any(np.array_equal(shown, other) for other in seen):
-            seen.append(shown)
-            yield (thruster.name,)
+    for group in thrusters_alike(known.layout, [*map(commands_of, logs)]):
+        yield group[:1]
 
 
 def _ill(known: Prior, logs: Logs) -> Iterator[Of]:
@@ -237,22 +234,27 @@ def _ill(known: Prior, logs: Logs) -> Iterator[Of]:
         yield from _thrusters(known, logs)
 
 
-def _signature(known: Prior, logs: Logs, name: str) -> Array | None:
-    """Return the effects of a thruster along the axes times its commands in the logs; None if nothing commands it."""
-    effects = [t.effect(form.axis) for t in known.layout.thrusters if t.name == name for form in known.layout.axes]
-    values = [c[name] for one in logs if name in (c := commands_of(one))]
-    commands = np.concatenate(values) if values else np.zeros(1)
-    if not any(effects) or np.ptp(commands) < LEAST_COMMAND:
-        return None
-    sign = 1.0 if next(filter(None, effects)) > 0.0 else -1.0
-    return np.outer(np.round(np.multiply(effects, sign), 9), sign * commands)
+def thrusters_alike(layout: Layout, commands: Sequence[Mapping[str, Array]]) -> list[Of]:
+    """Return the thrusters that logs command, in groups that none of these logs tells apart.
+
+    The effects of those of a group along the axes, times their commands in each row, are the same. `commands` has the
+    commands of each log by the names of the thrusters.
+    """
+    shown = list[tuple[bytes, str]]()
+    for thruster in layout.thrusters:
+        effects = [thruster.effect(axis) for axis in layout.bare_axes]
+        values = np.concatenate([np.zeros(0), *(own[thruster.name] for own in commands if thruster.name in own)])
+        if any(effects) and values.size and np.ptp(values) >= LEAST_COMMAND:
+            sign = 1.0 if next(filter(None, effects)) > 0.0 else -1.0
+            signature = np.outer(np.round(np.multiply(effects, sign), 9), sign * values) + 0.0  # no -0
+            shown.append((signature.tobytes(), thruster.name))
+    return [tuple(names) for names in grouped(shown).values()]
 
 
-def twins(known: Prior, logs: Logs, name: str) -> list[str]:
+def twins(known: Prior, logs: Logs, name: str) -> Of:
     """Return the thrusters that no log tells from one of them, with its name."""
-    shown = {t.name: _signature(known, logs, t.name) for t in known.layout.thrusters}
-    own = shown[name]
-    return [other for other, one in shown.items() if one is not None and own is not None and np.array_equal(own, one)]
+    groups = thrusters_alike(known.layout, [*map(commands_of, logs)])
+    return next((group for group in groups if name in group), ())
 
 
 def _pairs(known: Prior, logs: Logs) -> Iterator[Of]:

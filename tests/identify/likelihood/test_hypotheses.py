@@ -321,11 +321,11 @@ def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
     inputs = one.record.inputs.copy()
     inputs[:, 1] = inputs[:, 0]
     alike = [one.with_inputs(inputs)]
-    assert twins(known, alike, "l") == ["l"]  # the pair turns the vehicle to opposite sides
+    assert twins(known, alike, "l") == ("l",)  # the pair turns the vehicle to opposite sides
     straight = replace(
         known, layout=replace(known.layout, axes=tuple(f for f in known.layout.axes if f.axis.name == "surge"))
     )
-    assert twins(straight, alike, "l") == ["l", "r"]
+    assert twins(straight, alike, "l") == ("l", "r")
     assert list(HYPOTHESES["health"].variants(straight, alike)) == [("l",)]
 
 

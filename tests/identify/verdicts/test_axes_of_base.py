@@ -221,3 +221,15 @@ def test_an_axis_whose_thrusters_the_log_lacks_asks_for_their_outputs(is_there: 
     (heave,) = (one for one in undetermined(tests.folder.logs, tests.description, ()) if one.startswith("heave"))
     assert heave.endswith("Command it both ways") == is_there
     assert ("Log the outputs to all thrusters" in heave) != is_there
+
+
+@pytest.mark.parametrize("is_same", [True, False])
+def test_thrusters_that_always_get_the_same_command_are_told_before_any_fit(is_same: bool, tmp_path: Path) -> None:
+    """No log tells which of both has lost force. The thrusters of surge, which turn the vehicle, are told apart."""
+    time, columns = drawn("bluerov2", SENSORS[HEAVE], SENSORS[YAW])
+    sixth = columns[VERTICAL[0]] if is_same else columns[VERTICAL[1]]
+    folder = folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', {})
+    write_dive(folder / "dive.csv", time, {**columns, "u_2 [1]": columns["u_1 [1]"], VERTICAL[1]: sixth})
+    tests = load_tests(folder)
+    told = [one for one in undetermined(tests.folder.logs, tests.description, ()) if one.startswith("thrusters")]
+    assert [one.partition(":")[0] for one in told] == ["thrusters 5 and 6"] * is_same
