@@ -24,6 +24,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.alone import RISE
 from rov_fmu.equation.catalogue import cross_of
 from rov_fmu.io.messages import InputError
+from rov_fmu.io.output import sealed
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
@@ -430,7 +431,7 @@ def test_the_command_writes_the_file_and_lists_the_notes(
         (["--world", "--added-mass", "plugin", "-o", "my rov.sdf"], "my rov.sdf", explicit, "gz sim -r 'my rov.sdf'\n"),
     ):
         assert main(["sdf", "bluerov2", *options]) == 0
-        assert Path(file).read_bytes() == wanted.text.encode()
+        assert Path(file).read_bytes() == sealed(wanted.text, "export").encode()
         out, err = capsys.readouterr()
         assert words in out
         assert err == "".join(f"rov-fmu: warning: {warning}\n" for warning in wanted.warnings)

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.bridges.urdf import urdf_model
 from rov_fmu.cli import main
+from rov_fmu.io.output import sealed
 from tests.bridges.test_sdf import LOADED
 
 SIX = ("Xu", "Yv", "Zw", "Kp", "Mq", "Nr")
@@ -77,7 +78,7 @@ def test_the_command_writes_it_by_the_name_of_the_file(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert main(["sdf", "bluerov2", "-o", "rov.urdf"]) == 0
-    assert Path("rov.urdf").read_text(encoding="utf-8") == urdf_model(LOADED["bluerov2"]).text
+    assert Path("rov.urdf").read_text(encoding="utf-8") == sealed(urdf_model(LOADED["bluerov2"]).text, "export")
     assert capsys.readouterr().out.endswith("Wrote rov.urdf.\n")
     assert main(["sdf", "bluerov2", "-o", "rov.urdf", "--world"]) == 2
     assert "--to urdf: leave out --world, because only" in capsys.readouterr().err

@@ -15,6 +15,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.fmu.card import card
 from rov_fmu.identify.tuning import Target, Tuning, TuningError, implausible, tune
+from rov_fmu.io.output import sealed, without_seal
 from rov_fmu.report.console_results import print_tuning
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle, load_vehicle
@@ -209,7 +210,7 @@ def test_tuned_vehicle_file_changes_nothing_else(tmp_path: Path, capsys: pytest.
     assert tuned.data
     assert vehicle.data
     assert tuned.data.resolve() == vehicle.data
-    before, after = VIDEORAY.read_text(encoding="utf-8").splitlines(), output.read_text(encoding="utf-8").splitlines()
+    before, after = (without_seal(path.read_text(encoding="utf-8")).splitlines() for path in (VIDEORAY, output))
     changed = {a.split(" ")[0] for a, b in zip(before, after, strict=True) if a != b}
     assert changed == {"name", "identifier", "data", "pictures", "alpha", "beta"}
     assert (
@@ -240,9 +241,10 @@ def test_a_tuned_vehicle_is_one_of_its_own(file: str, identifier: str, name: str
 
 
 def test_a_tuned_copy_of_an_identified_vehicle_says_so(tmp_path: Path) -> None:
-    """Its verdicts are of another vehicle, and the digest in its first line would no longer be right."""
+    """Its verdicts are of another vehicle, and its first line has its own digest."""
     write_tuned(SHIPPED["videoray_refit"], path := tmp_path / "mine.toml", {"alpha_u": 1.1}, f"{TUNED} V_ss")
-    assert "wrote this file" not in path.read_text(encoding="utf-8")
+    text = path.read_text(encoding="utf-8")
+    assert text == sealed(without_seal(text))
     trust = "The predictions are those of the vehicle before it was tuned."
     assert trust in card(load_vehicle(path))["How far to trust it"]
     assert trust not in card(load_vehicle(SHIPPED["videoray_refit"]))["How far to trust it"]
