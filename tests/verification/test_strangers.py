@@ -1,6 +1,7 @@
 """The gate of strangers: its simulator obeys mechanics and the law, and its counts are those made by hand."""
 
 import json
+import re
 from dataclasses import replace
 from math import exp, log, sqrt
 from pathlib import Path
@@ -231,6 +232,12 @@ MADE = [
     _made("play", ("usable", 0.06, 0.5), ("good", 0.2, 1.1)),
     _made("late velocity", ("good", 0.3, 2.0)),
 ]
+
+
+def test_the_cause_of_each_fault_is_what_the_product_calls_it() -> None:
+    told = ("health port", "rotor lag", "reversed commands stbd", "swapped commands port and stbd", "command limit")
+    true = [[words for words in told if re.fullmatch(kind.causes, words)] for kind in KINDS if kind.causes != "-"]
+    assert sorted(true) == sorted([words] for words in told)
 
 
 def test_counts_are_those_made_by_hand() -> None:

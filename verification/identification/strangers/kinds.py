@@ -247,7 +247,7 @@ FAULTS = (
     Kind("weak thruster", "port has 55 % of its thrust", _weak, causes=r"health .*port", group="law"),
     Kind("rotor lag", "the lag is on the rotors' speed", _rotors, causes="rotor lag", group="law"),
     Kind("reversed", "starboard is reversed", wired=_reversed, causes=r"reversed commands .*stbd", group="law"),
-    Kind("swapped", "port and starboard are swapped", wired=_swapped, causes="swapped commands", group="law"),
+    Kind("swapped", "port and starboard are swapped", wired=_swapped, causes=r"swapped commands .*", group="law"),
     Kind(
         "limit", "commands end at 45 %", followed=lambda c: np.clip(c, -0.45, 0.45), causes="command limit", group="law"
     ),
