@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.output import Output, sealed, write_whole
 from rov_fmu.report.plots.svg import LIGHT, name_axes, svg_file
 
 from .engines import ENGINES, Trajectory, plain
@@ -127,7 +127,7 @@ def draw(results: Mapping[str, Trajectory], path: Path, *, force: bool) -> None:
         depth.invert_yaxis()
 
     svg = svg_file(drawn, (8.6, 9.2), salt="system", background=LIGHT["page"])
-    write_whole(Output(path, svg.encode()), force=force)
+    write_whole(Output(path, sealed(svg).encode()), force=force)
 
 
 if __name__ == "__main__":

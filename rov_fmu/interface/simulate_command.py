@@ -16,7 +16,7 @@ from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
-from rov_fmu.io.output import Output, check_targets, write_whole
+from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 
 _STOP = 10.0
@@ -222,7 +222,8 @@ def _plot_output(result: Result, path: Path, title: str) -> Output:
     picture = BytesIO()
     with without_font_warnings():
         figure.savefig(picture, format=path.suffix[1:].lower())
-    return Output(path, picture.getvalue())
+    content = picture.getvalue()
+    return Output(path, sealed(content.decode(), "simulate").encode() if path.suffix.lower() == ".svg" else content)
 
 
 def print_final(vehicle: VehicleModel, result: Result, *, has_no_input: bool) -> None:

@@ -183,7 +183,7 @@ def _foreign(path: Path) -> str:
         with open_file(path) as file:
             begins = _XML.sub("", file.read(500).decode(errors="replace").removeprefix("\ufeff"), count=1)
         if not (seal := _SEAL.match(begins)):
-            return "is not as rov-fmu wrote it: it may have been made or changed by hand"
+            return "has no mark of rov-fmu: it may have been made or changed by hand"
         below = _XML.sub("", read_text(path), count=1).partition("\n")[2]
         return "" if seal[1] == _digest(below) else "has changed since rov-fmu wrote it"
     except FileError as error:

@@ -428,7 +428,7 @@ def test_no_log_replaces_a_table_of_the_vehicle(tmp_path: Path) -> None:
                 connection.answer(packet(50, count, NEUTRAL), HERE)
         connection.write_log()
     assert table.read_text(encoding="utf-8") == "kept"
-    foreign = "a file that is not as rov-fmu wrote it: it may have been made or changed by hand"
+    foreign = "a file that has no mark of rov-fmu: it may have been made or changed by hand"
     assert connection.logs == {tmp_path / "dive.csv": "", old: foreign}
 
 
