@@ -76,7 +76,7 @@ def test_otter(otter: Identification) -> None:
     names = re.findall(r'"((?:a_d|b_d|beta|F_0)_[uwr])"', text(TANK))
     assert len(names) == 10
     assert len([name for name in misses(otter, OTTER) if name in names]) <= 1
-    assert all(otter.vehicle[name] == pytest.approx(OTTER[name], rel=0.03) for name in names)
+    assert all(otter.vehicle[name] == pytest.approx(OTTER[name], rel=0.04) for name in names)
     found = {effect.kind: effect for effect in kept(otter).values()}
     assert {"dead time", "load"} <= found.keys()
     low, high = found["dead time"].interval
