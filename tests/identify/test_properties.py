@@ -13,7 +13,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests as Given
 from rov_fmu.identify.identified_vehicle import identified_vehicle, written
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
-from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.likelihood.solve import ENOUGH, minimise
 from rov_fmu.identify.result import KEPT
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import folder_of
@@ -67,7 +67,7 @@ def test_what_is_told_is_the_vehicle_of_the_file_with_its_weak_effects(name: str
     """Only measured forces bend a curve in what is told: the shapes of others would explain noise."""
     tests = load_tests(HERE / "tank_tests" / name)
     fit = fit_all(*begin(tests))
-    assert fit.file.minimum.value - least_without_evidence(fit) <= 2.1
+    assert fit.file.minimum.value - least_without_evidence(fit) <= 2.0 + 2.0 * ENOUGH, "both end so near to a minimum"
     parameters = fit.objective.table.parameters
     shapes = [n for n, p in enumerate(parameters) if p.kind == "thrust shape" and p.of not in fit.known.measured_curves]
     assert not fit.best.z[shapes].any()

@@ -250,7 +250,7 @@ class Table:
         coefficients = self.coefficients(z)
         for axis in (form.axis for form in self.layout.axes):
             *powers, typical = self.powers(z, axis)
-            for end, q in zip(("", REVERSE), powers, strict=True) if np.any(powers) else ():
+            for end, q in zip(("", REVERSE), powers, strict=True) if any(map(np.any, powers)) else ():
                 names = [axis.coefficient(f"{key}{end}") for key in ("a_d", "b_d")]
                 drag = {name: coefficients[name] for name in names if name in coefficients}
                 if drag:
