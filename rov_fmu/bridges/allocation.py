@@ -46,9 +46,8 @@ _SAMPLES = 300
 """The commands among which the rows of a table are chosen."""
 
 
-_OF_HULL = (LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
-_HAS = (THRUST, DEAD_BAND, *_OF_HULL)
-"""The effects that the files have, and those that the body has whatever its thrusters do."""
+_HAS = (THRUST, DEAD_BAND, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
+"""The effects that the files have, and those that act on the body whatever its thrusters do."""
 
 
 def allocation_files(vehicle: Vehicle) -> dict[str, str]:

@@ -58,7 +58,7 @@ _COMMANDS = tuple(n / 4.0 for n in range(-4, 5))
 """The commands whose thrust the file lists."""
 
 
-_IN_GAZEBO = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING, DEAD_BAND)
+IN_GAZEBO = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING, DEAD_BAND)
 """The effects that Gazebo or the sender of its thrust has, or that have notes of their own."""
 
 
@@ -389,7 +389,7 @@ def _notes_of_commands(vehicle: Vehicle) -> Iterator[str]:
     }
     has = [part for part, is_there in parts.items() if is_there]
     yield f"the Thruster plugin takes newtons, so these are left to the sender: {', '.join(has)}"
-    yield from (f"left out: {words}" for words in left_out(layout, _IN_GAZEBO))
+    yield from (f"left out: {words}" for words in left_out(layout, IN_GAZEBO))
 
 
 def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:

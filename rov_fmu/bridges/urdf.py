@@ -10,21 +10,7 @@ from collections.abc import Iterator
 
 from rov_fmu.bridges import sdf
 from rov_fmu.equation.catalogue import AXES, BODY, REVERSE
-from rov_fmu.equation.forces import (
-    COUPLING,
-    DEAD_BAND,
-    DEAD_TIME,
-    LAG,
-    LIFT,
-    LINEAR,
-    LOAD,
-    QUADRATIC,
-    RESTORING,
-    ROTOR_LAG,
-    THRUST,
-    WEIGHT,
-    left_out,
-)
+from rov_fmu.equation.forces import DEAD_TIME, LAG, ROTOR_LAG, left_out
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
@@ -65,9 +51,8 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
     return sdf.Model(text, notes, ())
 
 
-_OF_CONTROLLER = (THRUST, DEAD_BAND, DEAD_TIME, LAG, ROTOR_LAG)
-_IN_URDF = (*_OF_CONTROLLER, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
-"""The effects that the reader of the file or its controller has, or that have notes of their own."""
+_IN_URDF = (*sdf.IN_GAZEBO, DEAD_TIME, LAG, ROTOR_LAG)
+"""The effects that the reader of the file has, and those that are left to the controller of the thrusters."""
 
 
 def _notes(vehicle: Vehicle) -> Iterator[str]:
