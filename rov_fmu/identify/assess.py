@@ -140,8 +140,8 @@ def answers(
     a fit to all data and of one to a part has the variance by which theirs differ (Hausman 1978,
     doi:10.2307/1913827).
 
-    Where drag has another power, the file has the nearest quadratic one up to the largest tested speeds, `speeds`. By
-    how much it changes an answer is an error to either side: no law is exact.
+    Where drag has another power, the file has the nearest quadratic drag up to the largest tested speeds, `speeds`. An
+    interval reaches as far to either side of the value as this drag changes the answer.
 
     The lag and the time without it share what the tests tell about their sum, so the interval of the time with the lag
     is its own. Thrusters beside logs with a wrench have none: no test shows their lag.

@@ -255,8 +255,8 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
 
     The forces of a measured curve that bends differ from those of the file by a misfit, which is uncertain, too. The
     covariance of a_t and b_t contains it: the mean variance of the forces grows by the mean square of the misfit. The
-    scale of the forces of other curves is an assumption, whose error is much larger than their misfit. So does that of
-    a_d and b_d with the misfit of drag with another power.
+    scale of the forces of other curves is an assumption, whose error is much larger than their misfit. The
+    covariance of a_d and b_d contains the misfit of drag with another power in the same way.
     """
 
     def measured(z: Array) -> list[Quadratic]:

@@ -111,11 +111,12 @@ class Kind(Coordinate):
     """The tests of an axis that tell it, which replace a coefficient of the base: `log`, `steady`, `astern` (steady
     velocities of negative commands) and `time_constant`."""
     needs_evidence: bool = False
-    """True if the file has it only with positive evidence: it would be an input more, or is only nearly in a file."""
+    """True if the file has it only with positive evidence: the FMU would have one more input for it, or the file can
+    only approximate it."""
     is_lag: bool = False
     """True for a time constant, which the samples of sensors must be close enough to show."""
     unusual: float = 2.5
-    """How many deviations of its prior from its usual size an effect is unusual."""
+    """The number of deviations of its prior, from the usual size on, at which an effect is unusual."""
     is_usual_if_right: bool = False
     """True if no size is unusual where predictions over 10 s along its axis have no larger errors than the noise."""
     finest: float = 0.0
@@ -195,14 +196,18 @@ def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
     )
 
 
-def _power(end: str = "") -> Callable[[Prior, VehicleAxis], Mapping[str, Any] | None]:
-    """Return the power of drag ahead, or what it is more astern, of an axis that is fitted."""
+def _power_of_drag(prior: Deviation, end: str = "", **own: Any) -> Kind:
+    """Return the kind of the power of drag ahead, or of how much larger it is astern, of an axis that is fitted."""
 
-    def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
-        free = form.axis in prior.fitted and all(_free(prior, form, f"{key}{end}") for key in ("a_d", "b_d"))
+    def of_axis(known: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+        free = form.axis in known.fitted and all(_free(known, form, f"{key}{end}") for key in ("a_d", "b_d"))
         return {} if free else None
 
-    return of_axis
+    note = ". The vehicle file has the linear and the quadratic drag that are nearest to it at the tested speeds"
+    words = prior.words.removeprefix("the ")
+    return Kind(
+        prior, words, note, of_axis=of_axis, low=-0.8, null=0.0, is_usual_if_right=True, needs_evidence=True, **own
+    )
 
 
 def _astern(prior: Deviation, words: str, **own: Any) -> Kind:
@@ -230,8 +235,6 @@ _COLOURED = Deviation(
     "coloured_noise", 1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"
 )
 _WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
-
-_NEAREST = ". The vehicle file has the linear and the quadratic drag that are nearest to it at the tested speeds"
 
 KINDS = {
     "thrust scale": Kind(
@@ -338,31 +341,23 @@ KINDS = {
         of_axis=_drag_astern,
         adapts=True,
     ),
-    POWER: Kind(
+    POWER: _power_of_drag(
         Deviation("drag_power", 0.3, "the excess of the power of drag over 2", "measured drag has 1.5 to 2.5"),
-        "excess of the power of drag over 2",
-        _NEAREST,
         told_by=("log", "steady"),
-        of_axis=_power(),
-        low=-0.8,
         high=1.5,
-        null=0.0,
         unusual=5.0 / 3.0,
-        is_usual_if_right=True,
-        needs_evidence=True,
     ),
-    POWER_ASTERN: Kind(
-        Deviation("drag_power_astern", 0.2, "the excess of the power of drag astern over that ahead", "as of drag"),
-        "excess of the power of drag astern over that ahead",
-        _NEAREST,
+    POWER_ASTERN: _power_of_drag(
+        Deviation(
+            "drag_power_astern",
+            0.2,
+            "the excess of the power of drag astern over that ahead",
+            "hulls are alike both ways",
+        ),
+        REVERSE,
         keys=("a_d_reverse", "b_d_reverse"),
         told_by=("log", "astern"),
-        of_axis=_power(REVERSE),
-        low=-0.8,
         high=0.8,
-        null=0.0,
-        is_usual_if_right=True,
-        needs_evidence=True,
     ),
     "centre of buoyancy": Kind(
         Deviation(

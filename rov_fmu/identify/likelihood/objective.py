@@ -139,12 +139,12 @@ class Data:
         return replace(self, **{key: getattr(self, key)[[*chosen]] for key in keys})
 
     def leading(self, scale: Array) -> int | None:
-        """Return the parameter of these data that changes most along a direction (p), if any does."""
+        """Return the parameter that changes most along a direction (p numbers); None if none of these data does."""
         most = max(self.places, key=lambda k: abs(scale[k]), default=None)
         return most if most is not None and scale[most] else None
 
     def separate(self, scale: Array) -> None:
-        """Take the derivatives with respect to a direction, which the leading parameter has, apart into its own."""
+        """Replace the derivatives of the leading parameter, which are with respect to a direction, by its own."""
         leading = self.leading(scale)
         if leading is None:
             return
@@ -434,9 +434,9 @@ class Objective:
         moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
-        moved = changed(z, moves)
+        moved, leading = changed(z, moves), into.leading(scale)
         for column, (k, step) in enumerate(moves):
-            if k == into.leading(scale):
+            if k == leading:
                 moved[:, column] = z + step * scale / scale[k]
         sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))

@@ -51,7 +51,7 @@ _PLACES = ("forward", "to starboard", "down")
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
 _LEAST_POWER = -0.9
-"""The least power of quadratic drag, less 2: below -1, drag would fall with the speed."""
+"""The least q of quadratic drag. With -1, it would be linear drag once more."""
 _MOTION_STEP = 3e-6
 """The relative change of z for the derivatives of the motion: kinks are rarely within it, and rounding errors add
 less than a per cent."""

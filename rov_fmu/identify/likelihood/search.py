@@ -18,7 +18,16 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
-from rov_fmu.identify.likelihood.hypotheses import CONTRAST, HYPOTHESES, Model, Variant, contrasts, in_order, twins
+from rov_fmu.identify.likelihood.hypotheses import (
+    CONTRAST,
+    HYPOTHESES,
+    Model,
+    Variant,
+    commands_of,
+    contrasts,
+    in_order,
+    thrusters_alike,
+)
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
@@ -348,6 +357,11 @@ class Trial:
     absent: frozenset[Variant] = frozenset()
     """The hypotheses for which its parameters are no evidence: they end near where these are absent."""
 
+    @cached_property
+    def misfits(self) -> dict[Axis, Misfit]:
+        """The errors of predictions over 10 s along each axis."""
+        return structure(self.objective, self.minimum)
+
 
 @dataclass(frozen=True, eq=False)
 class Explained:
@@ -464,8 +478,9 @@ class StructureSearch:
     def _alike(self) -> Iterator[tuple[str, ...]]:
         """Yield the groups of commanded thrusters along one axis that the data do not tell apart."""
         known, logs = self.model.known, self.model.logs
-        unknown = [name for name, error in self.contrasts.items() if error >= CONTRAST]
-        names = {twin for name in unknown for twin in twins(known, logs, name)}
+        unknown = {name for name, error in self.contrasts.items() if error >= CONTRAST}
+        same = thrusters_alike(known.layout, [*map(commands_of, logs)])
+        names = {name for group in same if unknown.intersection(group) for name in group}
         along = [known.layout.thrusters_along(axis) for axis in known.layout.bare_axes]
         groups = (tuple(t.name for t in some if t.name in names) for some in along)
         yield from dict.fromkeys(group for group in groups if len(group) > 1)
@@ -493,7 +508,7 @@ class StructureSearch:
             return True
         layout = now.model.known.layout
         without = self._best_of(now.starts.keys() - {variant})
-        before, after = (structure(one.objective, one.minimum) for one in (without, now))
+        before, after = without.misfits, now.misfits
         ill = [t for t in layout.thrusters if t.name in variant.of or not variant.of]
         on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
         others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
@@ -590,7 +605,7 @@ class StructureSearch:
         now = self.now
         predicted = filtered = worst(structure(now.objective, now.minimum, ahead=True))
         if any(one.lost and not one.is_momentary for one in now.model.logs):
-            filtered = worst(structure(now.objective, now.minimum))
+            filtered = worst(now.misfits)
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
