@@ -135,7 +135,12 @@ class Prediction:
     @property
     def moves(self) -> bool:
         """True if the quantity changes by clearly more than the noise of its sensor."""
-        return self.unchanged > _MOVING * self.noise
+        return moves(self.noise, self.unchanged)
+
+
+def moves(noise: float, unchanged: float) -> bool:
+    """Return False if the RMS error of a prediction of no change is hardly larger than the noise."""
+    return unchanged > _MOVING * noise
 
 
 def least_error(noise: float, unchanged: float) -> float:

@@ -104,16 +104,17 @@ def true_motion(k: Vehicle) -> dict[str, Array]:
 @pytest.mark.parametrize(
     ("kind", "vehicles", "width"),
     [
-        pytest.param("points", 8, 0.3, marks=pytest.mark.long),
+        pytest.param("points", 8, 0.4, marks=pytest.mark.long),
         pytest.param("recordings", 3, 0.1, marks=pytest.mark.long),
-        pytest.param("points", 60, 0.3, marks=pytest.mark.weekly),
+        pytest.param("points", 60, 0.4, marks=pytest.mark.weekly),
         pytest.param("recordings", 15, 0.1, marks=pytest.mark.weekly),
     ],
 )
 def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, scheduler: str, tmp_path: Path) -> None:
     """`width` is the largest relative width of the band of the stopping distance.
 
-    It is 7 % after two logs: when the logger's rows take effect is known to some 0.03 s, and with it the inertia.
+    It is 7 % after two logs: when the logger's rows take effect is known to some 0.03 s, and with it the inertia. It is
+    34 % after six steady speeds with errors of 3 %, which hardly tell the power of drag.
 
     docs/studies.md gives the shares for more vehicles, which would take too long here.
     """

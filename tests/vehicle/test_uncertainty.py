@@ -49,7 +49,7 @@ def test_the_range_of_200_draws_contains_the_samples_of_an_unseen_dive(seed: int
     """A VideoRay is identified from two dives of 20 s. A third one, with the noise of the sensors, is not seen.
 
     The range of each sample is that of 90 % of the draws, with the same noise. It contains more of them, because the
-    intervals of the file contain those of the fit with all effects.
+    intervals of the file contain those of the fit with all effects, among them the power of drag.
     """
     tank = replace(Tank(sensors=USUAL), logs=Logs("pilot", count=2, seconds=20.0))
     tank.write(seed, tmp_path / "dives")
@@ -69,7 +69,7 @@ def test_the_range_of_200_draws_contains_the_samples_of_an_unseen_dive(seed: int
         every = runs[{"velocity": "u", "depth": "z", "heading": "psi"}[sensor.quantity]]
         low, high = np.quantile(every + sensor.noise * random.standard_normal(every.shape), [0.05, 0.95], axis=0)
         inside.append(np.mean((low <= sample) & (sample <= high)))
-    assert 0.85 <= min(inside) <= max(inside) <= 0.98
+    assert 0.85 <= min(inside) <= max(inside) <= 0.99
 
 
 # ---- Writing, reading and checking -----------------------------------------------------------------------------------

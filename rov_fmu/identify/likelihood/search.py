@@ -34,7 +34,7 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
-from rov_fmu.identify.result import ALARM, USUAL, least_error
+from rov_fmu.identify.result import ALARM, USUAL, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
@@ -89,7 +89,7 @@ class Misfit:
     ratio: float = 0.0
     """R: relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells it."""
     lack: float = 0.0
-    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²."""
+    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves."""
 
     def or_larger(self, other: "Misfit") -> "Misfit":
         """Return the larger one of each number."""
@@ -128,7 +128,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         for m, at, noise, change in zip(one.measured, places, least, motion, strict=True):
             if at.sum() >= 10:
                 R = rms(errors[at])
-                lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and change > 0.0 else 0.0
+                lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and moves(noise, change) else 0.0
                 found[m.sensor.axis] = Misfit(R, lack).or_larger(found.get(m.sensor.axis, Misfit()))
     return found
 
