@@ -102,6 +102,7 @@ typedef struct {
     real white[MOST_SENSORS];               /* the standard deviation of each sensor's white noise */
     real lag[MOST_SENSORS];                 /* the time constant of each sensor, s */
     real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
+    real turn;                              /* of the sensors of velocity over ground about the vehicle's vertical axis, rad */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
     real power[2][N_AXES], typical[N_AXES]; /* of drag a |v| v |v / typical|^power, ahead and astern */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
@@ -254,10 +255,10 @@ static int direction_of(const filter *f, ptrdiff_t sensor)
     return f->log->kind[sensor] == STATE && axis < N_AXES ? f->where->direction[axis] : -1;
 }
 
-/* Return the velocity at the place of a sensor, relative to the origin, for a turn of 1 rad/s. */
-static real arm(const filter *f, ptrdiff_t sensor, int axis)
+/* Return the velocity along a direction at the place of a sensor, relative to the origin, for a turn of 1 rad/s. */
+static real arm(const filter *f, ptrdiff_t sensor, int along, int axis)
 {
-    const int about = f->where->turn[axis], along = direction_of(f, sensor), across = 3 - about - along;
+    const int about = f->where->turn[axis], across = 3 - about - along;
     real found = 0.0;
     if (about >= 0 && along >= 0 && about != along) {
         found = across == (about + 1) % 3 ? f->set->lever[sensor][across] : -f->set->lever[sensor][across];
@@ -276,7 +277,7 @@ static real beside_origin(const filter *f, const real x[N_X], ptrdiff_t sensor)
 {
     real R[3][3], found = 0.0;
     for (int i = 0; i < N_AXES; i++) {
-        found += arm(f, sensor, i) * x[i];
+        found += arm(f, sensor, direction_of(f, sensor), i) * x[i];
     }
     for (int axis = 0; axis < N_DRIFTS; axis++) {
         if (locates(f, sensor, axis)) {
@@ -302,11 +303,43 @@ static bool lags(const filter *f, ptrdiff_t sensor)
     return f->log->active[LAGGED + sensor] != 0;
 }
 
+/* Return the velocity over ground at the place of a sensor along a direction of the body: ahead, to starboard, down. */
+static real velocity_along(const filter *f, const real x[N_X], real R[3][3], ptrdiff_t sensor, int along)
+{
+    real found = 0.0;
+    for (int i = 0; i < N_AXES; i++) {
+        found += arm(f, sensor, along, i) * x[i];
+    }
+    for (int i = 0; i < N_DRIFTS; i++) {
+        found += R[i][along] * (x[DRIFT + i] + current(f, i));
+    }
+    for (int i = 0; i < N_AXES; i++) {
+        if (f->where->direction[i] == along) {
+            found += x[i];
+        }
+    }
+    return found;
+}
+
+/* Return a component of a vector in the frame of the sensors of velocity over ground, by its two horizontal components in the
+ * body: ahead and to starboard. */
+static real in_frame_of_sensor(const filter *f, int along, const real horizontal[2])
+{
+    const real c = cos(f->set->turn), s = sin(f->set->turn);
+    return along == 0 ? c * horizontal[0] + s * horizontal[1] : c * horizontal[1] - s * horizontal[0];
+}
+
+/* Return true for a sensor of the velocity over ground that measures along a turned direction. */
+static bool is_turned(const filter *f, ptrdiff_t sensor)
+{
+    return f->log->kind[sensor] == OVER_GROUND && f->log->place[sensor] < 2 && ANY(f->set->turn != 0.0);
+}
+
 /* Return what a sensor would measure at once, without noise. */
 static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
 {
     const int place = f->log->place[sensor];
-    real R[3][3], value;
+    real R[3][3];
     if (f->log->kind[sensor] == STATE) {
         return x[place - FIRST_STATE] + beside_origin(f, x, sensor);
     }
@@ -317,16 +350,11 @@ static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
         }
         return place == 0 ? atan2(R[2][1], R[2][2]) : atan2(R[1][0], R[0][0]);
     }
-    value = beside_origin(f, x, sensor); /* the place is the number of the direction: ahead, to starboard, down */
-    for (int i = 0; i < N_DRIFTS; i++) {
-        value += R[i][place] * (x[DRIFT + i] + current(f, i));
+    if (is_turned(f, sensor)) { /* the place is the number of the direction */
+        const real horizontal[2] = {velocity_along(f, x, R, sensor, 0), velocity_along(f, x, R, sensor, 1)};
+        return in_frame_of_sensor(f, place, horizontal);
     }
-    for (int i = 0; i < N_AXES; i++) {
-        if (f->where->direction[i] == place) {
-            value += x[i];
-        }
-    }
-    return value;
+    return velocity_along(f, x, R, sensor, place);
 }
 
 /* Return true for a state that the attitude depends on. */
@@ -334,6 +362,21 @@ static bool turns(const filter *f, int state)
 {
     const int quaternion = f->where->quaternion - FIRST_STATE;
     return f->where->quaternion >= 0 ? state >= quaternion && state < quaternion + 4 : state + FIRST_STATE == f->where->heading;
+}
+
+/* Return the derivative of a velocity over ground along a direction of the body with respect to a state other than the attitude. */
+static real slope_along(const filter *f, real R[3][3], ptrdiff_t sensor, int along, int state)
+{
+    if (state < N_AXES && f->where->turn[state] >= 0) {
+        return arm(f, sensor, along, state);
+    }
+    if (state < N_AXES) {
+        return f->where->direction[state] == along ? 1.0 : 0.0;
+    }
+    if (state >= DRIFT && state < NOISE) {
+        return R[state - DRIFT][along];
+    }
+    return 0.0;
 }
 
 /* Compute the derivatives of what a sensor would measure at once with respect to the listed states. */
@@ -352,16 +395,17 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
         H[c] = 0.0;
         if (kind == STATE && j == place - FIRST_STATE) {
             H[c] = 1.0;
-        } else if (j < N_AXES && f->where->turn[j] >= 0) {
-            H[c] = arm(f, sensor, j);
         } else if (turns(f, j) && !ignores_attitude) {
             y[j] = x[j] + 1e-6;
             H[c] = wrapped(at_once(f, y, sensor) - base) / 1e-6;
             y[j] = x[j];
-        } else if (kind == OVER_GROUND && j < N_AXES) {
-            H[c] = f->where->direction[j] == place ? 1.0 : 0.0;
-        } else if (kind == OVER_GROUND && j >= DRIFT && j < NOISE) {
-            H[c] = R[j - DRIFT][place];
+        } else if (is_turned(f, sensor)) {
+            const real horizontal[2] = {slope_along(f, R, sensor, 0, j), slope_along(f, R, sensor, 1, j)};
+            H[c] = in_frame_of_sensor(f, place, horizontal);
+        } else if (kind == OVER_GROUND) {
+            H[c] = slope_along(f, R, sensor, place, j);
+        } else if (j < N_AXES && f->where->turn[j] >= 0) {
+            H[c] = arm(f, sensor, direction_of(f, sensor), j);
         }
     }
 }

@@ -196,6 +196,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "as ramps, which take 1.2 s from rest to full command",
         structured(HEALTH, kind="slew limit", value=0.19, unit="s"),
     ),
+    (
+        "turned velocity sensor",
+        structured(HEALTH, kind="turned velocity sensor", value=-1.5708, unit="rad"),
+        "the velocity sensor is turned by -90 deg about the vertical axis",
+        structured(HEALTH, kind="turned velocity sensor", value=0.04, unit="rad"),
+    ),
     ("worse than no change", surge(predictions=(DISTANCE,)), "off by 0.90 m (RMS), and a prediction of", quiet()),
     ("slip", quiet(slips=(Slip("log_1.csv", "depth", "is it in mm", 9.0),)), "check the depth: is it in mm?", quiet()),
     ("second start", quiet(agreement=41.0), "two fits from different starts ended at", quiet(agreement=39.0)),

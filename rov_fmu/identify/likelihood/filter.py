@@ -119,6 +119,8 @@ class Parameters:
     """The force along each axis of what momentary commands lack between their rows, N or N m. Empty: there is none."""
     levers: tuple[tuple[Number, ...], ...] = ()
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
+    turn: Number = 0.0
+    """How far the sensors of velocity over ground are turned to starboard about the vertical axis of the body, rad."""
     lags: tuple[Number | None, ...] = ()
     """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
     powers: tuple[tuple[Number, Number, float], ...] = ()
@@ -331,6 +333,7 @@ class Filter:
             *(*parameters.white, *[1.0] * rest),
             *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
             *(part for lever in levers for part in lever),
+            parameters.turn,
             *units,
             *(number for column in zip(*powers, strict=True) for number in column),
             *(parameters.offset, parameters.width),

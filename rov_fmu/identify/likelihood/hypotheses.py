@@ -3,11 +3,13 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf
+from math import exp, inf, radians
 
 import numpy as np
 
+from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.kinds import TURN
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table, table_of
 from rov_fmu.identify.likelihood.prior import Prior
@@ -190,6 +192,12 @@ def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
     yield from ((one.log.file,) for one in logs if one.jump is not None)
 
 
+def _with_both_velocities(_: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield one variant, about all logs, if one has the velocity over ground both ahead and to starboard."""
+    if any({SURGE, SWAY} <= {s.axis for s in one.record.sensors if s.is_horizontal_velocity} for one in logs):
+        yield ()
+
+
 def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
     """Return how much of the command along which axis is lost between rows that are so far apart, s."""
     axis = max(lost, key=lambda one: lost[one])
@@ -311,6 +319,15 @@ HYPOTHESES = {
         ),
         in_words=_of_acting,
         has_times=True,
+    ),
+    TURN: Hypothesis(
+        0.02,
+        _with_both_velocities,
+        _with_parameter(TURN),
+        tuple(radians(degrees) for degrees in (45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0)),
+        "the velocity sensor is turned by {value} about the vertical axis, positive to starboard{odds}. The fit turns "
+        "its values back. Correct the angle of mounting where the log is made",
+        least=0.05,
     ),
     "reversed commands": Hypothesis(
         0.03,

@@ -25,6 +25,7 @@ PLACED = {True: "velocity sensor", False: "position sensor"}
 INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "logging width", "white noise"
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
+TURN = "turned velocity sensor"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
@@ -520,6 +521,17 @@ KINDS = {
         low=0.0,
         high=0.8,
         null=0.0,
+        is_of_structure=True,
+    ),
+    TURN: Kind(
+        None,
+        "angle of the velocity sensor about the vertical axis",
+        ". The vehicle file does not have it, because it describes the vehicle without its sensors",
+        deviation=1.5,
+        low=-4.0,
+        high=4.0,
+        null=0.0,
+        unit="rad",
         is_of_structure=True,
     ),
     "white noise": Kind(

@@ -239,8 +239,11 @@ def test_a_turning_vehicle_measures_its_velocity_over_ground() -> None:
     assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < 5e-4
 
 
-def test_a_sensor_beside_the_origin_measures_the_turn() -> None:
+@pytest.mark.parametrize("turned", [0.0, 2.1])
+def test_a_sensor_beside_the_origin_measures_the_turn(turned: float) -> None:
     """A velocity at a place is that of the origin plus the turn times the place, and a position is beside it.
+
+    A sensor of velocity over ground that is turned to starboard measures along its own directions.
 
     The variances are those of errors of one state at a time.
     """
@@ -253,7 +256,7 @@ def test_a_sensor_beside_the_origin_measures_the_turn() -> None:
     sensors = [Sensor(axis, moves, ground) for moves, ground in kinds for axis in (SURGE, SWAY, HEAVE)]
     white, told, filter = 0.01, (np.zeros(1), np.zeros(1)), Filter(k)
     levers = (tuple(place.tolist()),) * len(sensors)
-    known = parameters(k, len(sensors), levers=levers)
+    known = parameters(k, len(sensors), levers=levers, turn=turned)
 
     def predicted(changed: dict[str, float], errors: dict[str, float]) -> tuple[Array, Array]:
         """Return what the sensors measure of a state, and the variances of the first sample of each sensor alone."""
@@ -266,14 +269,17 @@ def test_a_sensor_beside_the_origin_measures_the_turn() -> None:
 
     found, _ = predicted({}, {})
     moved = np.array([*velocity.values()]) + np.cross([*turn.values()], place)
-    c, s = cos(psi), sin(psi)
-    assert found == pytest.approx(
-        np.concatenate([moved, moved, np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ place])
-    )
-    for name in ("p", "q", "r", QUATERNION[2], QUATERNION[3]):
+    assert found == pytest.approx(np.concatenate([moved, about_z(-turned) @ moved, about_z(psi) @ place]))
+    for name in ("u", "v", "p", "q", "r", QUATERNION[2], QUATERNION[3]):
         slope = (predicted({name: state.get(name, 0.0) + 1e-5}, {})[0] - found) / 1e-5
         _, variances = predicted({}, {name: 0.1})
         assert variances == pytest.approx(white**2 + (0.1 * slope) ** 2, rel=1e-3), name
+
+
+def about_z(angle: float) -> Array:
+    """Return the matrix that turns a vector about the vertical axis."""
+    c, s = cos(angle), sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 # ---- The mean --------------------------------------------------------------------------------------------------------

@@ -28,7 +28,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     probability,
     twins,
 )
-from rov_fmu.identify.likelihood.kinds import KINDS
+from rov_fmu.identify.likelihood.kinds import KINDS, TURN
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
@@ -61,6 +61,8 @@ from verification.references.autopilot.flights import flown
 SECONDS, INTERVAL = 45.0, 0.1
 NOISE = {"surge velocity [m/s]": 0.005, "sway velocity [m/s]": 0.005, "heading [deg]": 0.3, "depth [m]": 0.01}
 OUTPUTS = {"surge velocity [m/s]": "u", "sway velocity [m/s]": "v", "heading [deg]": "psi", "depth [m]": "z"}
+TURNS = (-170.0, -90.0, -30.0, 15.0, 60.0, 135.0)
+"""Angles of a velocity sensor, degrees."""
 Commands = dict[str, Array]
 
 
@@ -87,6 +89,8 @@ class Fault:
     """The time constant of the rotors' speeds, s."""
     settled: float = 0.0
     """Until when the measured velocities drift away, s."""
+    turned: float = 0.0
+    """How far the velocity sensor is turned to starboard, rad."""
 
 
 def faults(names: list[str]) -> dict[str, Fault]:
@@ -142,6 +146,9 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     acting = fault.acting(logged)
     motion = whole.simulate(time, {f"u_{name}": acting[name] for name in names})
     columns = {f"{name} [1]": logged[name] for name in names}
+    if fault.turned:
+        c, s = np.cos(fault.turned), np.sin(fault.turned)
+        motion = {**motion, "u": c * motion["u"] + s * motion["v"], "v": c * motion["v"] - s * motion["u"]}
     for title, variable in OUTPUTS.items():
         if variable in motion:
             values = np.degrees(motion[variable]) if "deg" in title else motion[variable]
@@ -168,16 +175,22 @@ def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
     return Model(*begin(tests))
 
 
+@pytest.fixture(scope="module")
+def four_axes(tmp_path_factory: pytest.TempPathFactory) -> Model:
+    """A dive of the BlueROV2, whose sway is measured, too."""
+    return Model(*begin(load_tests(folder(tmp_path_factory.mktemp("four_axes"), "bluerov2", Fault("")))))
+
+
 # ---- What each changes -----------------------------------------------------------------------------------------------
 
 
-def test_each_hypothesis_changes_what_acts(model: Model) -> None:
+def test_each_hypothesis_changes_what_acts(four_axes: Model) -> None:
     """A variant changes the commands that the filter reads, or adds a parameter, and nothing else."""
-    (one,), plain = model.logs, {p.key for p in model.table.parameters}
+    (one,), plain = four_axes.logs, {p.key for p in four_axes.table.parameters}
     for kind, hypothesis in HYPOTHESES.items():
-        for of in hypothesis.variants(model.known, model.logs):
+        for of in hypothesis.variants(four_axes.known, four_axes.logs):
             acting = ((one.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
-            changed = model.applied(Variant(kind, of, acting))
+            changed = four_axes.applied(Variant(kind, of, acting))
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert {p.key for p in changed.table.parameters} == plain
@@ -189,7 +202,7 @@ def test_each_hypothesis_changes_what_acts(model: Model) -> None:
                 continue
             assert added == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
             assert added or is_other
-    assert sum(one.probability for one in HYPOTHESES.values()) < 0.6
+    assert sum(one.probability for one in HYPOTHESES.values()) < 0.65
 
 
 def test_idle_commands_of_one_file_leave_another_alone(model: Model) -> None:
@@ -221,9 +234,9 @@ def one_of_each(model: Model) -> list[Variant]:
     return found
 
 
-def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(model: Model) -> None:
+def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Model) -> None:
     """Lines between momentary commands are those of the commands that act, and a slew limit repeats none of them."""
-    lossy = replace(model, logs=[with_jump(replace(one, lost={"yaw": 0.1})) for one in model.logs])
+    lossy = replace(four_axes, logs=[with_jump(replace(one, lost={"yaw": 0.1})) for one in four_axes.logs])
     every = one_of_each(lossy)
     for first, second in combinations(every, 2):
         (one,), (other,) = lossy.applied(first, second).logs, lossy.applied(second, first).logs
@@ -288,14 +301,17 @@ def seldom(one: SampledLog, number: int) -> SampledLog:
 
 @pytest.mark.parametrize("number", [1, 4])
 @pytest.mark.parametrize("kind", HYPOTHESES)
-def test_a_hypothesis_that_is_absent_is_the_model_without_it(kind: str, number: int, model: Model) -> None:
+def test_a_hypothesis_that_is_absent_is_the_model_without_it(
+    kind: str, number: int, model: Model, four_axes: Model
+) -> None:
     """J of the data is the same, and close to where the hypothesis is absent, it is almost the same."""
     hypothesis, null = HYPOTHESES[kind], KINDS[kind].null if HYPOTHESES[kind].starts else None
     has_null = null is not None or hypothesis.has_times or hypothesis.is_first
     assert has_null != bool(hypothesis.why_no_null)
     if not has_null:
         return
-    plain = replace(model, logs=[seldom(one, number) for one in model.logs])
+    of_kind = four_axes if kind == TURN else model
+    plain = replace(of_kind, logs=[seldom(one, number) for one in of_kind.logs])
     if hypothesis.is_first:
         absent = replace(plain, logs=[one.settled_at(-np.inf) for one in plain.logs])
     else:
@@ -742,6 +758,15 @@ def test_rotors_whose_speed_lags_are_told_from_a_lag_of_the_force(tmp_path: Path
 def test_velocities_of_an_estimator_without_a_position_are_named(tmp_path: Path) -> None:
     fault = Fault("unsettled velocity", "dive_0.csv (until 16.5 s)", settled=16.5)
     check(tmp_path, "videoray", fault, 1, 1)
+
+
+@pytest.mark.parametrize(
+    "turned",
+    [pytest.param(degrees, marks=pytest.mark.long if degrees == 135 else pytest.mark.weekly) for degrees in TURNS],
+)
+def test_a_turned_velocity_sensor_is_named_and_turned_back(turned: float, tmp_path: Path) -> None:
+    angle = np.radians(turned)
+    check(tmp_path, "bluerov2", Fault(TURN, turned=angle, value=angle), 1, 1)
 
 
 @pytest.mark.weekly
