@@ -49,11 +49,11 @@ def tested_commands(objective: Objective, z: Array) -> dict[Axis, Tested]:
     for row in objective.rows:
         if not isinstance(row.subject, Curve) and row.quantity == "V_ss":
             ends[row.subject][row.command > 0.0] = max(ends[row.subject][row.command > 0.0], abs(row.command))
-    for n, one in enumerate(objective.logs):
-        commands = dict(zip(one.layout.inputs, objective.table.followed(z, one).T, strict=True))
-        of_thrusters = {t.name: commands[f"u_{t.name}"] for t in one.layout.thrusters}
+    for n, sampled in enumerate(objective.logs):
+        commands = dict(zip(sampled.layout.inputs, objective.table.followed(z, sampled).T, strict=True))
+        of_thrusters = {t.name: commands[f"u_{t.name}"] for t in sampled.layout.thrusters}
         for axis, speeds in objective.reached(z, n).items():
-            push = push_along(one.layout, axis, of_thrusters)
+            push = push_along(sampled.layout, axis, of_thrusters)
             for is_ahead, (sign, reached) in enumerate(zip((-1.0, 1.0), speeds, strict=True)):
                 if reached:
                     held = sign * shapes.motions(vehicle, axis, sign * _GRID).response()[0]

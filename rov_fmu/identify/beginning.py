@@ -173,7 +173,7 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     dives = [log for log in tests.folder.logs if not log.axis]
     shown = {axis for log in dives for axis in shown_axes(log, tests.vehicle.layout)}
     vehicle = _extended(with_unseen_axes(tests, shown), measured, tests, shown)
-    logs = [one for log in tests.folder.logs if (one := recorded(log, layout_of(log, vehicle.layout)))]
+    logs = [sampled for log in tests.folder.logs if (sampled := recorded(log, layout_of(log, vehicle.layout)))]
     fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
     moved = {form.axis for one in logs for form in one.layout.axes}
     unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
@@ -214,10 +214,10 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
     counted = [
-        one
+        table_row
         for kind in QUANTITIES
-        for row, one in table_rows(tests, vehicle.layout, kind)
-        if tests.folder.counts(kind, one.subject.name, row.command)
+        for row, table_row in table_rows(tests, vehicle.layout, kind)
+        if tests.folder.counts(kind, table_row.subject.name, row.command)
     ]
     return known, logs, counted
 
@@ -385,9 +385,9 @@ def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[Sampl
 
 def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterator[float]:
     """Yield the sizes of the thrust along an axis for some rows of the logs."""
-    for one in (one for one in logs if axis.name in one.layout.by_name):
-        some = one.record.inputs[:: max(1, len(one.record.inputs) // 100)]
-        thrust = one.thrust(vehicle.coefficients, some)[:, one.layout.bare_axes.index(axis)]
+    for sampled in (one for one in logs if axis.name in one.layout.by_name):
+        some = sampled.record.inputs[:: max(1, len(sampled.record.inputs) // 100)]
+        thrust = sampled.thrust(vehicle.coefficients, some)[:, sampled.layout.bare_axes.index(axis)]
         yield from filter(None, np.abs(thrust).tolist())
 
 

@@ -63,11 +63,11 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
     """Yield the hypotheses about the structure that won, with the numbers of their parameters, and those that come
     nearest where the model lacks something."""
     table, objective = fit.posterior.table, fit.objective
-    for one in fit.adopted:
-        structure, place = _named(fit, one.variant, one.odds), table.place(*one.variant.parameter)
-        if place is not None:
-            value, interval = _number(fit, place)
-            structure = replace(structure, value=value, interval=interval, unit=table.parameters[place].unit)
+    for adopted in fit.adopted:
+        structure, index = _named(fit, adopted.variant, adopted.odds), table.index(*adopted.variant.parameter)
+        if index is not None:
+            value, interval = _number(fit, index)
+            structure = replace(structure, value=value, interval=interval, unit=table.parameters[index].unit)
         yield structure
     for variant, z in fit.nearest.items():
         structure = replace(_named(fit, variant, 0.0), probability=nan)
@@ -85,12 +85,12 @@ def _named(fit: Fit, variant: Variant, odds: float) -> Structure:
     return Structure(variant.kind, words.pop("of"), probability(odds), words=tuple(words.items()))
 
 
-def _changes_anywhere(fit: Fit, one: SampledLog) -> bool:
+def _changes_anywhere(fit: Fit, sampled: SampledLog) -> bool:
     """Return True if commands that hold surely change within more than half of the time between two rows."""
-    place = fit.posterior.table.place(WIDTH, one.log.file)
-    if one.is_momentary or place is None:
+    index = fit.posterior.table.index(WIDTH, sampled.log.file)
+    if sampled.is_momentary or index is None:
         return False
-    _, low, _ = fit.posterior.ends(place)
+    _, low, _ = fit.posterior.ends(index)
     return bool(low > MOST_OF_ROW)
 
 
@@ -100,9 +100,9 @@ def _shortest(fit: Fit, p: Parameter) -> float:
     A lag that is shorter changes samples no more than the model between them does.
     """
     intervals = [
-        float(np.median(np.diff(one.record.time[one.record.sensor == n])))
-        for one in fit.objective.logs
-        for n, m in enumerate(one.measured)
+        float(np.median(np.diff(sampled.record.time[sampled.record.sensor == n])))
+        for sampled in fit.objective.logs
+        for n, m in enumerate(sampled.measured)
         if p.of_kind.is_lag and p.part in ("", with_same_lag(m.sensor))
     ]
     return min(intervals, default=-inf) / (2.0 * pi)
@@ -111,24 +111,24 @@ def _shortest(fit: Fit, p: Parameter) -> float:
 def loggers_of(fit: Fit) -> Iterator[Logging]:
     """Yield how long after their rows the commands of each log act, s, without the dead time and lag of the vehicle."""
     posterior, table = fit.file.posterior, fit.file.posterior.table
-    for one in fit.objective.logs:
-        place = table.place(OFFSET, one.log.file)
-        if place is None:
+    for sampled in fit.objective.logs:
+        index = table.index(OFFSET, sampled.log.file)
+        if index is None:
             continue
-        offset, lag = float(posterior.z[place]), table.place(LAG)
+        offset, lag = float(posterior.z[index]), table.index(LAG)
         if lag in posterior.absent:  # a delay that the vehicle does not keep belongs to the logger
             offset += float(posterior.z[lag])
-        width = table.get(posterior.z, WIDTH, one.log.file) * one.interval
-        yield Logging(one.log.file, one.interval, offset, around(offset, posterior.errors[place]), width)
+        width = table.get(posterior.z, WIDTH, sampled.log.file) * sampled.interval
+        yield Logging(sampled.log.file, sampled.interval, offset, around(offset, posterior.errors[index]), width)
 
 
 def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
     """Yield the noise and the outliers of each measured quantity over all logs."""
     objective, table = fit.objective, fit.posterior.table
     seen = grouped(
-        (m.channel.quantity.name, (m, np.abs(data.normalised[record.sensor == place]) > _OUTLIER))
-        for one, record, data in zip(objective.logs, objective.records, fit.best.data, strict=False)
-        for place, m in enumerate(one.measured)
+        (m.channel.quantity.name, (m, np.abs(data.normalised[record.sensor == number]) > _OUTLIER))
+        for sampled, record, data in zip(objective.logs, objective.records, fit.best.data, strict=False)
+        for number, m in enumerate(sampled.measured)
     )
     for name, some in seen.items():
         m, noise = some[0][0], table.noise(fit.best.z, name)

@@ -452,14 +452,14 @@ def extrapolated(identification: Identification) -> list[str]:
     """Return sentences about answers to commands that were not tested, and about the voltage of all answers, if the
     thrust depends on it."""
     tested = [
-        f"{one.axis.name} from {0.0 - one.tested[0]:.0%} to {one.tested[1]:.0%}"
-        for one in identification.axes
-        if any(is_extrapolated(answer.command, one.tested) for answer in one.answers)
+        f"{result.axis.name} from {0.0 - result.tested[0]:.0%} to {result.tested[1]:.0%}"
+        for result in identification.axes
+        if any(is_extrapolated(answer.command, result.tested) for answer in result.answers)
     ]
     untested = [
-        f"{direction} ({one.axis.name})"
-        for one in identification.axes
-        for direction, strongest in zip((one.axis.negative, one.axis.positive), one.tested, strict=True)
+        f"{direction} ({result.axis.name})"
+        for result in identification.axes
+        for direction, strongest in zip((result.axis.negative, result.axis.positive), result.tested, strict=True)
         if strongest < LEAST_TESTED
     ]
     lines = (
@@ -664,45 +664,46 @@ def beyond_thrusters(wrench: Vehicle, own: Vehicle) -> Iterator[Finding]:
             yield about("", "beyond thrusters", axis.name, **sizes)
 
 
-def _on_log(identification: Identification, one: Log) -> Iterator[Finding]:
+def _on_log(identification: Identification, log: Log) -> Iterator[Finding]:
     """Yield findings about full commands, and about turns that the model takes for independent of the other motion."""
     description = identification.folder.rov_file.description
     # The full command of a wrench is its largest force in the logs, so it says nothing about what thrusters can follow.
-    if one.commands and not (description and description.layout.has_wrench):
-        values = np.abs(one.commands.at(one.commands.rows))
+    if log.commands and not (description and description.layout.has_wrench):
+        values = np.abs(log.commands.at(log.commands.rows))
         share = float(np.mean(np.any(values >= _FULL, axis=1)))
         if share > _SATURATED:
-            yield about(one.file, "saturation", share=share)
+            yield about(log.file, "saturation", share=share)
     layout = identification.vehicle.layout
     if all(map(layout.has, COUPLED_AXES)) and not layout.coupled:
-        surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in one.channels) for a in COUPLED_AXES)
+        surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in log.channels) for a in COUPLED_AXES)
         if yaw and (surge or sway):
-            yield Finding("coupling left out", file=one.file)
+            yield Finding("coupling left out", file=log.file)
 
 
-def _structure(one: Structure) -> Finding | None:
+def _structure(structure: Structure) -> Finding | None:
     """Return the finding about a hypothesis that won; None where only its effect is told."""
-    if (kind := KINDS.get(one.kind)) and abs(one.value - (kind.null or 0.0)) < HYPOTHESES[one.kind].least:
+    hypothesis, value, unit = HYPOTHESES[structure.kind], structure.value, structure.unit
+    if (kind := KINDS.get(structure.kind)) and abs(value - (kind.null or 0.0)) < hypothesis.least:
         return None
-    value = percent(one.value) if one.unit == "1" else size_in_words(one.value, one.unit)
-    words = {"of": one.of, "value": value, **dict(one.words)}
-    if isnan(one.probability):
-        return Finding("nearest", words={"nearest": HYPOTHESES[one.kind].sentence.format(odds="", **words)})
-    odds = f" (probability {percent(one.probability) if one.probability < _SURE else 'above 99%'})"
-    return Finding(one.kind, words={**words, "odds": odds})
+    size = percent(value) if unit == "1" else size_in_words(value, unit)
+    words = {"of": structure.of, "value": size, **dict(structure.words)}
+    if isnan(structure.probability):
+        return Finding("nearest", words={"nearest": hypothesis.sentence.format(odds="", **words)})
+    odds = f" (probability {percent(structure.probability) if structure.probability < _SURE else 'above 99%'})"
+    return Finding(structure.kind, words={**words, "odds": odds})
 
 
-def _logging(one: Logging) -> Finding | None:
+def _logging(logging: Logging) -> Finding | None:
     """Return the finding about a logger's offset, None where it may be 0.
 
     A row tells a command between one interval before it and the row itself. More than that is another clock.
     """
-    low, high = one.offset_interval
+    low, high = logging.offset_interval
     if low <= 0.0 <= high:
         return None
-    is_usual = high >= -1.5 * one.interval and low <= 0.5 * one.interval
-    kind, beside = "logging" if is_usual else "clock", "before" if one.offset < 0.0 else "after"
-    return about(one.file, kind, beside=beside, time=_rounded(one.offset), interval=_rounded(one.interval))
+    is_usual = high >= -1.5 * logging.interval and low <= 0.5 * logging.interval
+    kind, beside = "logging" if is_usual else "clock", "before" if logging.offset < 0.0 else "after"
+    return about(logging.file, kind, beside=beside, time=_rounded(logging.offset), interval=_rounded(logging.interval))
 
 
 def _rounded(time: float) -> float:

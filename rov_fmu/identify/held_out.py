@@ -126,11 +126,11 @@ def predictions(
     That vehicle may have seen the log. It is left out where it has other thrusters or coefficients.
     """
     other = _other(objective.table, against)
-    for one in out:
-        covariance = one.fit.covariance
-        if one.log not in one.part.logs:
-            covariance = _with_currents(objective, best, covariance, one.log)
-        yield from _predicted(objective, one, cautious(objective, one.fit.z), covariance, other)
+    for held in out:
+        covariance = held.fit.covariance
+        if held.log not in held.part.logs:
+            covariance = _with_currents(objective, best, covariance, held.log)
+        yield from _predicted(objective, held, cautious(objective, held.fit.z), covariance, other)
 
 
 def _other(table: Table, against: Vehicle | None) -> Table | None:
@@ -174,11 +174,11 @@ def _predicted(
 
     Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows.
     """
-    one, record = objective.logs[out.log], objective.records[out.log]
+    sampled, record = objective.logs[out.log], objective.records[out.log]
     inside = np.zeros(len(record.time), bool)
     inside[out.chosen] = True
     begin = max(float(record.time[inside][0] - record.time[0]), 0.0) + SETTLING
-    for span in (inf, one.horizon):
+    for span in (inf, sampled.horizon):
         try:
             off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
             usual = _usual_noise(objective, z)
@@ -186,16 +186,16 @@ def _predicted(
         except DivergedError:
             continue
         later = inside & (record.time >= record.time[0] + begin)
-        for number, m in enumerate(one.measured):
+        for number, m in enumerate(sampled.measured):
             at = later & (record.sensor == number)
-            is_left_out = m.sensor.is_velocity and (span < inf) != bool(one.lost)
+            is_left_out = m.sensor.is_velocity and (span < inf) != bool(sampled.lost)
             if at.sum() < 10 or is_left_out or m.sensor.axis not in out.axes:
                 continue
             off, deviation = off_all[at], deviations[at]
             measured = record.value[at]
             yield Prediction(
                 axis=m.sensor.axis,
-                file=one.log.file,
+                file=sampled.log.file,
                 quantity=m.channel.quantity.name,
                 unit=m.channel.quantity.unit,
                 is_position=not m.sensor.is_velocity,
@@ -232,12 +232,12 @@ def ahead(
     """
     run = objective.run(z, number, begin=begin, span=span)
     parameters = enumerate(objective.table.parameters)
-    places = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
-    errors = np.sqrt(np.maximum(np.diag(covariance)[places], 0.0))
+    indices = [k for k, p in parameters if p.of_motion and objective.concerns(p, number)]
+    errors = np.sqrt(np.maximum(np.diag(covariance)[indices], 0.0))
     slopes = np.zeros((len(run.innovations), len(z)))
     for share in _STEPS:
         try:
-            slopes[:, places] = objective.changes(z, number, places, share * errors + 1e-9, run, begin, span)
+            slopes[:, indices] = objective.changes(z, number, indices, share * errors + 1e-9, run, begin, span)
             break
         except DivergedError:
             if share is _STEPS[-1]:
@@ -253,15 +253,15 @@ def ahead(
 
 def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
     """Yield the rows of tables with what the vehicle says about them, also held out."""
-    for row, one in table_rows(tests, vehicle.layout, kind):
-        subject = one.subject.name
+    for row, table_row in table_rows(tests, vehicle.layout, kind):
+        subject = table_row.subject.name
         if only and subject != only:
             continue
         unit = {"thrust": "N", "time_constant": "s"}.get(kind) or AXES[subject].unit
-        out = values.get((one.quantity, subject, row.command), np.nan)
+        out = values.get((table_row.quantity, subject, row.command), np.nan)
         counts = tests.folder.counts(kind, subject, row.command)
-        numbers = row.command, row.value, float(modelled([one], vehicle, NO_SHAPES)[0]), out
-        yield Point(subject, one.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+        numbers = row.command, row.value, float(modelled([table_row], vehicle, NO_SHAPES)[0]), out
+        yield Point(subject, table_row.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
 
 
 def held_out_rows(objective: Objective, best: Minimum) -> Values:

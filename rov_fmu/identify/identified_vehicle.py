@@ -90,14 +90,14 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
             sources[name] = "Assumed: the tests do not determine it"
     if names:
         held = [name for name in every if name not in {*names, *unseen}]
-        places = [every.index(name) for name in (*names, *held)]
+        indices = [every.index(name) for name in (*names, *held)]
         of_file, full = numbers
         shift = full.values - of_file.values
         whole = full.covariance + np.outer(shift, shift)
-        covariance = _given_the_last(whole[np.ix_(places, places)], len(names))
+        covariance = _given_the_last(whole[np.ix_(indices, indices)], len(names))
         errors = np.sqrt(np.diag(covariance))
         for n, name in enumerate(names):
-            intervals[name] = identified.get(name) or _interval(rov, name, places[n], numbers)
+            intervals[name] = identified.get(name) or _interval(rov, name, indices[n], numbers)
             others = {
                 other: float(np.clip(covariance[n, m] / (errors[n] * errors[m]), -1.0, 1.0))
                 for m, other in enumerate(names[:n])
@@ -133,11 +133,11 @@ def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
         return vehicle
     own, tables = tests.thrusters or Layout((), (), ()), tests.description.tables
     layout = replace(vehicle.layout, curves=own.curves, thrusters=own.thrusters, mix=own.mix)
-    kept, places = layout.coefficients, layout.keys_in_file
+    kept, keys_in_file = layout.coefficients, layout.keys_in_file
     thrust = {
         name: quantity
         for name, quantity in tables.quantities(layout).items()
-        if quantity and places[name][0] in ("arm", "curves", "thruster")
+        if quantity and keys_in_file[name][0] in ("arm", "curves", "thruster")
     }
     vehicle = vehicle.with_(layout)
     numbers = {**dict.fromkeys(kept, UNTUNED), **vehicle.coefficients}
@@ -150,7 +150,7 @@ def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:
     )
 
 
-def written(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
+def vehicle_of_file(fit: Fit, vehicle: Vehicle, folder: Path) -> Vehicle:
     """Return the vehicle with meaningful digits, after a check that its file, when it is read, is the fit.
 
     Rounding keeps each value within its interval, and J, which very exact data change with the seventh digit. Both J
@@ -217,8 +217,8 @@ _SOURCE = "Identified from the tests, as the method says"
 def _in_file(posterior: Posterior, fit: Fit, z: Array) -> dict[str, Any]:
     """Return the coefficients of a vehicle file for the coordinates of the parameters."""
     coefficients = posterior.table.coefficients(z)
-    for one in (*_quadratics(posterior, fit, z), *posterior.table.nearest_drags(z, fit.speeds)):
-        coefficients |= one.coefficients
+    for quadratic in (*_quadratics(posterior, fit, z), *posterior.table.nearest_drags(z, fit.speeds)):
+        coefficients |= quadratic.coefficients
     return coefficients | {name: posterior.table.base[name] for name in posterior.table.exact}
 
 
@@ -270,11 +270,11 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
 
     means, covariance, prior = posterior.numbers(values)
     first, own = len(names), slice(len(names))
-    for one in measured(posterior.z[:, None]):
-        here = slice(first, first := first + len(one.misfit))
-        places = [names.index(name) for name in one.coefficients]
+    for quadratic in measured(posterior.z[:, None]):
+        here = slice(first, first := first + len(quadratic.misfit))
+        indices = [names.index(name) for name in quadratic.coefficients]
         mean_square = float(np.mean(means[here] ** 2 + np.diag(covariance[here, here])))
-        covariance[np.ix_(places, places)] += one.covariance(mean_square)
+        covariance[np.ix_(indices, indices)] += quadratic.covariance(mean_square)
     return _Numbers(means[own], covariance[own, own], prior[own, own])
 
 
@@ -343,13 +343,13 @@ def _coefficients(
         yield Coefficient(name, value, interval, declaration.unit, f"{float(centre):g} ± {before:.2g}{unit}", told)
 
 
-def _interval(vehicle: Vehicle, name: str, place: int, numbers: Iterable[_Numbers]) -> Interval:
+def _interval(vehicle: Vehicle, name: str, index: int, numbers: Iterable[_Numbers]) -> Interval:
     """Return the smallest interval of a coefficient with the 95 % intervals of all posteriors, within its bounds."""
     declaration, key = vehicle.layout.coefficients[name], vehicle.layout.keys_in_file[name][-1]
     least = EXACT_BAND / QUANTILE if key in _DEAD_BAND else 0.0
     positive = declaration.minimum >= 0.0 and key not in ("T", *_DEAD_BAND)
     ends = [
-        around(one.values[place], max(one.covariance[place, place] ** 0.5, least), positive=positive) for one in numbers
+        around(one.values[index], max(one.covariance[index, index] ** 0.5, least), positive=positive) for one in numbers
     ]
     low, high = hull((vehicle[name], vehicle[name]), *ends)
     return float(max(low, declaration.minimum)), float(min(high, declaration.maximum))
@@ -364,8 +364,8 @@ def tested_ranges(identification: Identification) -> Iterator[Range]:
     The ends have three digits, and an end that is next to nothing is no range.
     """
     ends_of: dict[str, list[float]] = {}
-    for one in identification.folder.logs:
-        for channel in one.channels:
+    for log in identification.folder.logs:
+        for channel in log.channels:
             if not channel.unused and (name := _variable(channel.quantity)):
                 ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
                 ends_of.setdefault(name, []).extend(ends)

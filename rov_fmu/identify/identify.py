@@ -16,7 +16,7 @@ from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structu
 from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
-from rov_fmu.identify.identified_vehicle import identified_vehicle, with_own_inputs, written
+from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.next_test import next_test
@@ -88,14 +88,14 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
         push = assess.push_of_thrusters(vehicle, of_file, axis)
         of_axis = axis, tested[axis], push
-        one = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)
+        found = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)
         if against and against.layout.has(axis):
-            one = replace(one, compared=assess.answers_of_file(against, axis))
-        axes.append(one)
+            found = replace(found, compared=assess.answers_of_file(against, axis))
+        axes.append(found)
     if not tests.description.tables.validity:
         ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
         of_file = replace(of_file, tested=ends)
-    of_file = written(fit, of_file, tests.folder.path)
+    of_file = vehicle_of_file(fit, of_file, tests.folder.path)
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
     result = Identification(
         folder=replace(tests.folder, findings=[*tests.folder.findings, *beyond_thrusters(vehicle, of_file)]),

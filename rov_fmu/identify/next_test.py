@@ -95,18 +95,18 @@ def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float
 def _length(motions: Sequence[AxisAlone], hold: float) -> float:
     """Return the length that a test and the coasting after it cover, m, by semi-implicit Euler steps."""
     rest, ahead, astern = motions
-    v, place, places = 0.0, 0.0, [0.0]
+    v, position, positions = 0.0, 0.0, [0.0]
     for motion, seconds in ((ahead, hold), (rest, _REST), (astern, hold), (rest, _COASTING)):
         for _ in range(round(seconds / _STEP)):
             v += _STEP * motion.acceleration(v)
-            place += _STEP * v
-            places.append(place)
-    return max(places) - min(places)
+            position += _STEP * v
+            positions.append(position)
+    return max(positions) - min(positions)
 
 
 def _information(objective: Objective, number: int, z: Array, axis: Axis, strength: float, hold: float) -> Array:
     """Return the information of a test about the parameters: two held commands with the sensors of a log."""
-    one, layout = objective.logs[number], objective.logs[number].layout
+    sampled, layout = objective.logs[number], objective.logs[number].layout
     edges = np.array([0.0, 2.0, 2.0 + hold, 2.0 + hold + _REST, 2.0 + 2.0 * hold + _REST])
     inputs = np.zeros((len(edges), len(layout.inputs)))
     names = [*layout.inputs]
@@ -115,21 +115,21 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
             if name in layout.commands or name == "voltage":
                 inputs[n, names.index(name)] = value
     time = np.arange(0.0, edges[-1] + 2.0, 1.0 / _RATE)
-    sensors = one.record.sensors
+    sensors = sampled.record.sensors
     count = len(sensors)
     record = Record(
         sensors,
         np.repeat(time, count),
         np.zeros(len(time) * count),
         np.tile(np.arange(count, dtype=np.intc), len(time)),
-        edges - one.interval,
+        edges - sampled.interval,
         edges,
         inputs,
         layout.at_rest,
-        one.record.errors,
+        sampled.record.errors,
     )
     proposed = copy(objective)
-    proposed.logs = [replace(other, record=record) if other is one else other for other in objective.logs]
+    proposed.logs = [replace(other, record=record) if other is sampled else other for other in objective.logs]
     proposed.records = [other.record for other in proposed.logs]
     free = proposed.run(z, number, begin=0.0)
     proposed.records[number] = replace(record, value=-free.innovations)

@@ -390,9 +390,9 @@ def is_whole(tested: Tested) -> bool:
     return not any(is_extrapolated(command, tested) for command in (-1.0, 1.0))
 
 
-def are_alike(one: float, other: float) -> bool:
+def are_alike(value: float, other: float) -> bool:
     """Return True if two commands are about the same."""
-    return one * other > 0.0 and max(one / other, other / one) <= _ABOUT
+    return value * other > 0.0 and max(value / other, other / value) <= _ABOUT
 
 
 def half_width(estimate: Estimate) -> float:

@@ -49,7 +49,7 @@ KNOWN = f"{HEAD}[known]\n{MASS}{TURNS}{ARM}"
 SHORT = ((0.0, 2.0), (0.3, 8.0), (0.0, 4.0), (-0.2, 6.0))
 
 
-def written(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Tests:
+def with_logs(folder: Path, *logs: tuple[Axis, str, tuple[tuple[float, float], ...]]) -> Tests:
     """Write logs at 10 Hz by their axes, names and plans."""
     path, random = folder_of(folder, KNOWN, FORCES), np.random.default_rng(0)
     for axis, name, plan in logs:
@@ -67,7 +67,7 @@ def add_voltage(log: Path, fall: float = 0.03) -> None:
 @pytest.fixture(scope="session")
 def short(tmp_path_factory: pytest.TempPathFactory) -> Tests:
     """Write a short log of heave and one of yaw."""
-    return written(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
+    return with_logs(tmp_path_factory.mktemp("tests"), (HEAVE, "a", SHORT), (YAW, "a", SHORT))
 
 
 @pytest.fixture(scope="session")

@@ -57,14 +57,14 @@ def found(fit: Fit, **others: float) -> Fit:
 @pytest.mark.parametrize("wider", ["file", "all effects"])
 def test_an_effect_has_the_interval_of_its_coefficient(wider: str, fit: Fit, short: given.Tests) -> None:
     """It contains those of both fits, in the facts as in the table of the coefficients."""
-    one = found(fit)
-    widened = [replace(of, covariance=4.0 * of.covariance) for of in one.posteriors]
+    wide = found(fit)
+    widened = [replace(of, covariance=4.0 * of.covariance) for of in wide.posteriors]
     if wider == "file":
-        one = replace(one, file=replace(one.file, posterior=widened[0]))
+        wide = replace(wide, file=replace(wide.file, posterior=widened[0]))
     else:
-        one = replace(one, posterior=widened[1])
-    _, coefficients = identified_vehicle(short, one)
-    (band,) = [effect for effect in effects_of(one) if effect.kind == "dead band" and effect.of == "top"]
+        wide = replace(wide, posterior=widened[1])
+    _, coefficients = identified_vehicle(short, wide)
+    (band,) = [effect for effect in effects_of(wide) if effect.kind == "dead band" and effect.of == "top"]
     assert band.interval == pytest.approx(coefficients["c_0_top"].interval, rel=1e-6)
     assert band.interval[1] - band.interval[0] == pytest.approx(4.0 * HALF, rel=1e-6)
 
@@ -137,14 +137,14 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
     monkeypatch.setitem(kinds.PRIORS, "wake", wake.prior)
     known, old = replace(fit.known, deviations={"wake": 0.3}), fit.posterior.table
     table = table_of(known, fit.objective.logs, [p.of for p in old.parameters if p.kind == "row noise"])
-    place = table.place("wake", "heave")
-    assert place is not None
-    assert table.parameters[place].deviation == 0.3
-    z = np.insert(fit.best.z, place, 1.0)
+    index = table.index("wake", "heave")
+    assert index is not None
+    assert table.parameters[index].deviation == 0.3
+    z = np.insert(fit.best.z, index, 1.0)
     objective = Objective(table, fit.objective.logs, fit.objective.rows, thinned=True)
     end = minimise(objective, z, most=1, last=False)
     assert end.value <= objective.value(z, objective.runs(z))
-    assert end.information[place, place] > 2.0 / 0.3**2, "the logs tell something of it"
+    assert end.information[index, index] > 2.0 / 0.3**2, "the logs tell something of it"
     clear = found(replace(fit, known=known, posterior=Posterior(table, z, np.eye(len(z)))), wake=1.2)
     (effect,) = (one for one in effects_of(clear) if one.kind == "wake")
     assert (effect.value, effect.of, effect.kept) == (1.2, "heave", True)
@@ -177,9 +177,9 @@ def test_effects_are_told_in_their_units(fit: Fit) -> None:
     }
     told = {(one.name, one.of): one for one in effects_of(found(fit))}
     for key, (value, low, high, unit) in expected.items():
-        one = told[key]
-        assert (one.value, *one.interval) == pytest.approx((value, low, high)), key
-        assert (one.unit, one.kept) == (unit, True)
+        effect = told[key]
+        assert (effect.value, *effect.interval) == pytest.approx((value, low, high)), key
+        assert (effect.unit, effect.kept) == (unit, True)
     assert told["constant load", "yaw"].unit == "N.m"
     assert told["dead band", "top"].beyond == pytest.approx(0.4), "a deviation of 0.05, of 2.5"
     assert not told["time constant of the thrusters", ""].is_unusual
@@ -198,10 +198,10 @@ def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
 
 @pytest.mark.parametrize(("lag", "offset"), [(0.2, -0.05), (0.02, -0.03)])
 def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(lag: float, offset: float, fit: Fit) -> None:
-    one, other = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))
-    assert (one.file, other.file) == ("log_heave_a.csv", "log_yaw_a.csv")
-    assert (one.interval, one.offset, one.width) == pytest.approx((0.1, offset, 0.06))
-    assert one.offset_interval == pytest.approx((offset - HALF, offset + HALF))
+    heave, yaw = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))
+    assert (heave.file, yaw.file) == ("log_heave_a.csv", "log_yaw_a.csv")
+    assert (heave.interval, heave.offset, heave.width) == pytest.approx((0.1, offset, 0.06))
+    assert heave.offset_interval == pytest.approx((offset - HALF, offset + HALF))
 
 
 def test_sensors_have_their_noise_and_their_outliers(fit: Fit) -> None:
@@ -220,15 +220,15 @@ def test_sensors_have_their_noise_and_their_outliers(fit: Fit) -> None:
 def test_a_prediction_is_as_uncertain_as_its_parameters(fit: Fit) -> None:
     """Nothing is known of a heading at 1.8 rad, and thrust is never known to better than 3 %."""
     objective, z, table = fit.objective, fit.file.posterior.z, fit.posterior.table
-    place, gain = table.place("quadratic drag", "yaw"), table.place("slow gain")
-    assert place is not None
+    index, gain = table.index("quadratic drag", "yaw"), table.index("slow gain")
+    assert index is not None
     assert gain is not None
 
     def deviations(error: float) -> np.ndarray:
-        covariance = np.diag(np.where(np.arange(len(z)) == place, error**2, 0.0))
+        covariance = np.diag(np.where(np.arange(len(z)) == index, error**2, 0.0))
         return ahead(objective, 1, z, covariance, 5.0, 10.0)[1]
 
-    ends = [z + step * np.eye(len(z))[place] for step in (0.01, -0.01)]
+    ends = [z + step * np.eye(len(z))[index] for step in (0.01, -0.01)]
     above, below = (objective.run(end, 1, begin=5.0, span=10.0).innovations for end in ends)
     slope = (above - below) / 0.02
     assert deviations(0.2) == pytest.approx(np.hypot(deviations(0.0), 0.2 * slope), rel=0.02)
@@ -294,8 +294,8 @@ def test_a_power_of_drag_is_unusual_beyond_a_half_unless_predictions_are_as_exac
 ) -> None:
     of_heave = {axis: replace(one, ratio=R) for axis, one in fit.structure.items()}
     for power, is_far in ((-0.49, False), (0.51, True)):
-        one = replace(found(fit, power_of_drag=power), structure=of_heave)
-        some = [effect for effect in effects_of(one) if effect.kind == "power of drag"]
+        bent = replace(found(fit, power_of_drag=power), structure=of_heave)
+        some = [effect for effect in effects_of(bent) if effect.kind == "power of drag"]
         assert [effect.is_unusual for effect in some] == [is_far and R > 1.0] * 2
 
 

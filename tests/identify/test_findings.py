@@ -78,8 +78,8 @@ def disturbance(kind: str = "slow force", **changes: Any) -> Identification:
 def with_channels(*names: str) -> Identification:
     channels = tuple(Channel(QUANTITIES[name], Source(name), TIME, TIME) for name in names)
     vehicle = replace(BLUEROV, layout=replace(BLUEROV.layout, coupled=False))
-    one = replace(log("dive.csv"), channels=channels)
-    return quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)
+    dive = replace(log("dive.csv"), channels=channels)
+    return quiet(folder=replace(quiet().folder, logs=[dive]), vehicle=vehicle)
 
 
 def with_description(reason: str) -> Identification:
@@ -125,8 +125,8 @@ HEALTH = Structure("health", "l", 0.999, 0.5, (0.48, 0.52))
 LOST = Structure("momentary commands", "a.csv", 1.0, words=(("share", "30%"), ("axis", "yaw"), ("rate", "10")))
 
 
-def structured(one: Structure, **changes: Any) -> Identification:
-    return quiet(structures=(replace(one, **changes),))
+def structured(structure: Structure, **changes: Any) -> Identification:
+    return quiet(structures=(replace(structure, **changes),))
 
 
 CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
@@ -388,13 +388,13 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
 
 
 def test_the_main_prediction_is_that_of_a_position_over_10_s_with_the_largest_error_beside_its_noise() -> None:
-    one = prediction(SURGE, "distance", span=10.0, error=0.05)
-    noisy, whole = replace(one, error=0.08, noise=0.02), prediction(SURGE, "distance", error=2.0)
+    distance = prediction(SURGE, "distance", span=10.0, error=0.05)
+    noisy, whole = replace(distance, error=0.08, noise=0.02), prediction(SURGE, "distance", error=2.0)
     velocity = prediction(SURGE, "surge velocity", error=0.9)
-    (axis,) = surge(predictions=(velocity, replace(one, error=0.04), whole, one, noisy)).axes
-    assert axis.main is one
-    short = replace(one, time=TIME[:60], coverage=0.5)
-    (axis,) = surge(predictions=(whole, short, one)).axes
+    (axis,) = surge(predictions=(velocity, replace(distance, error=0.04), whole, distance, noisy)).axes
+    assert axis.main is distance
+    short = replace(distance, time=TIME[:60], coverage=0.5)
+    (axis,) = surge(predictions=(whole, short, distance)).axes
     assert coverage_of(axis.predictions) == pytest.approx((0.5 * 60 + 0.95 * 600) / 660)
     assert quiet().seconds == pytest.approx(2 * 60.0, rel=0.01)
 
@@ -403,9 +403,9 @@ def test_the_vehicle_has_the_ranges_of_its_tests() -> None:
     """They are those of commands, of the measured V_ss and of the depths, of which 0.5 % at each end do not count."""
     values = np.where(TIME > 59.8, 99.0, np.where(TIME < 0.1, 0.0, 1.0 + TIME / 6.0))
     depth, heading = (Channel(QUANTITIES[name], Source(name), TIME, values) for name in ("depth", "heading"))
-    one = replace(log("dive.csv"), channels=(depth, heading))
+    dive = replace(log("dive.csv"), channels=(depth, heading))
     vehicle = replace(quiet().vehicle, command_range=(0.2, 0.6))
-    found = told(quiet(folder=replace(quiet().folder, logs=[one]), vehicle=vehicle)).vehicle.layout.identified
+    found = told(quiet(folder=replace(quiet().folder, logs=[dive]), vehicle=vehicle)).vehicle.layout.identified
     assert found == (("command", 0.0, 0.6), ("u", 0.29, 0.51), ("z", 1.05, 10.9))
 
 

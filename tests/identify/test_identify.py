@@ -65,8 +65,8 @@ def check_answers(result: AxisResult, near: float, commands: tuple[float, ...] =
 def stop(result: AxisResult, V_ss: float) -> float:
     """Return the way from a velocity to a tenth of it without thrust, by the engine."""
     axis, at = result.axis, np.linspace(0.0, 60.0, 30_001)
-    place = {"surge": "x", "heave": "z", "yaw": "psi"}[axis.name]
-    v, x = simulate(TRUTH, at, {axis.velocity: abs(V_ss)}, [axis.velocity, place]).values[:, 0]
+    position = {"surge": "x", "heave": "z", "yaw": "psi"}[axis.name]
+    v, x = simulate(TRUTH, at, {axis.velocity: abs(V_ss)}, [axis.velocity, position]).values[:, 0]
     return float(np.interp(-0.1 * abs(V_ss), -v, x))
 
 
@@ -371,9 +371,9 @@ def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> N
         assert found.vehicle["n_V_top"] == USUAL_EXPONENT
         assert found.vehicle.layout.voltage_source == "Mean voltage of the logs"
         write_vehicle(found.vehicle, tmp_path / "own.toml")
-        written = load_vehicle(tmp_path / "own.toml")
-        assert written["V_0_top"] == pytest.approx(found.vehicle["V_0_top"], rel=1e-5)
-        assert written["V_0_top"] == pytest.approx(written.layout.voltage, abs=1e-3)
+        vehicle = load_vehicle(tmp_path / "own.toml")
+        assert vehicle["V_0_top"] == pytest.approx(found.vehicle["V_0_top"], rel=1e-5)
+        assert vehicle["V_0_top"] == pytest.approx(vehicle.layout.voltage, abs=1e-3)
     if key.startswith("slow_"):
         assert key.replace("_", " ") not in {one.kind for one in found.disturbances}
 

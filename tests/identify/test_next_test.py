@@ -20,7 +20,7 @@ from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 from tests.folders import HEAD, SPEED, read
-from tests.identify.conftest import SHORT, TRUTH, written
+from tests.identify.conftest import SHORT, TRUTH, with_logs
 from tests.recordings import run
 
 REST = 4.0
@@ -77,11 +77,11 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     assert test
     assert test.is_useful
     more = ((0.0, 2.0), *plan(test), (0.0, 2.0))
-    known, logs, rows = begin(written(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
+    known, logs, rows = begin(with_logs(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
     objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
-    places = [fit.posterior.table.place(p.kind, p.of, p.part) for p in objective.table.parameters]
+    indices = [fit.posterior.table.index(p.kind, p.of, p.part) for p in objective.table.parameters]
     z = np.array(
-        [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(places, objective.mean, strict=True)]
+        [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(indices, objective.mean, strict=True)]
     )
     _, information = total(objective, z, objective.data(z, objective.runs(z)))
     after = Posterior.of(objective.table, z, information)

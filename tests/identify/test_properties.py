@@ -11,7 +11,7 @@ from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests as Given
-from rov_fmu.identify.identified_vehicle import identified_vehicle, written
+from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.solve import ENOUGH, minimise
 from rov_fmu.identify.result import KEPT
@@ -31,7 +31,7 @@ def drawn(folder: Path, load: float, noise: float, seed: int) -> tuple[Fit, Vehi
     write_log(path, "a", run(truth, HEAVE, PLAN, 10.0).noisy(np.random.default_rng(seed), noise=noise))
     tests = load_tests(path)
     fit = fit_all(*begin(tests))
-    return fit, written(fit, identified_vehicle(tests, fit)[0], path), truth
+    return fit, vehicle_of_file(fit, identified_vehicle(tests, fit)[0], path), truth
 
 
 def least_without_evidence(fit: Fit) -> float:
@@ -40,15 +40,15 @@ def least_without_evidence(fit: Fit) -> float:
     keys = {
         p.key for n, p in enumerate(fit.file.posterior.table.parameters) if n in absent and p.of_kind.needs_evidence
     }
-    places = [n for n, p in enumerate(table.parameters) if p.key in keys]
-    assert all(fit.posterior.evidence(n) < KEPT for n in places)
-    return minimise(fit.objective.without(places), fit.best.z).value if places else fit.best.value
+    indices = [n for n, p in enumerate(table.parameters) if p.key in keys]
+    assert all(fit.posterior.evidence(n) < KEPT for n in indices)
+    return minimise(fit.objective.without(indices), fit.best.z).value if indices else fit.best.value
 
 
 @pytest.mark.parametrize("seed", range(2))
 def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
-    """J rises by 2 at most, to a tenth. `written` compares J of the numbers of the file with that of the fit, and a fit
-    from elsewhere is not better."""
+    """J rises by 2 at most, to a tenth. `vehicle_of_file` compares J of the numbers of the file with that of the fit,
+    and a fit from elsewhere is not better."""
     fit, vehicle, _ = drawn(tmp_path, 0.01, 0.02, seed)
     file, parameters = fit.file, fit.file.posterior.table.parameters
     assert file.posterior.absent
@@ -57,7 +57,7 @@ def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: 
         assert file.minimum.z[n] == parameters[n].null, parameters[n]
     assert minimise(file.objective, fit.best.z).value > file.minimum.value - 0.5
     with pytest.raises(RuntimeError, match="differs by"):
-        written(fit, vehicle.with_(a_d_w=1.1 * vehicle["a_d_w"]), tmp_path)
+        vehicle_of_file(fit, vehicle.with_(a_d_w=1.1 * vehicle["a_d_w"]), tmp_path)
 
 
 @pytest.mark.parametrize(
@@ -100,9 +100,9 @@ def test_less_data_of_an_axis_widen_its_answers_and_those_of_no_other_axis(
     log.write_text("\n".join(log.read_text(encoding="utf-8").splitlines()[:110]), encoding="utf-8")
     half = load_tests(folder)
     widths = []
-    for tests, one in ((short, fit), (half, fit_all(*begin(half)))):
-        vehicle = identified_vehicle(tests, one)[0]
-        answers = (assess.answers(one.posteriors, axis, vehicle, (0.3, 0.3)) for axis in (HEAVE, YAW))
+    for tests, of_tests in ((short, fit), (half, fit_all(*begin(half)))):
+        vehicle = identified_vehicle(tests, of_tests)[0]
+        answers = (assess.answers(of_tests.posteriors, axis, vehicle, (0.3, 0.3)) for axis in (HEAVE, YAW))
         ends = [[answer.steady[1] for answer in of if answer.command in (-0.3, 0.3, 0.5)] for of in answers]
         widths.append(np.diff(ends)[..., 0])
     ratios = widths[1] / widths[0]

@@ -58,17 +58,17 @@ def test_the_shipped_file_is_one_that_its_tests_allow(refit: Identification, tmp
     numbers = rf"{ranges}|, correlation = .*(?= }}$)|^# rov-fmu identify .*$|-?\d[\d.]*|^tool = .*$"
     made, shipped = (re.sub(numbers, "", p.read_text(encoding="utf-8"), flags=re.M) for p in (path, REFIT))
     assert made == shipped
-    one, other = load_vehicle(path), load_vehicle(REFIT)
-    for name, (low, high) in one.intervals.items():
+    own, other = load_vehicle(path), load_vehicle(REFIT)
+    for name, (low, high) in own.intervals.items():
         assert low <= other[name] <= high, name
     for result in refit.axes:
         for answer in result.answers:
             V, Tau = other.response(result.axis, answer.command)
             for number, (_, (low, high)) in ((V, answer.steady), (Tau, answer.rise)):
                 assert low <= number <= high, (result.axis.name, answer.command)
-    assert one.provenance
+    assert own.provenance
     assert other.provenance
-    assert one.provenance.inputs == other.provenance.inputs
+    assert own.provenance.inputs == other.provenance.inputs
     assert set(other.provenance.inputs) == {path.name for path in TESTS.iterdir()} - {"README.md"}
 
 

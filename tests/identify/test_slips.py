@@ -74,10 +74,10 @@ def slipped(recording: Measured, slip: Slip) -> Measured:
     return replace(recording, values=slip.value * recording.values, command=slip.command * recording.command)
 
 
-def write_folder(folder: Path, written: Sequence[Measured]) -> Path:
+def write_folder(folder: Path, recordings: Sequence[Measured]) -> Path:
     """Write a folder with logs of the VideoRay."""
     folder_of(folder, f'base = "videoray"\n{HEAD}', {})
-    for recording in written:
+    for recording in recordings:
         values = np.degrees(recording.values) if recording.quantity == "heading" else recording.values
         table = np.column_stack([recording.time, 100.0 * recording.command, values])
         header = f"time [s],command [%],{_COLUMN[recording.quantity]}"
@@ -183,9 +183,9 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
     tests = load_tests(folder_of(write_folder(tmp_path, recordings(SURGE)[:1]), KNOWN, FORCES))
     known, recorded, rows = begin(tests)
     objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
-    z, place = objective.mean.copy(), objective.table.place("inertia", "surge")
-    assert place is not None
-    z[place] = np.log(ratio * known.coefficients["beta_u"])
+    z, index = objective.mean.copy(), objective.table.index("inertia", "surge")
+    assert index is not None
+    z[index] = np.log(ratio * known.coefficients["beta_u"])
     tried: list[int] = []
 
     def customary(*found: Collection[Axis]) -> tuple[float, ...]:
@@ -226,9 +226,9 @@ def test_a_mirrored_column_of_a_dive_in_all_axes_is_the_only_one_named(column: s
     COMPLETE["pilot"].write(0, tmp_path)
     file = sorted(tmp_path.glob("*.csv"))[-1]
     header, *rows = (line.split(",") for line in file.read_text(encoding="utf-8").splitlines())
-    place = header.index(column)
+    index = header.index(column)
     for row in rows:
-        row[place] = str(-float(row[place])) if row[place] else ""
+        row[index] = str(-float(row[index])) if row[index] else ""
     file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
     quantity, _ = column.split(" [")
     (line,) = told(tmp_path)

@@ -50,8 +50,8 @@ def run_with(objective: Objective, values: Mapping[int, Array], deviation: float
     """Return a run through the dive whose states are next to nothing, but for some."""
     time = objective.records[0].time
     states = np.full((len(time), objective.filters[0].states), 1e-9)
-    for place, some in values.items():
-        states[:, place] = np.interp(time, TIME, some)
+    for index, some in values.items():
+        states[:, index] = np.interp(time, TIME, some)
     return replace(objective.runs(objective.mean)[0], states=states, deviations=np.full_like(states, deviation))
 
 
@@ -74,9 +74,9 @@ OTHER = 0.03 * np.random.default_rng(0).standard_normal(len(TIME))
 def cause(objective: Objective, values: Array, axis: Axis | None = SURGE, time_constant: float = 8.0) -> str:
     """Return what a slow process with these values follows."""
     states, slow = objective.filters[0].vehicle_states, SLOW["slow force" if axis else "slow gain"]
-    (place,) = objective.filters[0].places_of(slow.acts_as, axis.name if axis else "")
+    (index,) = objective.filters[0].indices_of(slow.acts_as, axis.name if axis else "")
     course = {states.index(name): some for name, some in (("x", NORTH), ("y", EAST), ("psi", HEADING))}
-    run = run_with(objective, {**course, place: centred(values) + OTHER})
+    run = run_with(objective, {**course, index: centred(values) + OTHER})
     return cause_of(objective, objective.mean, [run], replace(slow, time_constant=time_constant), axis)
 
 
@@ -111,10 +111,10 @@ def test_independent_values_are_those_of_the_whole_correlation() -> None:
 def test_every_slow_process_has_states_of_its_own(objective: Objective) -> None:
     """The dive has three axes; a process along another one has no state, and does not get those of a neighbour."""
     own, slow = objective.filters[0], [p for p in objective.table.parameters if p.of_kind.slow]
-    places = [place for p in slow for place in own.places_of(SLOW[p.kind].acts_as, p.of)]
+    indices = [index for p in slow for index in own.indices_of(SLOW[p.kind].acts_as, p.of)]
     assert {p.kind for p in slow} == {*SLOW}
-    assert len({*places}) == len(places) == 3 + 1 + 3
-    assert not own.places_of("force", "sway")
+    assert len({*indices}) == len(indices) == 3 + 1 + 3
+    assert not own.indices_of("force", "sway")
 
 
 def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -146,19 +146,19 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
         ("slow force", YAW): (0.0, 0.05 * VIDEORAY.force(YAW, 1.0), "N.m"),
     }
     for key, (size, usual, unit) in sizes.items():
-        one = found[key]
-        assert (one.value, one.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
-        assert (one.unit, one.since) == (unit, pytest.approx(30.0, abs=0.3) if size else None)
-        place = objective.table.place(one.kind, one.of)
-        assert place is not None
-        gone = np.where(np.arange(len(z)) == place, objective.low, z)
+        process = found[key]
+        assert (process.value, process.share) == pytest.approx((size, size / usual), rel=0.02, abs=1e-6), key
+        assert (process.unit, process.since) == (unit, pytest.approx(30.0, abs=0.3) if size else None)
+        index = objective.table.index(process.kind, process.of)
+        assert index is not None
+        gone = np.where(np.arange(len(z)) == index, objective.low, z)
         explained = [
             objective.value(other, objective.runs(other, runs)) - objective.prior(other) for other in (gone, z)
         ]
         before = explained[0] - explained[1] - 2.0 * np.log(1.0 / 0.3)
-        assert one.evidence <= before + 1e-6, "the other parameters are fitted again"
+        assert process.evidence <= before + 1e-6, "the other parameters are fitted again"
         if before <= KEPT:
-            assert one.evidence == pytest.approx(before), key
+            assert process.evidence == pytest.approx(before), key
 
 
 def test_a_slow_force_that_the_other_parameters_explain_as_well_is_none(tmp_path: Path) -> None:

@@ -44,11 +44,11 @@ def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) ->
     assert not sentences(other.findings, "idle voltage")
     for axis, beside in zip(found.axes, other.axes, strict=True):
         assert axis.verdict.word == beside.verdict.word
-        for one, two in zip(axis.answers, beside.answers, strict=True):
+        for answer, unlogged in zip(axis.answers, beside.answers, strict=True):
             for (value, (low, high)), (without, _) in zip(
-                (one.steady, one.rise, one.stop), (two.steady, two.rise, two.stop), strict=True
+                (answer.steady, answer.rise, answer.stop), (unlogged.steady, unlogged.rise, unlogged.stop), strict=True
             ):
-                assert abs(value - without) < 0.25 * 0.5 * abs(high - low), (one, two)
+                assert abs(value - without) < 0.25 * 0.5 * abs(high - low), (answer, unlogged)
 
 
 def test_a_voltage_that_acts_on_nothing_changes_no_answer(tmp_path: Path) -> None:

@@ -158,8 +158,8 @@ def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], No
     assert tests.logged == axes.split()
     (log,) = tests.folder.logs
     assert log.commands
-    places = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]
-    commands = log.commands.at(log.commands.rows)[:, places]
+    indices = [log.commands.thrusters.index(name) for name in ("X_ext", "Z_ext")]
+    commands = log.commands.at(log.commands.rows)[:, indices]
     assert commands == pytest.approx(np.column_stack([d.X, d.Z]) / [abs(d.X).max(), abs(d.Z).max()], abs=1e-6)
 
 

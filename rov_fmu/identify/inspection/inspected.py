@@ -35,7 +35,7 @@ class Inspected:
     notes: Sequence[str]
     """A sentence about the tables in the folder, and one for each reason why others are not read."""
     path: Path
-    """The place of rov.toml."""
+    """The path of rov.toml."""
     own: str
     """The text of rov.toml; empty without one."""
     text: str
@@ -74,9 +74,9 @@ class Inspected:
         by_name = {one.path.name: one.log for one in self.logs if one.log}
         joined = {files[0]: files for files in dives(self.logs)}
         logs = []
-        for one in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
-            parts = [by_name[name] for name in joined.get(one.file, ()) if by_name.get(name)]
-            logs.append(together(self.path.with_name(one.file), parts) if len(parts) > 1 else one)
+        for log in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
+            parts = [by_name[name] for name in joined.get(log.file, ()) if by_name.get(name)]
+            logs.append(together(self.path.with_name(log.file), parts) if len(parts) > 1 else log)
         return logs
 
     @property
@@ -115,8 +115,8 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     not TOML.
     """
     folder, files = folder_and_files(paths)
-    place = folder / ROV_FILE
-    described = read_description(place) if place.exists() else NO_ROV_FILE
+    path = folder / ROV_FILE
+    described = read_description(path) if path.exists() else NO_ROV_FILE
     is_described = bool(described.tables.base or described.tables.thruster or has_wrench(described.tables))
     layouts = [load_vehicle(file).layout for file in SHIPPED.values()]
     listing = Listing(folder, files) if files else list_files(folder)
@@ -138,18 +138,18 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     likely = likely_vehicle(inspections, headers.curves)
     name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
     text = draft(name, inspections, headers, replace(likely, base="") if described.tables.thruster else likely)
-    own = read_text(place, VehicleFileError).strip() if place.exists() else ""
+    own = read_text(path, VehicleFileError).strip() if path.exists() else ""
     has_vehicle = is_described or _has_form_of_paper(described, likely)
     lacks = lacking(own, text, has_vehicle=has_vehicle) if own else text
-    if lacks and place.exists():  # what is told is about the file that it will be
-        described = read_description(place, draft=Draft(completed(own, lacks), ""))
+    if lacks and path.exists():  # what is told is about the file that it will be
+        described = read_description(path, draft=Draft(completed(own, lacks), ""))
     notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
     inspected = Inspected(
         logs=inspections,
         warnings=[*sentences(warnings), *described.mistakes],
         notes=sentences(notes),
-        path=place,
+        path=path,
         own=own,
         text=lacks,
         description=described.description,

@@ -103,13 +103,13 @@ class Shapes:
             return inputs
         names, changed = [*layout.inputs], dict[int, Array]()
         for name, curve in layout.curve_of.items():
-            place = names.index(f"u_{name}")
-            changed[place] = self.commands(curve.name, inputs[..., place].T).T
+            index = names.index(f"u_{name}")
+            changed[index] = self.commands(curve.name, inputs[..., index].T).T
         sets = np.broadcast_shapes(*(some.shape[:-1] for some in changed.values()))
         rows = np.empty((*sets, *inputs.shape[-2:]))
         rows[...] = inputs
-        for place, commands in changed.items():
-            rows[..., place] = commands
+        for index, commands in changed.items():
+            rows[..., index] = commands
         return rows
 
     def forces(self, vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
@@ -361,8 +361,8 @@ def nearest_drag(axis: str, drag: Mapping[str, Any], power: Any, typical: float,
     force = ((a * speed * (speed / typical) ** power + b) * speed).T
     terms = np.stack(np.broadcast_arrays(v**2, v), axis=-1) / force[..., None]
     both = np.linalg.pinv(terms).sum(axis=-1).T  # least squares of terms @ values = 1
-    one, other = (terms.sum(axis=-2) / (terms**2).sum(axis=-2)).T  # each without the other one
-    alone = np.where(both[0] < both[1], [0.0 * one, other], [one, 0.0 * other])
+    first, second = (terms.sum(axis=-2) / (terms**2).sum(axis=-2)).T  # each without the other one
+    alone = np.where(both[0] < both[1], [0.0 * first, second], [first, 0.0 * second])
     values = np.where(both.min(axis=0) >= 0.0, both, alone)
     values = np.where(np.equal(power, 0.0), np.broadcast_arrays(a, b), values)
     misfit = (terms @ values.T[..., None])[..., 0].T - 1.0

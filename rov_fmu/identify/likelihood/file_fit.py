@@ -66,7 +66,7 @@ def _exact(objective: Objective, absent: frozenset[int], near: Minimum) -> Minim
 
 
 def _without_evidence(posterior: Posterior) -> frozenset[int]:
-    """Return the places of the effects that need evidence and have none, the least of them first."""
+    """Return the indices of the effects that need evidence and have none, the least of them first."""
     parameters = posterior.table.parameters
     while rest := [n for n, p in enumerate(parameters) if p.of_kind.needs_evidence and n not in posterior.absent]:
         least = min(rest, key=posterior.evidence)
@@ -77,7 +77,7 @@ def _without_evidence(posterior: Posterior) -> frozenset[int]:
 
 
 def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
-    """Yield the places of effects in the order in which they are left out, for a normal posterior after a rise of J."""
+    """Yield the indices of effects in the order in which they are left out, for a normal posterior after J rose."""
     may_go = {n for n, p in enumerate(posterior.table.parameters) if p.is_effect and not p.of_kind.is_of_structure}
     while rest := may_go - posterior.absent:
         rises = {n: _rise(posterior, n) for n in rest}
@@ -89,8 +89,8 @@ def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
         posterior = posterior.without(least)
 
 
-def _rise(posterior: Posterior, place: int) -> float:
+def _rise(posterior: Posterior, index: int) -> float:
     """Return by how much J rises if an effect is absent."""
-    null = posterior.table.parameters[place].null
+    null = posterior.table.parameters[index].null
     assert null is not None
-    return float((posterior.z[place] - null) ** 2 / max(posterior.covariance[place, place], 1e-300))
+    return float((posterior.z[index] - null) ** 2 / max(posterior.covariance[index, index], 1e-300))

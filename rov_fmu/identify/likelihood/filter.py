@@ -205,23 +205,23 @@ class Filter:
         self._libraries: dict[Path, tuple[Callable[..., None], list[int]]] = {}
         self.states, axes, sensors, self.variables, self.inputs, *_ = self._library(FILTER_FILE)[1]
         assert (axes, sensors) == (len(layout.axes), MOST_SENSORS)
-        self._places = layout.places
+        self._indices = layout.places
         self._records: dict[tuple[Record, tuple[bool, ...]], tuple[_Record, list[object]]] = {}
-        self._where = np.array(_where(layout, self._places), np.intc)
+        self._where = np.array(_where(layout, self._indices), np.intc)
         self.vehicle_states = [*layout.state]
         first = len(self.vehicle_states) + MOST_SENSORS  # after what the sensors with a lag measure
         self.force, self.short = first, first + axes
         self.gain, self.drift = self.short + axes, self.short + axes + 1
         self.noise = self.drift + len(DRIFTS)
-        """The places of the slow processes among the states of the filter."""
+        """The indices of the slow processes among the states of the filter."""
 
-    def places_of(self, slow: Action, axis: str) -> list[int]:
-        """Return the places of a slow process among the states of the filter; none where the vehicle lacks its axis.
+    def indices_of(self, slow: Action, axis: str) -> list[int]:
+        """Return the indices of a slow process among the states of the filter; none where the vehicle lacks its axis.
 
         A velocity along no axis is the horizontal one.
         """
         if slow == "force":
-            return [place for place, form in enumerate(self.layout.axes, self.force) if form.axis.name == axis]
+            return [index for index, form in enumerate(self.layout.axes, self.force) if form.axis.name == axis]
         if slow == "gain":
             return [self.gain]
         return [self.drift + 2] if axis == HEAVE.name else [self.drift, self.drift + 1]
@@ -295,28 +295,28 @@ class Filter:
         aligned = ctypes.c_void_p(-(-memory.ctypes.data // 64) * 64)
         where = ctypes.c_void_p(self._where.ctypes.data)
         for first in range(0, len(runs), lanes):
-            places = [min(first + lane, len(runs) - 1) for lane in range(lanes)]
+            indices = [min(first + lane, len(runs) - 1) for lane in range(lanes)]
             results = [
-                (one.innovations, one.variances, one.pieces, one.gains, one.states, one.deviations)
-                for one in (runs[k] for k in places)
+                (run.innovations, run.variances, run.pieces, run.gains, run.states, run.deviations)
+                for run in (runs[k] for k in indices)
             ]
             given = (_Set * lanes)(
-                *(_Set(*(array.ctypes.data + k * array.strides[0] for array in (numbers, inputs))) for k in places)
+                *(_Set(*(array.ctypes.data + k * array.strides[0] for array in (numbers, inputs))) for k in indices)
             )
             outputs = (_Output * lanes)(
                 *(_Output(*(array.ctypes.data if array.size else None for array in own)) for own in results)
             )
             diverged = (ctypes.c_int * lanes)()
             run(where, ctypes.byref(log), given, ctypes.byref(mode), outputs, diverged, aligned)
-            failed |= {k for k, has_diverged in zip(places, diverged, strict=True) if has_diverged}
+            failed |= {k for k, has_diverged in zip(indices, diverged, strict=True) if has_diverged}
         return failed
 
     def _numbers(self, parameters: Parameters) -> Array:
         """Return the struct `parameters` of filter.c for each set, as a row of an array."""
         at: list[Number] = [0.0] * self.variables
         for name, value in parameters.coefficients.items():
-            if name in self._places:
-                at[self._places[name]] = value
+            if name in self._indices:
+                at[self._indices[name]] = value
         rest = MOST_SENSORS - len(parameters.noise)
         slow = [*parameters.slow, *[Slow()] * rest]
         levers = [*parameters.levers, *[AT_ORIGIN] * (MOST_SENSORS - len(parameters.levers))]
@@ -384,15 +384,15 @@ class Filter:
         return _Record(*sizes, *pointers[0], *tilts, *pointers[1], lines, *self._steps), kept
 
     def _kind(self, sensor: Sensor) -> tuple[int, int]:
-        """Return the kind and the place of a sensor, as filter.c wants them."""
+        """Return the kind and the index of a sensor, as filter.c wants them."""
         axis = sensor.axis
         if sensor.is_velocity:
             through_water = axis.is_rotation or not sensor.over_ground
-            return (STATE, self._places[axis.velocity]) if through_water else (OVER_GROUND, axis.place)
+            return (STATE, self._indices[axis.velocity]) if through_water else (OVER_GROUND, axis.place)
         if axis.is_rotation:
             state = "psi" if axis is YAW else ""
-            return (STATE, self._places[state]) if state in self.vehicle_states else (ANGLE, axis.place)
-        return STATE, self._places[DRIFTS[axis.place]]
+            return (STATE, self._indices[state]) if state in self.vehicle_states else (ANGLE, axis.place)
+        return STATE, self._indices[DRIFTS[axis.place]]
 
 
 def _inputs(record: Record, parameters: Parameters) -> Array:
@@ -401,23 +401,23 @@ def _inputs(record: Record, parameters: Parameters) -> Array:
     return np.broadcast_to(found, (parameters.count, *record.inputs.shape))
 
 
-def _where(layout: Layout, places: Mapping[str, int]) -> Sequence[int]:
+def _where(layout: Layout, indices: Mapping[str, int]) -> Sequence[int]:
     """Return the struct `places` of filter.c."""
 
     def of(names: Sequence[str], among: Mapping[str, object]) -> list[int]:
-        return [places[name] if name in among else -1 for name in names]
+        return [indices[name] if name in among else -1 for name in names]
 
     axes = layout.bare_axes
     drags = [[form.coefficient(key) for key in ("a_d", f"a_d{REVERSE}")] for form in layout.axes]
     return [
         *of([axis.external for axis in axes], layout.inputs),
-        *(max(place, 0) for column in zip(*drags, strict=True) for place in of(column, places)),
+        *(max(index, 0) for column in zip(*drags, strict=True) for index in of(column, indices)),
         *(-1 if axis.is_rotation else axis.place for axis in axes),
         *(axis.place if axis.is_rotation else -1 for axis in axes),
         *of(_CURRENT, layout.inputs),
         *of(DRIFTS, layout.state),
         *of([QUATERNION[0], "psi"], layout.state),
         *of([layout.by_name[HEAVE.name].name_of("F_0") if layout.has(HEAVE) else ""], layout.coefficients),
-        min((places[name] for name in layout.health.values()), default=0),
+        min((indices[name] for name in layout.health.values()), default=0),
         len(layout.health),
     ]

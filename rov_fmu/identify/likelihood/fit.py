@@ -93,9 +93,9 @@ class Fit:
     def command_range(self) -> tuple[float, float]:
         """The weakest and the strongest command of the tests that the thrusters follow."""
         used = [abs(row.command) for row in self.objective.rows]
-        for one in self.objective.logs:
-            assert one.log.commands
-            used += np.abs(one.log.commands.value).tolist()
+        for sampled in self.objective.logs:
+            assert sampled.log.commands
+            used += np.abs(sampled.log.commands.value).tolist()
         used = [round(min(c, self.most_followed), 6) for c in used if c > 1e-3]
         low, high = min(used, default=0.0), max(used, default=1.0)
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
@@ -144,9 +144,9 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = [
-        abs(ends[-1].z[place] - ends[0].z[place]) / max(posterior.errors[n], _SAME * full.deviation[n])
+        abs(ends[-1].z[index] - ends[0].z[index]) / max(posterior.errors[n], _SAME * full.deviation[n])
         for n in posterior.of_vehicle
-        if (place := table.place(*full.table.parameters[n].key)) is not None
+        if (index := table.index(*full.table.parameters[n].key)) is not None
     ]
     if max(apart, default=0.0) < 2.0 or adopted:  # other vehicles had the wrong structure
         difference = 0.0

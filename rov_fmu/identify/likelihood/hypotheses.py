@@ -119,26 +119,26 @@ def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Lo
     """Return the logs without the commands that do not act."""
     times = dict(zip(variant.of, variant.acting, strict=True))
 
-    def acting(one: SampledLog) -> SampledLog:
-        begin, end = times.get(one.log.file, (-inf, inf))
-        acts = (one.record.told >= begin) & (one.record.told < end)
-        return one.with_inputs(np.where(acts[:, None], one.record.inputs, 0.0))
+    def acting(sampled: SampledLog) -> SampledLog:
+        begin, end = times.get(sampled.log.file, (-inf, inf))
+        acts = (sampled.record.told >= begin) & (sampled.record.told < end)
+        return sampled.with_inputs(np.where(acts[:, None], sampled.record.inputs, 0.0))
 
     return known, [acting(one) for one in logs]
 
 
-def _permuted(places: Callable[[Of], tuple[Of, float]]) -> Change:
+def _permuted(permutation: Callable[[Of], tuple[Of, float]]) -> Change:
     """Return the change of the commands of some thrusters to those of others, with a sign."""
 
     def change(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-        others, sign = places(variant.of)
+        others, sign = permutation(variant.of)
         found = []
-        for one in logs:
-            inputs, names = one.record.inputs.copy(), [*one.layout.inputs]
+        for sampled in logs:
+            inputs, names = sampled.record.inputs.copy(), [*sampled.layout.inputs]
             for thruster, other in zip(variant.of, others, strict=True):
                 if {f"u_{thruster}", f"u_{other}"} <= {*names}:
-                    inputs[:, names.index(f"u_{thruster}")] = sign * one.record.inputs[:, names.index(f"u_{other}")]
-            found.append(one.with_inputs(inputs))
+                    inputs[:, names.index(f"u_{thruster}")] = sign * sampled.record.inputs[:, names.index(f"u_{other}")]
+            found.append(sampled.with_inputs(inputs))
         return known, found
 
     return change
@@ -162,15 +162,15 @@ def _slewing(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
 # ---- What may have them ----------------------------------------------------------------------------------------------
 
 
-def commands_of(one: SampledLog) -> dict[str, Array]:
+def commands_of(sampled: SampledLog) -> dict[str, Array]:
     """Return the commands of a dive's thrusters, by their names, in each row.
 
     It is empty for a log of one axis, whose thrusters all follow one command: no contrast tells them apart.
     """
-    if one.log.follows_axis:
+    if sampled.log.follows_axis:
         return {}
-    names = [*one.layout.inputs]
-    return {t.name: one.record.inputs[:, names.index(f"u_{t.name}")] for t in one.layout.thrusters}
+    names = [*sampled.layout.inputs]
+    return {t.name: sampled.record.inputs[:, names.index(f"u_{t.name}")] for t in sampled.layout.thrusters}
 
 
 def _momentary_files(_: Prior, logs: Logs) -> Iterator[Of]:
@@ -448,8 +448,8 @@ class Model:
         They change it in the order of HYPOTHESES: lines between momentary commands follow from those that act.
         """
         known, logs = self.known, self.logs
-        for one in in_order(variants):
-            known, logs = HYPOTHESES[one.kind].change(known, logs, one)
+        for variant in in_order(variants):
+            known, logs = HYPOTHESES[variant.kind].change(known, logs, variant)
         return replace(self, known=known, logs=logs)
 
 
@@ -457,7 +457,7 @@ def contrasts(model: Model, at: Mapping[tuple[str, str, str], float]) -> dict[st
     """Return the standard error of the health of each thruster by the data alone.
 
     Noise and slow processes have their usual sizes, because a fit that lacks a fault explains it by noise. The priors
-    of the motion are so wide that they tell nothing. `at` is a place near the fit. A thruster that no log commands, and
+    of the motion are so wide that they tell nothing. `at` is a point near the fit. A thruster that no log commands, and
     a commanded force along an axis of the body, are not among the result. Raises DivergedError.
     """
     known, names = model.known, [of[0] for of in _ill(model.known, model.logs)]
@@ -472,13 +472,13 @@ def contrasts(model: Model, at: Mapping[tuple[str, str, str], float]) -> dict[st
     z[[*of.values()]] = _WEAK
     z = np.clip(z, objective.low, objective.high)
     tells = np.diag(1.0 / (_WIDER * objective.deviation) ** 2)
-    for one in objective.data(z, objective.runs(z), exact=False):
-        A = one.slopes / np.sqrt(one.variances)[:, None]
-        tells[np.ix_(one.places, one.places)] += A.T @ A
+    for data in objective.data(z, objective.runs(z), exact=False):
+        A = data.slopes / np.sqrt(data.variances)[:, None]
+        tells[np.ix_(data.indices, data.indices)] += A.T @ A
     moves = [n for n, p in enumerate(parameters) if p.of_motion and p.low != p.high and n not in of.values()]
     found = {}
-    for name, place in of.items():
-        some = [*moves, place]
+    for name, index in of.items():
+        some = [*moves, index]
         scale = np.sqrt(np.diag(tells)[some])
         inverse = np.linalg.pinv(tells[np.ix_(some, some)] / np.outer(scale, scale), rcond=_ROUNDING, hermitian=True)
         found[name] = float(np.sqrt(inverse[-1, -1]) / scale[-1])

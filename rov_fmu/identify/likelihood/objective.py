@@ -86,17 +86,17 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
     A measured time constant contains the lag of the thrusters. `least_lag` is the lag of a vehicle without one.
     """
     found: dict[int, Array] = {}
-    for subject, places in grouped((row.subject, n) for n, row in enumerate(rows)).items():
-        commands = np.array([rows[n].command for n in places])
+    for subject, indices in grouped((row.subject, n) for n, row in enumerate(rows)).items():
+        commands = np.array([rows[n].command for n in indices])
         if isinstance(subject, Curve):
-            found |= zip(places, shapes.forces(vehicle, subject, commands), strict=True)
+            found |= zip(indices, shapes.forces(vehicle, subject, commands), strict=True)
             continue
         motions = shapes.motions(vehicle, subject, commands)
         V_ss, Tau = motions.response()
         curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(subject)}
         lags = [vehicle[curve.coefficient("T")] - least_lag for curve in curves if curve.has_lag]
         lag = np.broadcast_to(np.max(lags, axis=0) if lags else 0.0, Tau.shape)
-        if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in places):
+        if np.any(lag > 0.0) and any(rows[n].quantity == "Tau" for n in indices):
             load = shapes.motions(vehicle, subject, np.zeros(1)).of["C"]
             linear: Array | float = 1.0
             if rotors := [curve for curve in curves if curve.has_rotors]:  # F(n/2) = a n²/4 + b n/2
@@ -104,7 +104,7 @@ def modelled(rows: Sequence[TableRow], vehicle: Vehicle, shapes: Shapes, least_l
                 linear = 4.0 * (half - load) / (motions.of["C"] - load) - 1.0
             lagged = measured_time_constant(motions, load, np.maximum(lag, _LEAST_DELAY), linear)
             Tau = np.where(lag > 0.0, lagged, Tau)
-        for n, *pair in zip(places, V_ss, Tau, strict=True):
+        for n, *pair in zip(indices, V_ss, Tau, strict=True):
             found[n] = pair[rows[n].quantity == "Tau"]
     return np.array([found[n] for n in range(len(rows))])
 
@@ -122,16 +122,16 @@ class Data:
     """n x k: the derivatives of the innovations."""
     log_slopes: Array
     """n x k: the derivatives of log S."""
-    places: Sequence[int]
+    indices: Sequence[int]
     """k: the parameters."""
     parameters: int
     """p."""
 
     @classmethod
-    def of(cls, run: Run, places: Sequence[int], parameters: int) -> "Data":
+    def of(cls, run: Run, indices: Sequence[int], parameters: int) -> "Data":
         """Return the innovations of a run, with derivatives of 0."""
-        empty = np.zeros((len(run.innovations), len(places)))
-        return cls(run.innovations, run.variances, empty, empty.copy(), places, parameters)
+        empty = np.zeros((len(run.innovations), len(indices)))
+        return cls(run.innovations, run.variances, empty, empty.copy(), indices, parameters)
 
     def part(self, chosen: Sequence[int]) -> "Data":
         """Return some of the samples."""
@@ -140,7 +140,7 @@ class Data:
 
     def leading(self, scale: Array) -> int | None:
         """Return the parameter that changes most along a direction (p numbers); None if none of these data does."""
-        most = max(self.places, key=lambda k: abs(scale[k]), default=None)
+        most = max(self.indices, key=lambda k: abs(scale[k]), default=None)
         return most if most is not None and scale[most] else None
 
     def separate(self, scale: Array) -> None:
@@ -148,7 +148,7 @@ class Data:
         leading = self.leading(scale)
         if leading is None:
             return
-        column, share = self.places.index(leading), scale[[*self.places]] / scale[leading]
+        column, share = self.indices.index(leading), scale[[*self.indices]] / scale[leading]
         share[column] = 0.0
         for slopes in (self.slopes, self.log_slopes):
             slopes[:, column] -= slopes @ share
@@ -164,8 +164,8 @@ class Data:
         A = self.slopes[chosen] / np.sqrt(self.variances[chosen])[:, None]
         B = self.log_slopes[chosen]
         gradient, information = np.zeros(self.parameters), np.zeros((self.parameters, self.parameters))
-        gradient[self.places] = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
-        information[np.ix_(self.places, self.places)] = 2.0 * (A.T * weight) @ A + B.T @ B
+        gradient[self.indices] = 2.0 * A.T @ (weight * u) + B.T @ (1.0 - weight * u * u)
+        information[np.ix_(self.indices, self.indices)] = 2.0 * (A.T * weight) @ A + B.T @ B
         return gradient, information
 
 
@@ -182,12 +182,12 @@ def changed(z: Array, moves: Sequence[tuple[int, float]]) -> Array:
     return found
 
 
-def derivatives(function: Callable[[Array], Array], z: Array, places: Sequence[int], steps: Array) -> Array:
+def derivatives(function: Callable[[Array], Array], z: Array, indices: Sequence[int], steps: Array) -> Array:
     """Return the derivatives of m numbers with respect to k of the coordinates, by steps to both sides: m x k.
 
     The function returns m x n numbers for p x n coordinates.
     """
-    moves = [(k, sign * step) for k, step in zip(places, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
+    moves = [(k, sign * step) for k, step in zip(indices, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
     found = function(changed(z, moves))
     return np.asarray((found[:, ::2] - found[:, 1::2]) / (2.0 * steps))
 
@@ -239,13 +239,13 @@ class Objective:
         found = copy(self)
         found.logs, found.records = [self.logs[n] for n in part.logs], [self.records[n] for n in part.logs]
         found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
-        chosen = {place: part.chosen[n] for place, n in enumerate(part.logs) if n in part.chosen}
+        chosen = {index: part.chosen[n] for index, n in enumerate(part.logs) if n in part.chosen}
         found.whole = Part(range(len(part.logs)), range(len(part.rows)), chosen)
         found.__dict__.pop("_of_rows", None)
         return found
 
     def without(self, absent: Iterable[int]) -> "Objective":
-        """Return J where some effects are absent, by their places: their bounds are where they are absent."""
+        """Return J where some effects are absent, by their indices: their bounds are where they are absent."""
         found = copy(self)
         found.low, found.high = self.low.copy(), self.high.copy()
         for n in absent:
@@ -277,7 +277,7 @@ class Objective:
         return {axis: (largest(-v), largest(v)) for axis, v in measured.items()}
 
     def changes(
-        self, z: Array, n: int, places: Sequence[int], steps: Array, run: Run, begin: float, span: float
+        self, z: Array, n: int, indices: Sequence[int], steps: Array, run: Run, begin: float, span: float
     ) -> Array:
         """Return the derivatives of the predictions of a log with respect to some parameters, by steps to both sides.
 
@@ -295,15 +295,16 @@ class Objective:
                 raise DivergedError
             return np.reshape(ends, (len(ends), len(run.innovations))).T
 
-        return derivatives(innovations, z, places, steps)
+        return derivatives(innovations, z, indices, steps)
 
     def concerns(self, parameter: Parameter, number: int) -> bool:
         """Return False where a parameter certainly does not change what is predicted of a log."""
-        one = self.logs[number]
+        sampled = self.logs[number]
         if parameter.log is not None:
-            return parameter.of == one.log.file
-        quantities = {m.channel.quantity.name for m in one.measured}
-        names = {"", HORIZONTAL, *one.layout.by_name, *one.layout.curves_by_name, *one.layout.curve_of, *quantities}
+            return parameter.of == sampled.log.file
+        quantities = {m.channel.quantity.name for m in sampled.measured}
+        layout = sampled.layout
+        names = {"", HORIZONTAL, *layout.by_name, *layout.curves_by_name, *layout.curve_of, *quantities}
         return parameter.of in names and parameter.low != parameter.high
 
     # ---- All data ----
@@ -356,14 +357,14 @@ class Objective:
             (n, some[at : at + _TOGETHER]) for n, some in enumerate(of_log) for at in range(0, len(some), _TOGETHER)
         ]
 
-        def run(n: int, places: Sequence[int]) -> list[Run | None]:
-            parameters = self.table.of_log(z[:, places], self.logs[n])
+        def run(n: int, indices: Sequence[int]) -> list[Run | None]:
+            parameters = self.table.of_log(z[:, indices], self.logs[n])
             return self.filters[n].run_many(self.records[n], parameters, earlier[n], frozen=False)
 
         runs: list[list[Run | None]] = [[] for _ in parts]
-        for (_, places), found in zip(jobs, in_threads([partial(run, *job) for job in jobs]), strict=True):
-            for k, one in zip(places, found, strict=True):
-                runs[k].append(one)
+        for (_, indices), found in zip(jobs, in_threads([partial(run, *job) for job in jobs]), strict=True):
+            for k, of_set in zip(indices, found, strict=True):
+                runs[k].append(of_set)
         off, S = self.row_values(z) if self.rows else (np.zeros((0, 0)), np.zeros((0, 0)))
         trials = []
         for k, part in enumerate(parts):
@@ -395,10 +396,10 @@ class Objective:
         parameters, scale = self.table.parameters, self.table.scale_of_forces(z)
         found, work = [], list[Callable[[], None]]()
         for n, run in enumerate(runs):
-            places = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
-            found.append(Data.of(run, places, len(z)))
+            indices = [k for k, parameter in enumerate(parameters) if self.concerns(parameter, n)]
+            found.append(Data.of(run, indices, len(z)))
             columns = []
-            for column, k in enumerate(places):
+            for column, k in enumerate(indices):
                 if parameters[k].of_motion or not of_noise:
                     columns.append(column)
                 else:
@@ -408,8 +409,8 @@ class Objective:
                 some = columns[first : first + _TOGETHER]
                 work.append(partial(self.differentiate, z, n, some, run, found[n], scale, exact=exact))
         in_threads(work)
-        for one in found:
-            one.separate(scale)
+        for data in found:
+            data.separate(scale)
         if self.rows:
             found.append(self._rows_data(z))
         return found
@@ -430,8 +431,8 @@ class Objective:
         The filter runs with the changes of all these parameters at once. Exact derivatives are differences to both
         sides. Those of the leading parameter of a common scale are with respect to this scale.
         """
-        parameters = [self.table.parameters[into.places[column]] for column in columns]
-        moves = [(into.places[column], own.step) for column, own in zip(columns, parameters, strict=True)]
+        parameters = [self.table.parameters[into.indices[column]] for column in columns]
+        moves = [(into.indices[column], own.step) for column, own in zip(columns, parameters, strict=True)]
         if exact:
             moves += [(k, -step) for k, step in moves if z[k] - step >= self.table.parameters[k].low]
         moved, leading = changed(z, moves), into.leading(scale)
@@ -441,7 +442,7 @@ class Objective:
         sets = self.table.of_log(moved, self.logs[n])
         runs = dict(zip(moves, self.filters[n].run_many(self.records[n], sets, run, frozen=False), strict=True))
         for column, own in zip(columns, parameters, strict=True):
-            k = into.places[column]
+            k = into.indices[column]
             above, below = runs[k, own.step], runs.get((k, -own.step), run)
             if above is None or below is None:
                 raise DivergedError
@@ -451,20 +452,20 @@ class Objective:
                 into.log_slopes[:, column] = np.log(above.variances / below.variances) / width
 
     def _rows_data(self, z: Array) -> Data:
-        places, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
+        indices, steps = self._of_rows, np.array([self.table.parameters[k].step for k in self._of_rows])
         off, variances = self.row_values(z)
         inside = z.copy()  # a lag at its bound is absent, and a shorter one changes nothing
-        inside[places] = np.maximum(z[places], self.low[places] + steps)
-        of_motion = derivatives(lambda sets: self.row_values(sets)[0], inside, places, steps)
+        inside[indices] = np.maximum(z[indices], self.low[indices] + steps)
+        of_motion = derivatives(lambda sets: self.row_values(sets)[0], inside, indices, steps)
         own = {row.noise for row in self.rows}
         noises = {k: p.of for k, p in enumerate(self.table.parameters) if p.of in own}
         of_noise = np.array([[2.0 * (row.noise == name) for name in noises.values()] for row in self.rows])
         slopes = np.hstack([of_motion, np.zeros_like(of_noise)])
-        log_slopes = np.hstack([np.zeros((len(off), len(places))), of_noise])
-        return Data(off, variances, slopes, log_slopes, [*places, *noises], len(z))
+        log_slopes = np.hstack([np.zeros((len(off), len(indices))), of_noise])
+        return Data(off, variances, slopes, log_slopes, [*indices, *noises], len(z))
 
     @cached_property
     def _of_rows(self) -> list[int]:
-        """The places of the parameters of the motion that change the values of rows."""
+        """The indices of the parameters of the motion that change the values of rows."""
         layout, rows = self.table.layout, {(row.subject, row.quantity): row for row in self.rows}.values()
         return [k for k, p in enumerate(self.table.parameters) if any(row.depends_on(p, layout) for row in rows)]

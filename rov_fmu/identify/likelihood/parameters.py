@@ -134,12 +134,12 @@ class Table:
         from_null = z - np.array([p.null or 0.0 for p in self.parameters])
         return np.where(self.each("is_log"), power, power * from_null)
 
-    def place(self, kind: str, of: str = "", part: str = "") -> int | None:
+    def index(self, kind: str, of: str = "", part: str = "") -> int | None:
         """Return the index of a parameter, or None."""
-        return self._places.get((kind, of, part))
+        return self._indices.get((kind, of, part))
 
     @cached_property
-    def _places(self) -> dict[tuple[str, str, str], int]:
+    def _indices(self) -> dict[tuple[str, str, str], int]:
         return {p.key: n for n, p in enumerate(self.parameters)}
 
     # The coordinates of p parameters are an array of p numbers, or of p x n for n sets of parameters. All that follows
@@ -147,8 +147,8 @@ class Table:
 
     def get(self, z: Array, kind: str, of: str = "", part: str = "", default: Any = 0.0) -> Any:
         """Return the number that a coordinate stands for, or a default where there is no such parameter."""
-        place = self.place(kind, of, part)
-        return default if place is None else self.parameters[place].number(z[place])
+        index = self.index(kind, of, part)
+        return default if index is None else self.parameters[index].number(z[index])
 
     def coefficients(self, z: Array) -> dict[str, Any]:
         """Return all coefficients of the layout for the coordinates of the parameters."""
@@ -221,7 +221,7 @@ class Table:
     def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
         deviations, bands = {}, {}
         for curve in self.layout.curves:
-            if (first := self.place("thrust shape", curve.name, "1")) is not None:
+            if (first := self.index("thrust shape", curve.name, "1")) is not None:
                 deviations[curve.name] = self.shape_deviation * z[first : first + COUNT]
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
@@ -264,18 +264,18 @@ class Table:
 
     def of_vehicle(self, vehicle: Vehicle) -> "Table":
         """Return a table whose coefficients are those of a vehicle. An effect that the vehicle lacks is absent."""
-        values, places = dict(vehicle.with_(self.layout).coefficients), self.layout.keys_in_file
+        values, keys_in_file = dict(vehicle.with_(self.layout).coefficients), self.layout.keys_in_file
         parts = {keys[:-1] for keys in vehicle.layout.keys_in_file.values()}
-        names = {keys: name for name, keys in places.items()}
-        for name, (*part, key) in places.items():  # a coefficient astern stands after that ahead
+        names = {keys: name for name, keys in keys_in_file.items()}
+        for name, (*part, key) in keys_in_file.items():  # a coefficient astern stands after that ahead
             ahead = values.get(names.get((*part, key.removesuffix(REVERSE)), ""))
             if name not in values and tuple(part) in parts and (value := ABSENT.get(key, ahead)) is not None:
                 values[name] = value
         return replace(self, base={**self.base, **values}, exact=frozenset(values), shape_deviation=0.0)
 
-    def of_log(self, z: Array, one: SampledLog) -> Parameters:
+    def of_log(self, z: Array, sampled: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
-        file, layout = one.log.file, one.layout
+        file, layout = sampled.log.file, sampled.layout
         coefficients = self.coefficients(z)
         shapes = self._shapes(z, coefficients)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
@@ -291,10 +291,10 @@ class Table:
             return Slow(unit * self.get(z, kind, of), process.time_constant)
 
         along = Slow()
-        if one.has_positions or one.has_velocities:
-            along = slow(WANDER if one.record.wanders else "slow velocity", HORIZONTAL)
-        down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in one.record.sensors) else Slow()
-        noises = [self.noise(z, m.channel.quantity.name) for m in one.measured]
+        if sampled.has_positions or sampled.has_velocities:
+            along = slow(WANDER if sampled.record.wanders else "slow velocity", HORIZONTAL)
+        down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in sampled.record.sensors) else Slow()
+        noises = [self.noise(z, m.channel.quantity.name) for m in sampled.measured]
         powers = [self.powers(z, axis) for axis in axes]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         is_inside = HEAVE.name in layout.by_name
@@ -302,20 +302,20 @@ class Table:
             coefficients=coefficients,
             forces=tuple(slow("slow force", a.name, units[a.name]) for a in axes),
             units=units,
-            short=tuple(Slow(units[a.name] * self.get(z, "short force", a.name), 0.5 * one.interval) for a in axes)
-            if one.is_momentary
+            short=tuple(Slow(units[a.name] * self.get(z, "short force", a.name), 0.5 * sampled.interval) for a in axes)
+            if sampled.is_momentary
             else (),
             gain=slow("slow gain"),
             drifts=(along, along, down if is_inside else Slow()),
             white=tuple(white for white, _, _ in noises),
             noise=tuple(Slow(coloured, time) for _, coloured, time in noises),
-            lags=tuple(self._lag(z, m.sensor) for m in one.measured),
-            levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in one.measured),
+            lags=tuple(self._lag(z, m.sensor) for m in sampled.measured),
+            levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in sampled.measured),
             turn=self.get(z, TURN),
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
             width=self.get(z, WIDTH, file),
             powers=tuple(powers),
-            inputs=shapes.inputs(layout, self.followed(z, one)),
+            inputs=shapes.inputs(layout, self.followed(z, sampled)),
             count=1 if z.ndim == 1 else z.shape[1],
         )
 
@@ -325,10 +325,10 @@ class Table:
         coloured = white * self.get(z, "coloured noise", quantity)
         return white, coloured, self.get(z, "correlation time", quantity, default=1.0)
 
-    def wander(self, z: Array, one: SampledLog, sensor: Sensor) -> Any:
+    def wander(self, z: Array, sampled: SampledLog, sensor: Sensor) -> Any:
         """Return the standard deviation of what wanders of a sensor's values in a log; 0 unless it is an estimator's
         velocity."""
-        return self.get(z, WANDER, HORIZONTAL) if one.record.wanders and sensor.is_horizontal_velocity else 0.0
+        return self.get(z, WANDER, HORIZONTAL) if sampled.record.wanders and sensor.is_horizontal_velocity else 0.0
 
     def row_noise(self, z: Array, name: str) -> Any:
         """Return the relative noise of the rows of a table."""
@@ -337,7 +337,7 @@ class Table:
     @property
     def least_lag(self) -> float:
         """The lag of a vehicle without one, s: the least one if there is a parameter, and otherwise 0."""
-        return 0.0 if self.place(LAG) is None else LEAST_LAG
+        return 0.0 if self.index(LAG) is None else LEAST_LAG
 
     def limit(self, z: Array) -> Any:
         """Return the strongest command that the thrusters follow; inf if there is no limit."""
@@ -350,42 +350,42 @@ class Table:
         """
         larger = z.copy()
         for n, p in enumerate(self.parameters):
-            band = self.place("dead band", p.of)
+            band = self.index("dead band", p.of)
             if p.kind == "linear thrust" and p.low < p.high and band is not None:
                 d = self.parameters[band].deviation
                 larger[n], larger[band] = z[n] + 2.0 * d, z[band] + d
         return larger
 
-    def followed(self, z: Array, one: SampledLog) -> Array:
+    def followed(self, z: Array, sampled: SampledLog) -> Array:
         """Return the inputs that thrusters follow, by limits and a drop of the voltage: (sets x) rows x inputs."""
         numbers = np.broadcast(self.limit(z), self.get(z, "slew limit"), self.get(z, "voltage drop"))
-        some = [_followed(one, *map(float, each)) for each in numbers]
-        return np.reshape(some, (*np.shape(z)[1:], *one.record.inputs.shape)) if len(some) > 1 else some[0]
+        some = [_followed(sampled, *map(float, each)) for each in numbers]
+        return np.reshape(some, (*np.shape(z)[1:], *sampled.record.inputs.shape)) if len(some) > 1 else some[0]
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
-        place = self.place("sensor lag", "", with_same_lag(sensor))
-        return None if place is None else z[place]
+        index = self.index("sensor lag", "", with_same_lag(sensor))
+        return None if index is None else z[index]
 
 
 @lru_cache(64)
-def _followed(one: SampledLog, limit: float, rise: float, drop: float) -> Array:
+def _followed(sampled: SampledLog, limit: float, rise: float, drop: float) -> Array:
     """Return the inputs of a log that thrusters can follow. Most sets of parameters that run together have the same.
 
     `rise` is the least time from rest to full command, s.
     """
-    found = one.record.inputs
-    if one.log.follows_axis or (limit == np.inf and rise == drop == 0.0):
+    found = sampled.record.inputs
+    if sampled.log.follows_axis or (limit == np.inf and rise == drop == 0.0):
         return found
     found = found.copy()
-    places = [n for n, name in enumerate(one.layout.inputs) if name in one.layout.commands]
-    for n in places:
+    indices = [n for n, name in enumerate(sampled.layout.inputs) if name in sampled.layout.commands]
+    for n in indices:
         found[:, n] = np.clip(found[:, n], -limit, limit)
         if rise > 0.0:
-            found[:, n] = [*_ramped(found[:, n].tolist(), one.spans.tolist(), rise)]
+            found[:, n] = [*_ramped(found[:, n].tolist(), sampled.spans.tolist(), rise)]
     # Power and thrust grow about with the square of a command. The load is the mean of these squares.
-    load = np.mean(found[:, places] ** 2, axis=1)
-    found[:, places] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
+    load = np.mean(found[:, indices] ** 2, axis=1)
+    found[:, indices] *= np.sqrt(np.maximum(1.0 - drop * load, 0.0))[:, None]
     return found
 
 
@@ -441,8 +441,8 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
     yield from _of_curves(known, make, prior("thrust_shape"))
     yield from _advance(known, make)
     yield from _of_axes(known, make)
-    for number, one in enumerate(logs):
-        yield from _of_one_log(one, number, make)
+    for number, sampled in enumerate(logs):
+        yield from _of_one_log(sampled, number, make)
     yield from _of_noise(known, logs, make)
     for kind, of in known.assumed:
         yield make(kind, of, sets=_set(known, kind, [t for t in known.layout.thrusters if t.name == of]))
@@ -530,13 +530,13 @@ def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str
     return tuple(name for name in names if name in known.layout.coefficients)
 
 
-def _of_one_log(one: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
-    file, half = one.log.file, 0.5 * one.interval
-    share, width = (0.5, {"mean": 1.0, "low": 1.0}) if one.is_momentary else (1.0, {})
+def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
+    file, half = sampled.log.file, 0.5 * sampled.interval
+    share, width = (0.5, {"mean": 1.0, "low": 1.0}) if sampled.is_momentary else (1.0, {})
     yield make(OFFSET, file, mean=-half, deviation=max(share * half, 0.005), log=number)
     yield make(WIDTH, file, log=number, **width)
-    if one.has_positions or one.has_velocities:
-        for part in CURRENT if "psi" in one.layout.state or one.layout.has_attitude else CURRENT[:1]:
+    if sampled.has_positions or sampled.has_velocities:
+        for part in CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]:
             yield make("current", file, part, log=number)
 
 
@@ -545,9 +545,10 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
     for is_velocity, kind in PLACED.items():
         turns = {
             form.axis
-            for one in logs
-            for form in one.layout.axes
-            if form.axis.is_rotation and any(s.is_velocity == is_velocity and has_place(s) for s in one.record.sensors)
+            for sampled in logs
+            for form in sampled.layout.axes
+            if form.axis.is_rotation
+            and any(s.is_velocity == is_velocity and has_place(s) for s in sampled.record.sensors)
         }
         for part in _PLACES if turns - {YAW} else _PLACES[:2] if turns else ():
             yield make(kind, "", part)

@@ -39,7 +39,7 @@ class Posterior:
     covariance: Array
 
     absent: frozenset[int] = frozenset()
-    """The places of the effects without which J was minimised: their coordinates have no errors."""
+    """The indices of the effects without which J was minimised: their coordinates have no errors."""
 
     @classmethod
     def of(cls, table: Table, z: Array, information: Array, absent: Collection[int] = ()) -> "Posterior":
@@ -98,45 +98,45 @@ class Posterior:
         """The standard errors of the coordinates."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
-    def error(self, place: int) -> float:
+    def error(self, index: int) -> float:
         """Return the standard error of a coordinate, which is never less than its kind says."""
-        return max(float(self.errors[place]), self.table.parameters[place].of_kind.finest / QUANTILE)
+        return max(float(self.errors[index]), self.table.parameters[index].of_kind.finest / QUANTILE)
 
-    def ends(self, place: int) -> Array:
+    def ends(self, index: int) -> Array:
         """Return a coordinate and the two ends of its 95 % interval."""
-        z = float(self.z[place])
-        return np.array([z, *around(z, self.error(place))])
+        z = float(self.z[index])
+        return np.array([z, *around(z, self.error(index))])
 
-    def evidence(self, place: int) -> float:
+    def evidence(self, index: int) -> float:
         """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent."""
-        p, error = self.table.parameters[place], self.error(place)
+        p, error = self.table.parameters[index], self.error(index)
         assert p.null is not None
-        after, before = ((self.z[place] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
+        after, before = ((self.z[index] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2
         return float(after - before + 2.0 * log(error / p.deviation))
 
-    def without(self, place: int) -> "Posterior":
+    def without(self, index: int) -> "Posterior":
         """Return the posterior given that an effect is absent."""
-        column, null = self.covariance[:, place], self.table.parameters[place].null
+        column, null = self.covariance[:, index], self.table.parameters[index].null
         assert null is not None
-        share = column / max(column[place], 1e-300)
-        z, covariance = self.z - share * (self.z[place] - null), self.covariance - np.outer(share, column)
-        return replace(self, z=z, covariance=covariance, absent=self.absent | {place})
+        share = column / max(column[index], 1e-300)
+        z, covariance = self.z - share * (self.z[index] - null), self.covariance - np.outer(share, column)
+        return replace(self, z=z, covariance=covariance, absent=self.absent | {index})
 
     def slopes(self, function: Callable[[Array], Array]) -> Array:
         """Return the derivatives of m numbers of the vehicle with respect to the p coordinates, m x p.
 
         The function returns m x n numbers for p x n coordinates.
         """
-        places = [*self.of_vehicle]
-        steps = 0.05 * self.errors[places] + 1e-9
-        some = derivatives(function, self.z, places, steps)
+        indices = [*self.of_vehicle]
+        steps = 0.05 * self.errors[indices] + 1e-9
+        some = derivatives(function, self.z, indices, steps)
         found = np.zeros((len(some), len(self.z)))
-        found[:, places] = some
+        found[:, indices] = some
         return found
 
     @cached_property
     def of_vehicle(self) -> tuple[int, ...]:
-        """The places of the parameters of the vehicle itself: neither of one log nor of noise."""
+        """The indices of the parameters of the vehicle itself: neither of one log nor of noise."""
         return tuple(n for n, p in enumerate(self.table.parameters) if p.of_motion and p.log is None)
 
     def numbers(self, values: Callable[[Array], Array]) -> tuple[Array, Array, Array]:

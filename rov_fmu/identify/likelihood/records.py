@@ -234,10 +234,10 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
             continue
         measured.setdefault(axis, found.file)
         slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
-        if places := gaps(channel.time, channel.values):
+        if some := gaps(channel.time, channel.values):
             assert log.commands
             begin = float(log.commands.rows[0])
-            words = {**found.words, "gaps": gaps_in_words(places, begin), "count": len(places)}
+            words = {**found.words, "gaps": gaps_in_words(some, begin), "count": len(some)}
             findings.append(replace(found, words=words))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
     findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
@@ -388,8 +388,8 @@ def _samples(
 ) -> tuple[Array, Array, np.ndarray]:
     """Return the times, the values and the sensors of all samples in the order of time."""
     times, values, sensors = [], [], []
-    for n, one in enumerate(measured):
-        time, value = one.channel.time, one.channel.values
+    for n, m in enumerate(measured):
+        time, value = m.channel.time, m.channel.values
         first = first_in_each(time, rate, begin)
         if averaged and len(first) < 0.8 * len(time):
             count = np.diff(first, append=len(time))

@@ -45,7 +45,7 @@ SETTLING = 5.0
 _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
 _FITTED = 2
-"""The most hypotheses that change the thrust that are fitted in a round, for each place at which J compares them."""
+"""The most hypotheses that change the thrust that are fitted in a round, for each point at which J compares them."""
 _LEFT = 0.3
 """A hypothesis about the thrust explains the errors over 10 s if at most this share of R² - 1 is left."""
 _FAR = 100.0
@@ -73,7 +73,7 @@ _LONGEST_IDLE = 0.5
 """Commands do not act during at most this share of a log, at its beginning or at its end."""
 
 Search = Callable[[Objective, Mapping[int, float]], Minimum]
-"""A function that minimises J of thinned logs from a start in which some parameters, by their places, have numbers."""
+"""A function that minimises J of thinned logs from a start in which some parameters, by their indices, have numbers."""
 Key = tuple[str, str, str]
 Starts = Mapping[Variant, float | None]
 """Hypotheses that hold together, with the coordinates from which their parameters begin; None if one has none."""
@@ -108,14 +108,14 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     predictions over 10 s there, too, as long as the log has no short force, which stands for these commands.
     """
     found: dict[Axis, Misfit] = {}
-    for n, (one, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
+    for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         begin = SETTLING + _late(record)
         usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
-        places = [usual & (record.sensor == number) for number in range(len(one.measured))]
-        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in places]
-        noise_of = (hypot(m.noise, objective.table.wander(best.z, one, m.sensor)) for m in one.measured)
+        masks = [usual & (record.sensor == number) for number in range(len(sampled.measured))]
+        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in masks]
+        noise_of = (hypot(m.noise, objective.table.wander(best.z, sampled, m.sensor)) for m in sampled.measured)
         least = [least_error(noise, change) for noise, change in zip(noise_of, motion, strict=True)]
-        is_motion = not (one.is_momentary or (one.lost and not ahead))
+        is_motion = not (sampled.is_momentary or (sampled.lost and not ahead))
         try:
             if is_motion:
                 run = objective.run(best.z, n, begin=begin, span=AHEAD)
@@ -125,7 +125,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
                 errors = run.innovations / np.sqrt(run.variances)
         except DivergedError:
             errors = np.full(len(record.time), inf)
-        for m, at, noise, change in zip(one.measured, places, least, motion, strict=True):
+        for m, at, noise, change in zip(sampled.measured, masks, least, motion, strict=True):
             if at.sum() >= 10:
                 R = rms(errors[at])
                 lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and moves(noise, change) else 0.0
@@ -226,16 +226,17 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
         if (kind := p.of_kind).is_size:
             z[n] = p.high if kind.slow and kind.slow.acts_as == "force" else p.low
     coefficients = table.coefficients(best)
-    for n, one in enumerate(model.logs):
-        if one.log.file not in variant.of:
+    for n, sampled in enumerate(model.logs):
+        if sampled.log.file not in variant.of:
             continue
-        scale = np.array([float(table.force_unit(z, form.axis)) for form in one.layout.axes])
-        prompt = {m.sensor.axis for m in one.measured if m.sensor.is_velocity} or {*one.layout.bare_axes}
-        scale[[form.axis not in prompt for form in one.layout.axes]] = inf
+        scale = np.array([float(table.force_unit(z, form.axis)) for form in sampled.layout.axes])
+        prompt = {m.sensor.axis for m in sampled.measured if m.sensor.is_velocity} or {*sampled.layout.bare_axes}
+        scale[[form.axis not in prompt for form in sampled.layout.axes]] = inf
         first, time = objective.filters[n].force, objective.records[n].time
         at = first_in_each(time, 1.0 / _IDLE_STEP)
-        force = objective.run(z, n, with_states=True).states[at, first : first + len(one.layout.axes)]
-        r, T = force / scale, one.thrust(coefficients, held(one.record.told, one.record.inputs, time[at])) / scale
+        force = objective.run(z, n, with_states=True).states[at, first : first + len(sampled.layout.axes)]
+        inputs = held(sampled.record.told, sampled.record.inputs, time[at])
+        r, T = force / scale, sampled.thrust(coefficients, inputs) / scale
         gain = _IDLE_STEP * np.sum(r**2 - (r + T) ** 2 - _IDLE * T**2, axis=1)
 
         def rows(gain: Array) -> int:
@@ -247,19 +248,19 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
         begins, ends = rows(gain), rows(gain[::-1])
         if begins or ends:
             begin, end = time[at][begins] if begins else -inf, time[at][-1 - ends] if ends else inf
-            found[one.log.file] = float(begin), float(end)
+            found[sampled.log.file] = float(begin), float(end)
     return replace(variant, of=tuple(found), acting=tuple(found.values()))
 
 
 class Comparison:
-    """J of thinned logs with each set of hypotheses, before it is fitted, at one place.
+    """J of thinned logs with each set of hypotheses, before it is fitted, at one point.
 
     The vehicle adapts to a set by one linear step of the scales of thrust, drag and inertia.
     """
 
-    def __init__(self, model: Model, held: Starts, place: Mapping[Key, float]) -> None:
-        """`model` is without hypotheses. At the place, some are held, and parameters that it lacks have their means."""
-        self.model, self.place = model, place
+    def __init__(self, model: Model, held: Starts, point: Mapping[Key, float]) -> None:
+        """`model` is without hypotheses. At the point, some are held, and parameters that it lacks have their means."""
+        self.model, self.point = model, point
         self.objective = model.applied(*held).objective(thinned=True)
         self.z, self.data = self._start(self.objective, held), list[Data]()
         self.free = np.flatnonzero([p.of_kind.adapts for p in self.objective.table.parameters])
@@ -289,43 +290,43 @@ class Comparison:
         end[free] += np.clip(-np.linalg.solve(information[np.ix_(free, free)], gradient[free]), -most, most)
         end = np.clip(end, self.objective.low, self.objective.high)
         change = end - self.z
-        costs = [cost(one.innovations + one.slopes @ change[[*one.places]], one.variances) for one in data]
+        costs = [cost(one.innovations + one.slopes @ change[[*one.indices]], one.variances) for one in data]
         return self.objective.prior(end) + sum(costs)
 
     def _start(self, objective: Objective, starts: Starts) -> Array:
-        """Return the place with the coordinates from which the parameters of some hypotheses begin."""
-        z = coordinates(self.place, objective.table)
-        for place, start in numbers_of(objective.table, starts).items():
-            z[place] = start
+        """Return the point with the coordinates from which the parameters of some hypotheses begin."""
+        z = coordinates(self.point, objective.table)
+        for index, start in numbers_of(objective.table, starts).items():
+            z[index] = start
         return z
 
 
 def rough(table: Table) -> dict[Key, float]:
-    """Return a place near the means of the priors, with noise that is large enough for a rough vehicle.
+    """Return a point near the means of the priors, with noise that is large enough for a rough vehicle.
 
     A fit without the right hypothesis bends the vehicle until wrong ones look right.
     """
-    place = {p.key: p.mean + _LOUD * p.deviation for p in table.parameters if p.kind == WHITE}
+    point = {p.key: p.mean + _LOUD * p.deviation for p in table.parameters if p.kind == WHITE}
     forces = (p for p in table.parameters if (slow := p.of_kind.slow) and slow.acts_as == "force")
-    return place | {p.key: log(_FORCE) for p in forces}
+    return point | {p.key: log(_FORCE) for p in forces}
 
 
-def place_of(table: Table, z: Array) -> dict[Key, float]:
+def point_of(table: Table, z: Array) -> dict[Key, float]:
     """Return the coordinates of all parameters by their keys."""
     return dict(zip((p.key for p in table.parameters), z.tolist(), strict=True))
 
 
-def coordinates(place: Mapping[Key, float], table: Table) -> Array:
-    """Return the coordinates of a place. Parameters that it lacks have their means."""
-    return np.array([place.get(p.key, p.mean) for p in table.parameters])
+def coordinates(point: Mapping[Key, float], table: Table) -> Array:
+    """Return the coordinates of a point. Parameters that it lacks have their means."""
+    return np.array([point.get(p.key, p.mean) for p in table.parameters])
 
 
 def numbers_of(table: Table, starts: Starts) -> dict[int, float]:
-    """Return the places of the parameters of some hypotheses, with the coordinates from which they begin."""
+    """Return the indices of the parameters of some hypotheses, with the coordinates from which they begin."""
     return {
-        place: start
-        for one, start in starts.items()
-        if start is not None and (place := table.place(*one.parameter)) is not None
+        index: start
+        for variant, start in starts.items()
+        if start is not None and (index := table.index(*variant.parameter)) is not None
     }
 
 
@@ -399,17 +400,17 @@ def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial |
     model = model.applied(*starts)
     objective = model.objective()
     with suppress(DivergedError):
-        start = coordinates(place_of(near.objective.table, near.minimum.z), objective.table)
+        start = coordinates(point_of(near.objective.table, near.minimum.z), objective.table)
         return _trial(starts, model, objective, minimise(objective, start, last=False), prior, near.quick)
     return None
 
 
 def _trial(starts: Starts, model: Model, objective: Objective, full: Minimum, prior: float, quick: float) -> Trial:
     """Return the fit with some hypotheses, whose parameters are where it ends."""
-    places = {one: objective.table.place(*one.parameter) for one in starts}
-    ends = {one: None if place is None else float(full.z[place]) for one, place in places.items()}
+    indices = {one: objective.table.index(*one.parameter) for one in starts}
+    ends = {one: None if index is None else float(full.z[index]) for one, index in indices.items()}
     posterior = Posterior.of(objective.table, full.z, full.information)
-    absent = (one for one, place in places.items() if place is not None and posterior.evidence(place) <= WINS)
+    absent = (one for one, index in indices.items() if index is not None and posterior.evidence(index) <= WINS)
     return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick, frozenset(absent))
 
 
@@ -422,11 +423,11 @@ def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
     if worst(structure(plain.objective, plain.minimum, ahead=True)) > ALARM:
         for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
             variants = [Variant(kind, of) for of in HYPOTHESES[kind].variants(plain.model.known, plain.model.logs)]
-            for one in variants:
+            for variant in variants:
                 prior = 2.0 * log(HYPOTHESES[kind].probability / len(variants))
-                trial = fitted(plain.model, {one: None}, prior, search)
+                trial = fitted(plain.model, {variant: None}, prior, search)
                 if trial and (odds := trial.score - plain.score - _left_out(plain, trial.objective)) > WINS:
-                    adopted.append(Adopted(one, odds))
+                    adopted.append(Adopted(variant, odds))
                     plain = replace(trial, starts={}, score=trial.score - prior)
     return plain, tuple(adopted)
 
@@ -436,8 +437,8 @@ def _left_out(trial: Trial, objective: Objective) -> float:
     gone = 0.0
     for old, new, data in zip(trial.objective.records, objective.records, trial.minimum.data, strict=False):
         if len(new.time) < len(old.time):
-            places = ~np.isin(old.time + 1j * old.sensor, new.time + 1j * new.sensor)
-            gone += cost(data.innovations[places], data.variances[places])
+            left_out = ~np.isin(old.time + 1j * old.sensor, new.time + 1j * new.sensor)
+            gone += cost(data.innovations[left_out], data.variances[left_out])
     return gone
 
 
@@ -546,17 +547,20 @@ class StructureSearch:
         every = (Variant(kind, of) for kind, one in kinds for of in one.variants(known, logs))
         some = (timed(self.model, plain.objective, plain.minimum.z, one) for one in every)
         return [
-            one
-            for one in some
-            if (one.of or not HYPOTHESES[one.kind].has_times)
-            and (not HYPOTHESES[one.kind].is_contrast or all(self.contrasts.get(n, inf) < CONTRAST for n in one.of))
+            variant
+            for variant in some
+            if (variant.of or not HYPOTHESES[variant.kind].has_times)
+            and (
+                not HYPOTHESES[variant.kind].is_contrast
+                or all(self.contrasts.get(n, inf) < CONTRAST for n in variant.of)
+            )
         ]
 
     @cached_property
     def contrasts(self) -> dict[str, float]:
         """The standard error of the health of each thruster by the data alone; empty if a motion diverges."""
         with suppress(DivergedError):
-            return contrasts(self.model, place_of(self.plain.objective.table, self.plain.minimum.z))
+            return contrasts(self.model, point_of(self.plain.objective.table, self.plain.minimum.z))
         return {}
 
     @property
@@ -609,13 +613,13 @@ class StructureSearch:
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
-        for one in self.variants if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
-            hypothesis = HYPOTHESES[one.kind]
+        for variant in self.variants if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
+            hypothesis = HYPOTHESES[variant.kind]
             if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
             for some in self._smaller:
-                if len(some) < _MOST and not any(one.excludes(other) for other in some):
-                    sets = [{**some, one: start} for start in hypothesis.starts or (None,)]
+                if len(some) < _MOST and not any(variant.excludes(other) for other in some):
+                    sets = [{**some, variant: start} for start in hypothesis.starts or (None,)]
                     (shown if hypothesis.changes_thrust else others).extend(sets)
         shown = [some for some in shown if frozenset(some) not in self.tried]
         if shown:
@@ -623,20 +627,20 @@ class StructureSearch:
         yield from ((some, -inf) for some in others if frozenset(some) not in self.tried)
 
     def _ranked(self, sets: Sequence[Starts]) -> Iterator[tuple[Starts, float]]:
-        """Yield the best sets at either of two places with the fall of J at the better one, the largest fall first.
+        """Yield the best sets at either of two points with the fall of J at the better one, the largest fall first.
 
         Of the starts of one set, the best one counts. A hypothesis that made a fit worse is tried again only where J
         falls by more than it did before that fit.
         """
         now = self.now
-        at_fit = Comparison(self.model, now.starts, place_of(now.objective.table, now.minimum.z))
+        at_fit = Comparison(self.model, now.starts, point_of(now.objective.table, now.minimum.z))
         found = ([_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets)
         falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), -inf)}
         chosen = dict[frozenset[Variant], int]()
-        for place in (0, 1):
+        for point in (0, 1):
             best = dict[frozenset[Variant], int]()
-            for n in sorted(falls, key=lambda one: falls[one][place], reverse=True):
-                if falls[n][place] > 0.0:
+            for n in sorted(falls, key=lambda one: falls[one][point], reverse=True):
+                if falls[n][point] > 0.0:
                     best.setdefault(frozenset(sets[n]), n)
             for key, n in islice(best.items(), _FITTED):
                 chosen.setdefault(key, n)

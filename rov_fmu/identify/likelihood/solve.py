@@ -98,7 +98,7 @@ def minimise(
 
 
 def _descended(objective: Objective, start: Minimum) -> Minimum:
-    """Return a place with a smaller J, after a few steps with the same derivatives, or the same place.
+    """Return a point with a smaller J, after a few steps with the same derivatives, or the same point.
 
     Each step is the best of some that are damped differently, which run in the lanes of the filter together.
     """
@@ -125,11 +125,11 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
     return now
 
 
-def _within_reach(objective: Objective, place: Minimum) -> tuple[float, Array]:
+def _within_reach(objective: Objective, minimum: Minimum) -> tuple[float, Array]:
     """Return the J that is left if a step reduces it by twice what is expected, and the information."""
-    gradient, information = total(objective, place.z, place.data)
-    change = _step(objective, place.z, gradient, information, np.ones(len(place.z), bool), 0.0) - place.z
-    return place.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
+    gradient, information = total(objective, minimum.z, minimum.data)
+    change = _step(objective, minimum.z, gradient, information, np.ones(len(minimum.z), bool), 0.0) - minimum.z
+    return minimum.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
 
 
 def refits(
@@ -137,7 +137,7 @@ def refits(
 ) -> list[Minimum]:
     """Minimise J for some parts of the data, each from the minimum for all data, without the noise.
 
-    If `absent` is given, it has the places of the effects that each fit is without. All fits take their damped steps
+    If `absent` is given, it has the indices of the effects that each fit is without. All fits take their damped steps
     together, so that the lanes of the filter are full. The derivatives are those at the minimum for all data, which are
     exact, as long as a fit is near it, and always if it is without effects. A fit to most of the data needs two steps.
     """

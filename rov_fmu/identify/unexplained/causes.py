@@ -48,9 +48,9 @@ def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process,
     """
     time_constant = slow.time_constant
     pieces = [
-        _piece(objective, z, n, run, place, axis)
+        _piece(objective, z, n, run, index, axis)
         for n, run in enumerate(runs)
-        for place in objective.filters[n].places_of(slow.acts_as, axis.name if axis else "")
+        for index in objective.filters[n].indices_of(slow.acts_as, axis.name if axis else "")
     ]
     pieces = [piece for piece in pieces if piece.constants(time_constant) > _LEAST]
     if not pieces:
@@ -66,8 +66,8 @@ def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process,
     return best if is_clear else ""
 
 
-def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, axis: Axis | None) -> _Piece:
-    one, record = objective.logs[number], objective.records[number]
+def _piece(objective: Objective, z: Array, number: int, run: Run, index: int, axis: Axis | None) -> _Piece:
+    sampled, record = objective.logs[number], objective.records[number]
     time = record.time[first_in_each(record.time, 1.0 / _STEP)]
 
     def at(times: Array, values: Array) -> Array:
@@ -75,7 +75,7 @@ def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, ax
 
     causes = {"the time": time - time[0]}
     for quantity, words in _CHANNELS.items():
-        channel = one.log.used(quantity)
+        channel = sampled.log.used(quantity)
         if channel and channel.count > 2 and spread(channel.values):
             causes[words] = at(*channel.samples)
     thrust = thrust_along(objective, z, number, time, axis)
@@ -88,18 +88,18 @@ def _piece(objective: Objective, z: Array, number: int, run: Run, place: int, ax
             causes["the distance"] = distance
         if "the voltage" in causes:
             causes["the voltage"] = (causes["the voltage"] - causes["the voltage"].mean()) * thrust
-    return _Piece(time, at(record.time, run.states[:, place]), causes)
+    return _Piece(time, at(record.time, run.states[:, index]), causes)
 
 
 def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis: Axis | None) -> Array:
     """Return the thrust along an axis that the model commands, N or N m; without an axis, the largest command."""
-    one, record = objective.logs[number], objective.records[number]
+    sampled, record = objective.logs[number], objective.records[number]
     inputs = held(record.told, record.inputs, time)
-    names = [*one.layout.inputs]
+    names = [*sampled.layout.inputs]
     if axis is None:
-        thrusters = [names.index(f"u_{thruster.name}") for thruster in one.layout.thrusters]
+        thrusters = [names.index(f"u_{thruster.name}") for thruster in sampled.layout.thrusters]
         return np.asarray(np.max(np.abs(inputs[:, thrusters]), axis=1))
-    return one.thrust(objective.table.coefficients(z), inputs)[:, one.layout.bare_axes.index(axis)]
+    return sampled.thrust(objective.table.coefficients(z), inputs)[:, sampled.layout.bare_axes.index(axis)]
 
 
 def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Axis) -> Array | None:

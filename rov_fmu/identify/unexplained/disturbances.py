@@ -32,9 +32,9 @@ def disturbances(
     objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[Run]
 ) -> Iterator[Disturbance]:
     """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
-    for place, p in enumerate(objective.table.parameters):
+    for index, p in enumerate(objective.table.parameters):
         if p.kind in SLOW:
-            evidence, error = _evidence(objective, best, posterior, place), float(posterior.errors[place])
+            evidence, error = _evidence(objective, best, posterior, index), float(posterior.errors[index])
             in_logs = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
             present = [one for one in in_logs if one]
             if present:
@@ -46,21 +46,21 @@ def disturbances(
 
 def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[UnknownForce]:
     """Yield the slow force along each axis of each log."""
-    for number, (one, run) in enumerate(zip(objective.logs, runs, strict=True)):
+    for number, (sampled, run) in enumerate(zip(objective.logs, runs, strict=True)):
         first, time = objective.filters[number].force, objective.records[number].time
-        for place, form in enumerate(one.layout.axes, first):
-            yield UnknownForce(form.axis, one.log.file, time, run.states[:, place], run.deviations[:, place])
+        for index, form in enumerate(sampled.layout.axes, first):
+            yield UnknownForce(form.axis, sampled.log.file, time, run.states[:, index], run.deviations[:, index])
 
 
-def _evidence(objective: Objective, best: Minimum, posterior: Posterior, place: int) -> float:
+def _evidence(objective: Objective, best: Minimum, posterior: Posterior, index: int) -> float:
     """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it.
 
     The price of its size is how much the data narrow its prior (the Laplace approximation). The fit ends early where
     strong evidence is certain: J within reach, with what the others can explain, is not small enough.
     """
-    p, without = objective.table.parameters[place], objective.without([place])
+    p, without = objective.table.parameters[index], objective.without([index])
     assert p.null is not None
-    price = ((p.null - p.mean) / p.deviation) ** 2 + 2.0 * log(max(p.deviation / posterior.errors[place], 1.0))
+    price = ((p.null - p.mean) / p.deviation) ** 2 + 2.0 * log(max(p.deviation / posterior.errors[index], 1.0))
 
     def evidence(J: float) -> float:
         return J - best.value - price
@@ -86,10 +86,10 @@ def _disturbance(
     error: float,
 ) -> Disturbance | None:
     """Return a slow process in one log; None if the log does not have it. `error` is that of ln of its size."""
-    one, run, time = objective.logs[number], runs[number], objective.records[number].time
+    sampled, run, time = objective.logs[number], runs[number], objective.records[number].time
     slow = SLOW[parameter.kind]
-    columns = objective.filters[number].places_of(slow.acts_as, parameter.of)
-    if not columns or (one.record.wanders and parameter.of == HORIZONTAL):
+    columns = objective.filters[number].indices_of(slow.acts_as, parameter.of)
+    if not columns or (sampled.record.wanders and parameter.of == HORIZONTAL):
         return None
     axis = AXES.get(parameter.of)
     states, deviations = run.states[:, columns], run.deviations[:, columns]
@@ -104,7 +104,7 @@ def _disturbance(
     else:
         speeds = [
             n
-            for n, form in enumerate(one.layout.axes)
+            for n, form in enumerate(sampled.layout.axes)
             if not form.axis.is_rotation and (form.axis is HEAVE) == (axis is HEAVE)
         ]
         usual = max(rms(np.linalg.norm(run.states[:, speeds], axis=1)), _LITTLE)
@@ -119,7 +119,7 @@ def _disturbance(
         unit,
         evidence,
         axis=axis,
-        file=one.log.file,
+        file=sampled.log.file,
         share=size / usual,
         since=float(time[clear[0]] - time[0]) if len(clear) else None,
     )

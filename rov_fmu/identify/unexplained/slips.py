@@ -122,9 +122,9 @@ def slips(
         untried = {first - {member} for member in first} - J.keys() - {frozenset()}
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
     for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
-        for one, scale in scaling:
-            words = told.setdefault((one.file, one.channel.quantity.name), {})
-            words.setdefault(_words(one.channel, scale), as_it_is - J[scaling])
+        for match, scale in scaling:
+            words = told.setdefault((match.file, match.channel.quantity.name), {})
+            words.setdefault(_words(match.channel, scale), as_it_is - J[scaling])
     return tuple(
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
@@ -135,10 +135,10 @@ def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> It
     """Yield the translations that are fitted, with ln of their inertia relative to the mass, and its error."""
     vehicle, _ = objective.table.model(z)
     for axis in known.fitted:
-        place = objective.table.place(INERTIA, axis.name)
-        if place is not None and not axis.is_rotation:
+        index = objective.table.index(INERTIA, axis.name)
+        if index is not None and not axis.is_rotation:
             inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
-            yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[place]), _WEIGHED)
+            yield axis, float(np.log(inertia / vehicle[axis.inertia])), hypot(float(errors[index]), _WEIGHED)
 
 
 def _lightness(scaling: Scaling, axis: Axis, ratio: float, error: float) -> float:
@@ -153,20 +153,20 @@ def _drag(scaling: Scaling, compared: Sequence[_Match], guessed: Sequence[str]) 
     The drag is relative to the usual one as the simulated velocity, squared, to the measured one.
     """
     scales, ratios = dict(scaling), dict[str, list[float]]()
-    for one in compared:
-        axis = one.channel.quantity.axis
-        if axis and axis.name in guessed and one.ratios:
-            scale, ratio = next(iter(one.ratios.items()))
-            ratios.setdefault(axis.name, []).append(log(ratio * abs(scale / scales.get(one, 1.0))))
+    for match in compared:
+        axis = match.channel.quantity.axis
+        if axis and axis.name in guessed and match.ratios:
+            scale, ratio = next(iter(match.ratios.items()))
+            ratios.setdefault(axis.name, []).append(log(ratio * abs(scale / scales.get(match, 1.0))))
     return sum((2.0 * float(np.mean(some)) / _USUAL) ** 2 for some in ratios.values())
 
 
-def _customary(one: _Match, compared: Sequence[_Match], light: Collection[Axis]) -> Iterator[float]:
+def _customary(match: _Match, compared: Sequence[_Match], light: Collection[Axis]) -> Iterator[float]:
     """Yield the scales of knots and feet, where something speaks for them."""
-    quantity = one.channel.quantity
+    quantity = match.channel.quantity
     others = [other for other in compared if other.channel.quantity.axis is quantity.axis and 1.0 in other.ratios]
-    for scale in _CUSTOMARY if quantity.axis and not quantity.axis.is_rotation and 1.0 in one.ratios else ():
-        differs = any(abs(log(one.ratios[1.0] / other.ratios[1.0] / scale)) < _SAME for other in others)
+    for scale in _CUSTOMARY if quantity.axis and not quantity.axis.is_rotation and 1.0 in match.ratios else ():
+        differs = any(abs(log(match.ratios[1.0] / other.ratios[1.0] / scale)) < _SAME for other in others)
         if (quantity.axis in light or differs) and (quantity.is_velocity or scale != _KNOTS):
             yield scale
 
@@ -205,9 +205,9 @@ def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Ar
     return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
 
-def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
+def _corrected(log: Log, scales: Mapping[Channel, float]) -> Log:
     """Return a log with the true values of some of its channels."""
-    return replace(one, channels=tuple(replace(c, values=c.values / scales.get(c, 1.0)) for c in one.channels))
+    return replace(log, channels=tuple(replace(c, values=c.values / scales.get(c, 1.0)) for c in log.channels))
 
 
 # ---- Comparison with the vehicle of the priors -----------------------------------------------------------------------
@@ -215,14 +215,14 @@ def _corrected(one: Log, scales: Mapping[Channel, float]) -> Log:
 
 def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Iterator[_Match]:
     """Yield all channels of a log that the filter reads, beside their simulation."""
-    one, record = objective.logs[number], objective.records[number]
+    sampled, record = objective.logs[number], objective.records[number]
     try:
         simulated = _simulated(objective, number, guessed)
     except DivergedError:
         return
-    for n, m in enumerate(one.measured):
+    for n, m in enumerate(sampled.measured):
         at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
-        channel = next(c for c in one.log.channels if not c.unused and (c.quantity, c.source) == used)
+        channel = next(c for c in sampled.log.channels if not c.unused and (c.quantity, c.source) == used)
         time, raw = channel.samples
         likenesses = {}
         for scale in (1.0, -1.0, *(_ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS)):
@@ -230,7 +230,7 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
             likenesses[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
         most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in likenesses.values())
         ratios = {k: ratio for k, (ratio, unexplained) in likenesses.items() if ratio > 0.0 and unexplained < min(most)}
-        yield _Match(one.log.file, channel, int(np.sum(one.thinned.sensor == n)), ratios)
+        yield _Match(sampled.log.file, channel, int(np.sum(sampled.thinned.sensor == n)), ratios)
 
 
 def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:
@@ -239,16 +239,16 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
     The slow gain of the thrust stays 0: a heading of the wrong sign would drive it to -2, and all motion with it.
     `guessed` names the axes whose prior of the drag follows from the data: they have the drag of a body of their mass.
     """
-    one, record = objective.logs[number], objective.records[number]
-    parameters = objective.table.of_log(objective.mean, one)
+    sampled, record = objective.logs[number], objective.records[number]
+    parameters = objective.table.of_log(objective.mean, sampled)
     usual = dict(parameters.coefficients)
-    for axis in (axis for axis in one.layout.bare_axes if axis.name in guessed):
+    for axis in (axis for axis in sampled.layout.bare_axes if axis.name in guessed):
         volume = usual[axis.inertia] / _DENSITY
         drag = 0.5 * _DENSITY * (_TURNING * volume if axis.is_rotation else _MOVING * volume ** (2.0 / 3.0))
         for end in ("", REVERSE):
             usual |= {axis.coefficient(f"a_d{end}"): drag, axis.coefficient(f"b_d{end}"): _SLOWEST * drag}
     parameters = replace(parameters, coefficients=usual)
-    is_angle = np.array([m.channel.quantity.unit == "rad" for m in one.measured])
+    is_angle = np.array([m.channel.quantity.unit == "rad" for m in sampled.measured])
     parameters = replace(parameters, gain=Slow())
     heeding = replace(parameters, white=tuple(np.where(is_angle, 1.0, _UNHEEDED) * parameters.white))
     run = objective.filters[number].run

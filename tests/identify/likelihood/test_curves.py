@@ -74,12 +74,12 @@ def test_the_nearest_curve_of_a_quadratic_one_is_this_one_and_has_its_variance()
         return np.where(c > 0.0, 20.0 * ahead * abs(ahead) + 5.0 * ahead, -15.0 * astern * abs(astern) - 3.0 * astern)
 
     names = ("a_t_main", "b_t_main"), ("a_t_main_reverse", "b_t_main_reverse")
-    for one, own, values in zip(
+    for quadratic, own, values in zip(
         nearest(curve, forces, (0.08, 0.12), 0.05, 0.1), names, ((20, 5), (15, 3)), strict=True
     ):
-        assert one.coefficients == pytest.approx(dict(zip(own, values, strict=True)))
-        assert np.abs(one.misfit).max() < 1e-9
-        variances = np.einsum("ni,ij,nj->n", one.terms, one.covariance(0.04), one.terms)
+        assert quadratic.coefficients == pytest.approx(dict(zip(own, values, strict=True)))
+        assert np.abs(quadratic.misfit).max() < 1e-9
+        variances = np.einsum("ni,ij,nj->n", quadratic.terms, quadratic.covariance(0.04), quadratic.terms)
         assert np.mean(variances) == pytest.approx(0.04)
 
 

@@ -364,8 +364,8 @@ def test_a_measured_tilt_turns_the_net_weight_and_the_way() -> None:
     log = record(sensors, [(t, n) for t in (0.25 * np.arange(20.0)).tolist() for n in (0, 1)])
     tilt = np.array([[0.0, 5.0], [0.5, 0.5], [0.3, 0.3]])
     tilted, level = (
-        -Filter(k).run(one, parameters(k, 2), begin=0.0).innovations
-        for k, one in ((LAGGING, replace(log, tilt=tilt)), (heave(T_top=0.2, F_0_w=0.1 * share), log))
+        -Filter(k).run(read, parameters(k, 2), begin=0.0).innovations
+        for k, read in ((LAGGING, replace(log, tilt=tilt)), (heave(T_top=0.2, F_0_w=0.1 * share), log))
     )
     assert tilted[::2] == pytest.approx(level[::2], rel=1e-9)
     assert tilted[1::2] - START["z"] == pytest.approx(share * (level[1::2] - START["z"]), abs=1e-9)
@@ -418,11 +418,11 @@ def test_an_outlier_tells_ever_less() -> None:
     deviation = float(np.sqrt(ERRORS["z"] ** 2 + 0.01**2))
     z = Filter(LAGGING).vehicle_states.index("z")
     for u, weight in ((1.0, 1.0), (2.9, 1.0), (6.0, 0.5), (60.0, 0.05)):
-        one = after(u * deviation)
+        run = after(u * deviation)
         share = weight * ERRORS["z"] ** 2 / deviation**2
-        assert float(one.states[0, z]) - START["z"] == pytest.approx(share * u * deviation)
-        assert float(one.deviations[0, z]) == pytest.approx(ERRORS["z"] * np.sqrt(1.0 - share))
-        assert one.variances == pytest.approx([deviation**2])
+        assert float(run.states[0, z]) - START["z"] == pytest.approx(share * u * deviation)
+        assert float(run.deviations[0, z]) == pytest.approx(ERRORS["z"] * np.sqrt(1.0 - share))
+        assert run.variances == pytest.approx([deviation**2])
 
 
 # ---- Runs that repeat, and predictions -------------------------------------------------------------------------------
@@ -457,11 +457,11 @@ def test_sets_in_lanes_run_like_each_of_them_alone(frozen: bool, turns: bool) ->
     bad = replace(sets, coefficients={**sets.coefficients, "m_rov": masses})
     found = of_both.run_many(log, bad, first, frozen=frozen)
     assert [n for n, run in enumerate(found) if run is None] == [5]
-    for one, expected in zip(found, alone, strict=True):
-        if one is not None:
+    for of_set, expected in zip(found, alone, strict=True):
+        if of_set is not None:
             scale = np.abs(expected.innovations).max()
-            assert one.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
-            assert one.variances == pytest.approx(expected.variances, rel=1e-9)
+            assert of_set.innovations == pytest.approx(expected.innovations, rel=1e-9, abs=1e-9 * scale)
+            assert of_set.variances == pytest.approx(expected.variances, rel=1e-9)
 
 
 def test_functions_of_vectors_are_exact_to_rounding(tmp_path: Path) -> None:

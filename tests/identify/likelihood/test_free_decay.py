@@ -86,9 +86,9 @@ def test_drag_relative_to_inertia_follows_from_logs_without_thrust(quantity: str
     posterior = fit_all(known, logs, rows).file.posterior
     table, S = posterior.table, posterior.covariance
     found = table.coefficients(posterior.z.tolist())
-    inertia = table.place("inertia", "surge")
+    inertia = table.index("inertia", "surge")
     for key, kind, true in (("a_d_u", "quadratic drag", A / M), ("b_d_u", "linear drag", B / M)):
-        drag = table.place(kind, "surge")
+        drag = table.index(kind, "surge")
         assert drag is not None
         assert inertia is not None
         deviation = sqrt(S[drag, drag] + S[inertia, inertia] - 2.0 * S[drag, inertia])

@@ -95,14 +95,16 @@ class Fault:
 
 def faults(names: list[str]) -> dict[str, Fault]:
     """One fault of each kind, of the first thrusters of a vehicle."""
-    one, two = names[:2]
+    first, second = names[:2]
     return {
         "healthy": Fault(""),
-        "dead": Fault("health", one, 0.0, value=0.0),
-        "half": Fault("health", two, 0.5, value=0.5),
-        "three quarters": Fault("health", two, 0.75, value=0.75),
-        "reversed": Fault("reversed commands", two, acting=lambda u: {**u, two: -u[two]}),
-        "swapped": Fault("swapped commands", f"{one} and {two}", acting=lambda u: {**u, one: u[two], two: u[one]}),
+        "dead": Fault("health", first, 0.0, value=0.0),
+        "half": Fault("health", second, 0.5, value=0.5),
+        "three quarters": Fault("health", second, 0.75, value=0.75),
+        "reversed": Fault("reversed commands", second, acting=lambda u: {**u, second: -u[second]}),
+        "swapped": Fault(
+            "swapped commands", f"{first} and {second}", acting=lambda u: {**u, first: u[second], second: u[first]}
+        ),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
         "drooping": Fault("voltage drop", acting=lambda u: drooping(u, 0.3), value=0.3),
@@ -119,8 +121,8 @@ def drooping(u: Commands, share: float) -> Commands:
 def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
     """The vehicle with rotors whose speed lags by T, s."""
     curves = tuple(
-        replace(one, lag="speed", keys=tuple(key for key in CURVE if key in {*one.keys, "T"}))
-        for one in vehicle.layout.curves
+        replace(curve, lag="speed", keys=tuple(key for key in CURVE if key in {*curve.keys, "T"}))
+        for curve in vehicle.layout.curves
     )
     lags = {one.coefficient("T"): T for one in curves}
     layout = replace(vehicle.layout, curves=curves)
@@ -144,11 +146,12 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     if fault.rotor_lag:
         whole = with_rotors(whole, fault.rotor_lag)
     acting = fault.acting(logged)
-    motion = whole.simulate(time, {f"u_{name}": acting[name] for name in names})
+    motion = dict(whole.simulate(time, {f"u_{name}": acting[name] for name in names}))
     columns = {f"{name} [1]": logged[name] for name in names}
     if fault.turned:
         c, s = np.cos(fault.turned), np.sin(fault.turned)
-        motion = {**motion, "u": c * motion["u"] + s * motion["v"], "v": c * motion["v"] - s * motion["u"]}
+        ahead, starboard = motion["u"], motion["v"]
+        motion |= {"u": c * ahead + s * starboard, "v": c * starboard - s * ahead}
     for title, variable in OUTPUTS.items():
         if variable in motion:
             values = np.degrees(motion[variable]) if "deg" in title else motion[variable]
@@ -186,17 +189,17 @@ def four_axes(tmp_path_factory: pytest.TempPathFactory) -> Model:
 
 def test_each_hypothesis_changes_what_acts(four_axes: Model) -> None:
     """A variant changes the commands that the filter reads, or adds a parameter, and nothing else."""
-    (one,), plain = four_axes.logs, {p.key for p in four_axes.table.parameters}
+    (sampled,), plain = four_axes.logs, {p.key for p in four_axes.table.parameters}
     for kind, hypothesis in HYPOTHESES.items():
         for of in hypothesis.variants(four_axes.known, four_axes.logs):
-            acting = ((one.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
+            acting = ((sampled.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
             changed = four_axes.applied(Variant(kind, of, acting))
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert {p.key for p in changed.table.parameters} == plain
                 continue
             added = {p.key for p in changed.table.parameters} - plain
-            is_other = not np.array_equal(changed.logs[0].record.inputs, one.record.inputs)
+            is_other = not np.array_equal(changed.logs[0].record.inputs, sampled.record.inputs)
             if kind == "momentary commands":
                 assert {key[0] for key in added} == {"short force"}
                 continue
@@ -206,22 +209,22 @@ def test_each_hypothesis_changes_what_acts(four_axes: Model) -> None:
 
 
 def test_idle_commands_of_one_file_leave_another_alone(model: Model) -> None:
-    (one,) = model.logs
-    other, told = replace(one, log=replace(one.log, file="other.csv")), one.record.told
-    idle = Variant("idle commands", (one.log.file,), ((told[5], np.inf),))
-    first, second = replace(model, logs=[one, other]).applied(idle).logs
+    (sampled,) = model.logs
+    other, told = replace(sampled, log=replace(sampled.log, file="other.csv")), sampled.record.told
+    idle = Variant("idle commands", (sampled.log.file,), ((told[5], np.inf),))
+    first, second = replace(model, logs=[sampled, other]).applied(idle).logs
     assert not first.record.inputs[:5].any()
     assert np.array_equal(second.record.inputs, other.record.inputs)
 
 
-def with_jump(one: SampledLog) -> SampledLog:
+def with_jump(sampled: SampledLog) -> SampledLog:
     """The log, whose horizontal velocities jump by 2 m/s after a third of it."""
 
     def jumping(m: SampledChannel) -> SampledChannel:
         values = m.channel.values + 2.0 * (np.arange(len(m.channel.values)) > len(m.channel.values) // 3)
         return replace(m, channel=replace(m.channel, values=values)) if m.sensor.is_horizontal_velocity else m
 
-    return replace(one, measured=tuple(map(jumping, one.measured)))
+    return replace(sampled, measured=tuple(map(jumping, sampled.measured)))
 
 
 def one_of_each(model: Model) -> list[Variant]:
@@ -239,10 +242,10 @@ def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Mod
     lossy = replace(four_axes, logs=[with_jump(replace(one, lost={"yaw": 0.1})) for one in four_axes.logs])
     every = one_of_each(lossy)
     for first, second in combinations(every, 2):
-        (one,), (other,) = lossy.applied(first, second).logs, lossy.applied(second, first).logs
-        assert (one.is_momentary, one.layout) == (other.is_momentary, other.layout)
+        (sampled,), (other,) = lossy.applied(first, second).logs, lossy.applied(second, first).logs
+        assert (sampled.is_momentary, sampled.layout) == (other.is_momentary, other.layout)
         for key in ("told", "since", "inputs", "beside"):
-            assert np.array_equal(getattr(one.record, key), getattr(other.record, key)), (first, second, key)
+            assert np.array_equal(getattr(sampled.record, key), getattr(other.record, key)), (first, second, key)
         assert lossy.applied(first, second).table.parameters == lossy.applied(second, first).table.parameters
     assert in_order(reversed(every)) == every
     (momentary,) = (one for one in every if one.kind == "momentary commands")
@@ -259,25 +262,25 @@ def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Mod
 
 def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
     """The commands that act are those of a loop written out separately."""
-    (one,) = model.logs
-    names = [name for name in one.layout.inputs if name in one.layout.commands]
-    u = one.record.inputs[:, [[*one.layout.inputs].index(name) for name in names]]
+    (sampled,) = model.logs
+    names = [name for name in sampled.layout.inputs if name in sampled.layout.commands]
+    u = sampled.record.inputs[:, [[*sampled.layout.inputs].index(name) for name in names]]
     limited = model.applied(Variant("command limit", ()))
     z = np.array([p.mean for p in limited.table.parameters])
-    place = limited.table.place("command limit")
-    assert place is not None
+    index = limited.table.index("command limit")
+    assert index is not None
     sets = np.repeat(z[:, None], 2, axis=1)
-    sets[place] = 0.55, 1.0
+    sets[index] = 0.55, 1.0
     found = limited.table.followed(sets, limited.logs[0])
     assert np.array_equal(found[0][:, : len(names)], np.clip(u, -0.55, 0.55))
-    assert np.array_equal(found[1], one.record.inputs)
+    assert np.array_equal(found[1], sampled.record.inputs)
     slow = model.applied(Variant("slew limit", ()))
     (fine,), z = slow.logs, np.array([p.mean for p in slow.table.parameters])
-    place = slow.table.place("slew limit")
-    assert place is not None
+    index = slow.table.index("slew limit")
+    assert index is not None
     told = fine.record.told
     for rise in (1.25, 0.04, 0.0):  # the second ramp ends within its row
-        z[place] = rise
+        z[index] = rise
         acting = slow.table.followed(z, fine)[:, 0]
         now = fine.record.inputs[0, 0]
         for wanted, mean in zip(fine.record.inputs[:200, 0].tolist(), acting, strict=False):
@@ -287,16 +290,16 @@ def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
                 within.append(now)
             assert mean == pytest.approx(np.mean(within), abs=0.01)
     assert fine.spans[:-1] == pytest.approx(0.05)
-    assert told[-1] + fine.spans[-1] >= one.record.time[-1]
-    assert {*one.record.told} <= {*told}
+    assert told[-1] + fine.spans[-1] >= sampled.record.time[-1]
+    assert {*sampled.record.told} <= {*told}
 
 
-def seldom(one: SampledLog, number: int) -> SampledLog:
+def seldom(sampled: SampledLog, number: int) -> SampledLog:
     """The log of a logger that writes only some of its rows."""
-    told, inputs = one.record.told[::number], one.record.inputs[::number]
+    told, inputs = sampled.record.told[::number], sampled.record.inputs[::number]
     since = np.append(told[0], told[:-1])
-    record, thinned = (replace(own, told=told, since=since, inputs=inputs) for own in (one.record, one.thinned))
-    return replace(one, interval=number * one.interval, record=record, thinned=thinned)
+    record, thinned = (replace(own, told=told, since=since, inputs=inputs) for own in (sampled.record, sampled.thinned))
+    return replace(sampled, interval=number * sampled.interval, record=record, thinned=thinned)
 
 
 @pytest.mark.parametrize("number", [1, 4])
@@ -320,23 +323,23 @@ def test_a_hypothesis_that_is_absent_is_the_model_without_it(
     values = []
     for some in (plain, absent):
         objective = some.objective(thinned=True)
-        places = [n for n, p in enumerate(objective.table.parameters) if p.kind == kind]
+        indices = [n for n, p in enumerate(objective.table.parameters) if p.kind == kind]
         sets = np.repeat(np.array([p.mean for p in objective.table.parameters])[:, None], 2, axis=1)
-        sets[places] = null
+        sets[indices] = null
         runs = objective.runs(sets[:, 0])
         values.append(objective.value(sets[:, 0], runs) - objective.prior(sets[:, 0]))
-        sets[places, 1] += np.where(objective.high[places] > sets[places, 1], 1e-11, -1e-11)
+        sets[indices, 1] += np.where(objective.high[indices] > sets[indices, 1], 1e-11, -1e-11)
         near = objective.trials(sets, [objective.whole] * 2, runs)
         values += [value - objective.prior(z) for (value, _), z in zip(near, sets.T, strict=True)]
     assert values == pytest.approx([values[0]] * len(values), abs=1e-6, rel=0.0)
 
 
 def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
-    known, (one,) = model.known, model.logs
+    known, (sampled,) = model.known, model.logs
     assert [*HYPOTHESES["health"].variants(known, model.logs)] == [(name,) for name in ("l", "r", "t")]
-    inputs = one.record.inputs.copy()
+    inputs = sampled.record.inputs.copy()
     inputs[:, 1] = inputs[:, 0]
-    alike = [one.with_inputs(inputs)]
+    alike = [sampled.with_inputs(inputs)]
     assert twins(known, alike, "l") == ("l",)  # the pair turns the vehicle to opposite sides
     straight = replace(
         known, layout=replace(known.layout, axes=tuple(f for f in known.layout.axes if f.axis.name == "surge"))
@@ -382,8 +385,8 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
         acts = (whole.told >= begins) & (whole.told < ends)
         assert not changed.inputs[~acts].any()
         assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
-    (one,) = model.logs
-    against = replace(model, logs=[one.with_inputs(-one.record.inputs)])
+    (sampled,) = model.logs
+    against = replace(model, logs=[sampled.with_inputs(-sampled.record.inputs)])
     assert not timed(against, against.objective(), z, variant).of
 
 
@@ -416,14 +419,14 @@ def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path
     logs = {"flight.csv": flown(rov_fmu.load(vehicle), 12.0, 1)}
     known, recorded, rows = begin(load_tests(folder_of(tmp_path, f'base = "{vehicle}"\n{HEAD}', logs)))
     assert list(HYPOTHESES["momentary commands"].variants(known, recorded)) == [("flight.csv",)]
-    (one,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
-    assert one.is_momentary
-    assert not list(HYPOTHESES["momentary commands"].variants(known, [one]))
+    (sampled,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
+    assert sampled.is_momentary
+    assert not list(HYPOTHESES["momentary commands"].variants(known, [sampled]))
     least = 1e-3  # of full thrust
-    assert one.record.beside is not None
-    assert one.record.beside.shape == (len(one.record.told), len(one.layout.axes))
-    assert np.all(one.record.beside >= least)
-    assert np.any(one.record.beside > 5.0 * least)
+    assert sampled.record.beside is not None
+    assert sampled.record.beside.shape == (len(sampled.record.told), len(sampled.layout.axes))
+    assert np.all(sampled.record.beside >= least)
+    assert np.any(sampled.record.beside > 5.0 * least)
 
 
 def test_lines_between_momentary_commands_are_wrong_where_their_second_differences_are_large(model: Model) -> None:
@@ -434,20 +437,20 @@ def test_lines_between_momentary_commands_are_wrong_where_their_second_differenc
     for n, wanted in enumerate(np.roll(target, 37)):
         now += (wanted - now) / fine  # a stick that moves within a row
         command[n] = now
-    known, one = model.known, model.logs[0]
-    layout, names = one.layout, [*one.layout.inputs]
+    known, log = model.known, model.logs[0]
+    layout, names = log.layout, [*log.layout.inputs]
     thrusters = [names.index(f"u_{t.name}") for t in layout.thrusters_along(SURGE)]
     axis = [form.axis for form in layout.axes].index(SURGE)
 
     def thrust(commands: Array) -> Array:
         inputs = np.zeros((len(commands), len(names)))
         inputs[:, thrusters] = commands[:, None]
-        lines = one.with_inputs(inputs)
+        lines = log.with_inputs(inputs)
         return lines.thrust(known.coefficients, lines.record.inputs)[:, axis] / known.full["surge"]
 
     sampled = np.zeros((rows, len(names)))
     sampled[:, thrusters] = command[::fine, None]
-    beside = one.with_inputs(sampled).with_lines(known.coefficients, known.full).record.beside
+    beside = log.with_inputs(sampled).with_lines(known.coefficients, known.full).record.beside
     assert beside is not None
     at_rows, between = thrust(command[::fine]), thrust(command[:: fine // 5]).reshape(rows, 5).mean(axis=1)
     lacking = np.abs(between[:-1] - 0.5 * (at_rows[1:] + at_rows[:-1]))
@@ -479,20 +482,20 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     """Of a vehicle whose velocities are all 1 % larger, and whose time constants are longer by a shift of commands."""
     nothing = dict.fromkeys((form.axis for form in model.known.layout.axes), Misfit())
     objective = replace(model, logs=[replace(one, lost={"yaw": 0.1}) for one in model.logs]).objective()
-    table, (one,) = objective.table, objective.logs
-    place, file = table.place("logging width", one.log.file), one.log.file
-    assert place is not None
+    table, (sampled,) = objective.table, objective.logs
+    index, file = table.index("logging width", sampled.log.file), sampled.log.file
+    assert index is not None
     z = np.array([p.mean for p in table.parameters])
     vehicle, shapes = table.model(z)
     for width, window in ((0.05, 0.2), (0.4, 0.4), (0.6, 1.0)):  # beyond a half, commands change at any time
-        z[place] = width
+        z[index] = width
         assert windows(objective, z) == {file: pytest.approx(window)}
         found = unseen_errors(objective, z, {}, nothing)
         assert np.array_equal(found, found.T)
         for axis in vehicle.layout.bare_axes:
             own = {p.kind: n for n, p in enumerate(table.parameters) if p.of == axis.name}
             _, time = shapes.motions(vehicle, axis, np.array([0.5])).response()
-            late = 0.05 * window * one.interval / time[0]
+            late = 0.05 * window * sampled.interval / time[0]
             assert found[own["inertia"], own["inertia"]] == pytest.approx(2.0 * 0.01**2 + late**2)
             larger = z.copy()  # by a standard error of the scale
             for kind in ("quadratic drag", "linear drag", "inertia"):
@@ -515,12 +518,12 @@ def test_velocities_before_they_jump_are_left_out(model: Model, tmp_path: Path) 
     other = Model(*begin(load_tests(drifting)))
     (of,) = HYPOTHESES["unsettled velocity"].variants(other.known, other.logs)
     left = other.applied(Variant("unsettled velocity", of))
-    ((one,), (whole,)) = left.logs, other.logs
+    ((sampled,), (whole,)) = left.logs, other.logs
     assert of == ("dive_0.csv",)
-    assert one.settled == pytest.approx(16.5)
-    assert one.jump is None
+    assert sampled.settled == pytest.approx(16.5)
+    assert sampled.jump is None
     assert left.table.parameters == other.table.parameters
-    for record, old in ((one.record, whole.record), (one.thinned, whole.thinned)):
+    for record, old in ((sampled.record, whole.record), (sampled.thinned, whole.thinned)):
         is_velocity = np.array([s.is_horizontal_velocity for s in old.sensors])[old.sensor]
         kept = ~is_velocity | (old.time >= 16.5)
         assert 0 < np.sum(~kept) < np.sum(is_velocity)
@@ -598,10 +601,10 @@ def reversed_model(tmp_path_factory: pytest.TempPathFactory) -> Model:
 def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> None:
     at = Comparison(reversed_model, {}, rough(reversed_model.table))
     values = {
-        (kind, of): min(at.value({Variant(kind, of): start}) for start in one.starts or (None,))
-        for kind, one in HYPOTHESES.items()
-        if one.changes_thrust and not one.has_times
-        for of in one.variants(reversed_model.known, reversed_model.logs)
+        (kind, of): min(at.value({Variant(kind, of): start}) for start in hypothesis.starts or (None,))
+        for kind, hypothesis in HYPOTHESES.items()
+        if hypothesis.changes_thrust and not hypothesis.has_times
+        for of in hypothesis.variants(reversed_model.known, reversed_model.logs)
     }
     assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
     assert values["health", ("r",)] < at.value({})
@@ -735,10 +738,10 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: py
 def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None:
     found = identify(load_tests(folder(path, vehicle, fault, seed, dives)))
     assert [(one.kind, one.of) for one in found.structures] == [(fault.kind, fault.of)] * bool(fault.kind)
-    for one in found.structures:
-        assert one.probability > 0.95
+    for told in found.structures:
+        assert told.probability > 0.95
         if fault.value is not None:
-            low, high = one.interval
+            low, high = told.interval
             assert low - 0.03 <= fault.value <= high + 0.03
     if fault.kind == "health":
         assert found.vehicle[f"health_{fault.of}"] == pytest.approx(fault.health, abs=0.05)

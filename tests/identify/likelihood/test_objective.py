@@ -39,7 +39,7 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
 
 
 @pytest.fixture(scope="module")
-def place(objective: Objective) -> Array:
+def point(objective: Objective) -> Array:
     """Return parameters near the minimum, inside of their bounds. Outliers have kinks, and there is none."""
     louder = np.array([2.0 * (p.kind == "slow force") for p in objective.table.parameters])
     found = minimise(objective, objective.mean + louder * objective.deviation)
@@ -50,17 +50,17 @@ def place(objective: Objective) -> Array:
     return np.asarray(z, float)
 
 
-def test_quadratic_drag_is_that_of_the_model_without_another_power(objective: Objective, place: Array) -> None:
+def test_quadratic_drag_is_that_of_the_model_without_another_power(objective: Objective, point: Array) -> None:
     """J without the prior of q is equal at q = 0, and almost equal next to it."""
     powers = [n for n, p in enumerate(objective.table.parameters) if p.kind.startswith("power of drag")]
     assert len(powers) == 4
     rest = tuple(p for p in objective.table.parameters if not p.kind.startswith("power of drag"))
     plain = Objective(replace(objective.table, parameters=rest), objective.logs, objective.rows)
-    without = np.delete(place, powers)
+    without = np.delete(point, powers)
     runs = plain.runs(without)
     J = plain.value(without, runs)
     for q in (0.0, 1e-11, -1e-11):
-        z = place.copy()
+        z = point.copy()
         z[powers] = q
         own = objective.runs(z, runs)
         assert objective.value(z, own) == pytest.approx(J, abs=1e-6, rel=0.0)
@@ -84,7 +84,7 @@ def names(parameters: Sequence[Parameter]) -> list[str]:
 
 
 def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
-    objective: Objective, place: Array, monkeypatch: pytest.MonkeyPatch
+    objective: Objective, point: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The motion does not depend on it, and derivatives lose much at a kink. Here, their steps are far too long.
 
@@ -92,20 +92,20 @@ def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
     """
     monkeypatch.setattr(parameters, "_MOTION_STEP", 0.03)
     logs = objective.of(Part(range(len(objective.logs)), []))
-    scale = objective.table.scale_of_forces(place)
+    scale = objective.table.scale_of_forces(point)
     for is_exact in (True, False):
-        for one in logs.data(place, logs.runs(place), exact=is_exact):
-            along = np.linalg.norm(one.slopes @ scale[[*one.places]])
-            assert along < 1e-4 * np.linalg.norm(one.slopes * scale[[*one.places]])
+        for data in logs.data(point, logs.runs(point), exact=is_exact):
+            along = np.linalg.norm(data.slopes @ scale[[*data.indices]])
+            assert along < 1e-4 * np.linalg.norm(data.slopes * scale[[*data.indices]])
 
 
 def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
-    objective: Objective, place: Array, monkeypatch: pytest.MonkeyPatch
+    objective: Objective, point: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    runs = objective.runs(place)
+    runs = objective.runs(point)
 
     def errors() -> Array:
-        _, information = total(objective, place, objective.data(place, runs))
+        _, information = total(objective, point, objective.data(point, runs))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
     def one_by_one(self: Filter, record: Record, sets: Parameters, first: Run, **how: bool) -> list[Run]:
@@ -134,8 +134,8 @@ def check_gradient(objective: Objective, z: Array) -> None:
         assert abs(expected) > 1e-6 or name in silent, "a ratio says nothing where there is neither dead band nor loss"
 
 
-def test_the_gradient_is_that_of_j(objective: Objective, place: Array) -> None:
-    check_gradient(objective, place)
+def test_the_gradient_is_that_of_j(objective: Objective, point: Array) -> None:
+    check_gradient(objective, point)
 
 
 def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> None:
@@ -160,32 +160,32 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
 
 @pytest.mark.parametrize("threads", [2, 4])
 def test_the_number_of_threads_changes_no_bit(
-    objective: Objective, place: Array, threads: int, monkeypatch: pytest.MonkeyPatch
+    objective: Objective, point: Array, threads: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def found(cores: int) -> bytes:
         monkeypatch.setattr("rov_fmu.identify.likelihood.objective.usable_cores", lambda: cores)
-        best = minimise(objective, place, most=1)
+        best = minimise(objective, point, most=1)
         arrays = [best.z, best.information, *(one.gains for one in best.runs), *(one.slopes for one in best.data)]
         return b"".join(array.tobytes() for array in arrays)
 
     assert found(threads) == found(1)
 
 
-def test_j_is_the_sum_of_its_parts(objective: Objective, place: Array) -> None:
+def test_j_is_the_sum_of_its_parts(objective: Objective, point: Array) -> None:
     """The prior, each sample of each log, and each row of a table, by the formula."""
-    runs, parameters = objective.runs(place), objective.table.parameters
-    expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(place.tolist(), parameters, strict=True))
-    for off, S in [*((one.innovations, one.variances) for one in runs), objective.row_values(place)]:
+    runs, parameters = objective.runs(point), objective.table.parameters
+    expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(point.tolist(), parameters, strict=True))
+    for off, S in [*((one.innovations, one.variances) for one in runs), objective.row_values(point)]:
         u = np.abs(off) / np.sqrt(S)
         expected += float(
             np.sum(np.log(S) + np.where(u > 3.0, 9.0 + 9.0 * np.log(np.maximum(u, 3.0) ** 2 / 9.0), u * u))
         )
-    assert objective.value(place, runs) == pytest.approx(expected, rel=1e-12)
+    assert objective.value(point, runs) == pytest.approx(expected, rel=1e-12)
 
 
-def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objective, place: Array) -> None:
+def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objective, point: Array) -> None:
     """Without each log and without each row, from the minimum for all data."""
-    best = minimise(objective, place)
+    best = minimise(objective, point)
     logs, rows = objective.whole.logs, objective.whole.rows
     parts = [Part([m for m in logs if m != n], rows) for n in logs] + [Part(logs, [m for m in rows if m != rows[0]])]
     of_motion = np.array([p.of_motion for p in objective.table.parameters])
@@ -198,8 +198,8 @@ def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objec
         assert (np.abs(found.z - again.z) < 1.5 * errors)[of_motion].all()
 
 
-def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objective: Objective, place: Array) -> None:
-    z = np.clip(place, objective.low, objective.high)
+def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objective: Objective, point: Array) -> None:
+    z = np.clip(point, objective.low, objective.high)
     step, data = minimise(objective, z, most=1, last=False), objective.data(z, objective.runs(z), exact=False)
     with patch.object(Objective, "data", side_effect=[data, DivergedError, DivergedError]):
         assert minimise(objective, z, last=False).z == pytest.approx(step.z)
@@ -207,14 +207,14 @@ def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objectiv
             minimise(objective, z, last=False)
 
 
-def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, place: Array) -> None:
+def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, point: Array) -> None:
     """One call for all sets gives the same as a call for each, and the same J."""
     moved = (
-        place[:, None] + 1e-3 * np.random.default_rng(2).standard_normal((len(place), 5)) * objective.deviation[:, None]
+        point[:, None] + 1e-3 * np.random.default_rng(2).standard_normal((len(point), 5)) * objective.deviation[:, None]
     )
     moved = np.clip(moved.T, objective.low, objective.high).T
     off, S = objective.row_values(moved)
-    runs = objective.runs(place)
+    runs = objective.runs(point)
     trials = objective.trials(moved, [objective.whole] * 5, runs)
     for n in range(5):
         one_off, one_S = objective.row_values(moved[:, n])

@@ -141,28 +141,31 @@ def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:
             assert [c[name], c[f"{name}_reverse"]] == pytest.approx([of(kind, axis), ratio * of(kind, axis)])
         assert c[f"beta_{v}"] == pytest.approx(base[f"beta_{v}"] / of("inertia", axis))
         assert c[f"F_0_{v}"] == of("load", axis)
-    one, other = (table.of_log(z, log) for log in (heave, surge))
-    assert one.offset == of("logging offset", "log_heave_0.csv") + of("dead time")
-    assert one.width == of("logging width", "log_heave_0.csv")
+    of_heave, of_surge = (table.of_log(z, log) for log in (heave, surge))
+    assert of_heave.offset == of("logging offset", "log_heave_0.csv") + of("dead time")
+    assert of_heave.width == of("logging width", "log_heave_0.csv")
     slow = {
         8.0: [table.full["heave"] * of("inertia", "heave") * of("slow force", "heave"), of("slow velocity", "heave")],
         60.0: [of("slow gain")],
         of("correlation time", "depth"): [of("white noise", "depth") * of("coloured noise", "depth")],
     }
-    for process in (*one.forces, one.gain, one.drifts[2], *one.noise):
+    for process in (*of_heave.forces, of_heave.gain, of_heave.drifts[2], *of_heave.noise):
         assert process.size == pytest.approx(slow[process.time_constant].pop(0))
-    assert one.white == (of("white noise", "depth"),)
+    assert of_heave.white == (of("white noise", "depth"),)
     sideways = of("slow velocity", "horizontal")
-    drifts = [drift.size for drift in (*one.drifts[:2], *other.drifts)]
+    drifts = [drift.size for drift in (*of_heave.drifts[:2], *of_surge.drifts)]
     assert drifts == [0.0, 0.0, sideways, sideways, 0.0]
-    for p, tested in ((one, HEAVE), (other, SURGE)):
+    for p, tested in ((of_heave, HEAVE), (of_surge, SURGE)):
         ((q, back, typical),) = p.powers
         more = [of(f"power of drag{end}", tested.name) for end in ("", " astern")]
         assert np.array([q, back - q]) == pytest.approx(more)
         quadratic, linear = (base[tested.coefficient(key)] for key in ("a_d", "b_d"))
         quarter = 0.25 * table.full[tested.name]
         assert quadratic * typical**2 + linear * typical == pytest.approx(quarter), "of full thrust"
-    assert [p.coefficients["V_N"] for p in (one, other)] == [0.0, of("current", "log_surge_0.csv", "to the north")]
+    assert [p.coefficients["V_N"] for p in (of_heave, of_surge)] == [
+        0.0,
+        of("current", "log_surge_0.csv", "to the north"),
+    ]
 
 
 def test_a_linear_drag_of_0_has_a_prior_next_to_0(fit: Fit) -> None:

@@ -115,17 +115,17 @@ CASES: Mapping[str, tuple[Log, list[str], list[str]]] = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_a_log_tests_the_axes_that_it_pushes_and_measures(case: str) -> None:
-    one, axes, told = CASES[case]
-    tested, findings = driven_axes(one, VIDEORAY.layout)
+    read, axes, told = CASES[case]
+    tested, findings = driven_axes(read, VIDEORAY.layout)
     assert [axis.name for axis in tested] == axes
     assert [line.removeprefix("a.csv: ") for line in sentences(findings)] == told
-    assert (recorded(one, VIDEORAY.layout) is None) is (not axes)
+    assert (recorded(read, VIDEORAY.layout) is None) is (not axes)
 
 
 def test_the_channels_of_an_axis_that_is_not_pushed_still_tell_how_the_vehicle_moved() -> None:
-    one = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), VIDEORAY.layout)
-    assert one
-    assert [sensor.axis.name for sensor in one.record.sensors] == ["surge", "heave", "yaw"]
+    sampled = recorded(dive(STEP, STEP, 0.0 * STEP, *moving(*MOTION)), VIDEORAY.layout)
+    assert sampled
+    assert [sensor.axis.name for sensor in sampled.record.sensors] == ["surge", "heave", "yaw"]
 
 
 FAST: Array = 0.02 * np.arange(1000.0)
@@ -135,9 +135,9 @@ DEPTH = 2.0 + 0.3 * FAST + 0.01 * np.random.default_rng(0).standard_normal(1000)
 def test_the_filter_reads_averages_of_fast_samples_and_all_slow_ones() -> None:
     """Of 50 samples per second and 10, 20 are kept and 10; a first fit has 5 single ones of both."""
     channels = channel("depth", FAST, DEPTH), *moving("surge velocity")
-    one = recorded(dive(STEP, 0.0 * STEP, STEP, *channels), VIDEORAY.layout)
-    assert one
-    full, thin, depth = one.record, one.thinned, one.measured[0]
+    sampled = recorded(dive(STEP, 0.0 * STEP, STEP, *channels), VIDEORAY.layout)
+    assert sampled
+    full, thin, depth = sampled.record, sampled.thinned, sampled.measured[0]
     groups = np.floor(20.0 * FAST + 1e-6)
     for told, of in ((full.time, FAST), (full.value, DEPTH)):
         assert told[full.sensor == 0] == pytest.approx([of[groups == n].mean() for n in range(400)])
@@ -145,30 +145,30 @@ def test_the_filter_reads_averages_of_fast_samples_and_all_slow_ones() -> None:
     assert thin.time == pytest.approx(np.repeat(0.2 * np.arange(100.0), 2))
     assert thin.value[thin.sensor == 0] == pytest.approx(DEPTH[::10])
     assert np.all(np.diff(full.time) >= 0.0)
-    assert (one.has_velocities, one.has_positions) == (True, False)
+    assert (sampled.has_velocities, sampled.has_positions) == (True, False)
     assert depth.noise == pytest.approx(0.01, rel=0.1)
     assert full.start == VIDEORAY.layout.at_rest | {"z": DEPTH[0]}
-    usual = {"w": 0.3, "r": 0.3, "psi": 0.1, "z": 3.0 * depth.noise, "u": 0.03 + 3.0 * one.measured[1].noise}
+    usual = {"w": 0.3, "r": 0.3, "psi": 0.1, "z": 3.0 * depth.noise, "u": 0.03 + 3.0 * sampled.measured[1].noise}
     assert full.errors == usual, "a horizontal position that no sensor measures is not followed"
     assert [*full.since] == [0.0, TIME[50]]
     assert full.inputs[:, [*VIDEORAY.layout.inputs].index("u_l")].tolist() == [0.0, 0.4]
-    assert [typical([one], axis) for axis in (HEAVE, SURGE, YAW)] == pytest.approx([0.3, 0.04, 0.0], rel=0.1)
+    assert [typical([sampled], axis) for axis in (HEAVE, SURGE, YAW)] == pytest.approx([0.3, 0.04, 0.0], rel=0.1)
 
 
 @pytest.mark.parametrize(("speed", "start", "error"), [(0.8, 0.8, 0.7), (0.5, 0.0, 0.3)])
 def test_a_vehicle_that_moves_at_the_start_begins_with_the_velocity_of_its_position(
     speed: float, start: float, error: float
 ) -> None:
-    one = recorded(dive(STEP, STEP, STEP, channel("depth", TIME, 1.0 + speed * TIME)), VIDEORAY.layout)
-    assert one
-    assert (one.record.start["w"], one.record.errors["w"]) == pytest.approx((start, error))
+    sampled = recorded(dive(STEP, STEP, STEP, channel("depth", TIME, 1.0 + speed * TIME)), VIDEORAY.layout)
+    assert sampled
+    assert (sampled.record.start["w"], sampled.record.errors["w"]) == pytest.approx((start, error))
 
 
 def test_a_free_decay_begins_with_the_velocity_of_its_position_however_small() -> None:
-    one = recorded(CASES["a free decay by a position"][0], VIDEORAY.layout)
-    assert one
+    sampled = recorded(CASES["a free decay by a position"][0], VIDEORAY.layout)
+    assert sampled
     mean = float(np.mean(FADING[1:11]))
-    assert (one.record.start["r"], one.record.errors["r"]) == pytest.approx((mean, 0.3 + 0.5 * mean), rel=0.02)
+    assert (sampled.record.start["r"], sampled.record.errors["r"]) == pytest.approx((mean, 0.3 + 0.5 * mean), rel=0.02)
 
 
 def test_a_voltage_has_a_row_for_each_thousandth_and_tilt_is_an_input() -> None:
@@ -179,13 +179,13 @@ def test_a_voltage_has_a_row_for_each_thousandth_and_tilt_is_an_input() -> None:
         channel("pitch angle", TIME, pitch),
         channel("roll angle", TIME[::2], TIME[::2]),
     )
-    one = recorded(dive(STEP, STEP, STEP, *more, *moving("depth")), layout)
-    assert one
-    changed = one.record.inputs[:, [*layout.inputs].index("voltage")]
+    sampled = recorded(dive(STEP, STEP, STEP, *more, *moving("depth")), layout)
+    assert sampled
+    changed = sampled.record.inputs[:, [*layout.inputs].index("voltage")]
     steps = -np.diff(changed) / changed[:-1]
     assert 0.001 < min(steps) < max(steps) < 0.0015
-    assert changed == pytest.approx(np.interp(one.record.told, TIME, volts))
-    assert one.record.tilt == pytest.approx(np.array([TIME, np.minimum(TIME, TIME[198]), pitch]))
+    assert changed == pytest.approx(np.interp(sampled.record.told, TIME, volts))
+    assert sampled.record.tilt == pytest.approx(np.array([TIME, np.minimum(TIME, TIME[198]), pitch]))
 
 
 def test_the_attitude_at_the_start_is_that_of_the_first_angles() -> None:
@@ -194,8 +194,10 @@ def test_the_attitude_at_the_start_is_that_of_the_first_angles() -> None:
         {"heading": 1.1, "pitch angle": -0.2, "roll angle": 0.3},
     )
     channels = [channel(name, TIME, value + 0.01 * np.sin(TIME)) for name, value in angles.items()]
-    one = recorded(log(commands(TIME, {t.name: STEP for t in layout.thrusters}), *channels, *moving("depth")), layout)
-    assert one
+    sampled = recorded(
+        log(commands(TIME, {t.name: STEP for t in layout.thrusters}), *channels, *moving("depth")), layout
+    )
+    assert sampled
     x, y, z, w = Rotation.from_euler("ZYX", [*angles.values()]).as_quat()
-    assert [one.record.start[name] for name in QUATERNION] == pytest.approx([w, x, y, z])
-    assert {one.record.errors[name] for name in QUATERNION} == {0.1}
+    assert [sampled.record.start[name] for name in QUATERNION] == pytest.approx([w, x, y, z])
+    assert {sampled.record.errors[name] for name in QUATERNION} == {0.1}

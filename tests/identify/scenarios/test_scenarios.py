@@ -49,9 +49,9 @@ def test_what_is_judged_is_read_from_the_result() -> None:
     result = without_findings()
     truths = {("surge", "a_d_u"): 8.0, ("heave", "b_d_w"): 2.0, ("", "T_top"): 0.3, ("", "b_t_top"): 0.0}
     truths |= {("surge", "V_ss 30 %"): 0.3, ("surge", "V_ss -70 %"): -0.7}
-    one = replace(result.axes[0].predictions[0], measured=np.array([0.0, 1.0, np.nan, 5.0]))
-    one = replace(one, predicted=np.zeros(4), deviation=np.ones(4))
-    found = read_result(result, truths, [one], 2.0)
+    prediction = replace(result.axes[0].predictions[0], measured=np.array([0.0, 1.0, np.nan, 5.0]))
+    prediction = replace(prediction, predicted=np.zeros(4), deviation=np.ones(4))
+    found = read_result(result, truths, [prediction], 2.0)
     covered = {estimate.quantity: estimate.covered for estimate in found.estimates}
     assert covered == {"a_d_u": False, "b_d_w": True, "T_top": False, "b_t_top": False, "V_ss 30 %": True}
     assert found.effects == (("lag", "top", 0.12), ("current", "log_1.csv", 0.1))

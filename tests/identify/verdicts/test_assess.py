@@ -49,19 +49,19 @@ def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
     found = answers([uncertain], SURGE, file, FULL)
     assert axis
     assert [one.command for one in found] == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0]
-    for one in found:
-        c = one.command
+    for answer in found:
+        c = answer.command
         slopes = np.log(numbers(more, c) / numbers(less, c)) / 0.02
         half = t.ppf(0.975, 10) * 0.04 * np.abs(slopes)
         for (value, (low, high)), number, fitted, width in zip(
-            (one.steady, one.rise, one.stop), numbers(file, c), numbers(VIDEORAY, c), half, strict=True
+            (answer.steady, answer.rise, answer.stop), numbers(file, c), numbers(VIDEORAY, c), half, strict=True
         ):
             assert abs(value) == pytest.approx(number)
             assert low < value < high
             ends = np.minimum(fitted * np.exp(-width), number * 0.99), np.maximum(fitted * np.exp(width), number * 1.01)
             assert sorted(map(abs, (low, high))) == pytest.approx(ends, rel=1e-3)
-    for one in answers([of_drag(0.0)], SURGE, VIDEORAY, FULL):
-        for value, (low, high) in (one.steady, one.rise):
+    for answer in answers([of_drag(0.0)], SURGE, VIDEORAY, FULL):
+        for value, (low, high) in (answer.steady, answer.rise):
             assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
 
 
@@ -123,10 +123,10 @@ def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
     rov = load_vehicle(REFIT)
     names, rows = rov.uncertainty.names, np.random.default_rng(0).random((1000, len(rov.uncertainty.names)))
     drawn = [rov.with_(**dict(zip(names, row, strict=True))) for row in rov.uncertainty.drawn(rows).tolist()]
-    for one, exact in zip(answers_of_file(rov, HEAVE), answers_of_file(VIDEORAY, HEAVE), strict=True):
-        numbers = np.array([k.response(HEAVE, one.command) for k in drawn])
+    for answer, exact in zip(answers_of_file(rov, HEAVE), answers_of_file(VIDEORAY, HEAVE), strict=True):
+        numbers = np.array([k.response(HEAVE, answer.command) for k in drawn])
         for (value, interval), some, own in zip(
-            (one.steady, one.rise), numbers.T, rov.response(HEAVE, one.command), strict=True
+            (answer.steady, answer.rise), numbers.T, rov.response(HEAVE, answer.command), strict=True
         ):
             assert value == pytest.approx(own)
             assert interval == pytest.approx(np.quantile(some, (0.025, 0.975)), abs=0.3 * np.std(some))

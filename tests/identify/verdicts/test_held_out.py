@@ -86,10 +86,10 @@ def test_a_fit_to_a_part_is_the_minimum_for_this_part(fit: Fit) -> None:
         p if p.of_motion else replace(p, low=z, high=z) for p, z in zip(table.parameters, best.z.tolist(), strict=True)
     )
     still = Objective(replace(table, parameters=fixed), objective.logs, objective.rows)
-    for one in held_out(objective, best)[:2]:
-        part = still.of(one.part)
-        reached = part.value(one.fit.z, part.runs(one.fit.z))
-        assert minimise(part, one.fit.z).value == pytest.approx(reached, abs=0.5)
+    for held in held_out(objective, best)[:2]:
+        part = still.of(held.part)
+        reached = part.value(held.fit.z, part.runs(held.fit.z))
+        assert minimise(part, held.fit.z).value == pytest.approx(reached, abs=0.5)
 
 
 def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:

@@ -35,8 +35,8 @@ class Identified:
         table = table_of(self.found.known, [recording.log], [])
         z = np.array([p.mean for p in table.parameters])
         covariance = np.diag([p.deviation**2 for p in table.parameters])
-        places = [(n, own.table.place(p.kind, p.of, p.part)) for n, p in enumerate(table.parameters) if p.log is None]
-        here, there = np.array([(n, place) for n, place in places if place is not None]).T
+        indices = [(n, own.table.index(p.kind, p.of, p.part)) for n, p in enumerate(table.parameters) if p.log is None]
+        here, there = np.array([(n, index) for n, index in indices if index is not None]).T
         z[here], covariance[np.ix_(here, here)] = own.z[there], own.covariance[np.ix_(there, there)]
         for n, p in enumerate(table.parameters):
             if p.kind == "current":
