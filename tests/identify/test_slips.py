@@ -137,7 +137,12 @@ QUESTIONS = {
 def asked(folder: Path, *logs: Measured, rov: str) -> dict[tuple[str, str], str]:
     """Return what is asked about the first 30 s of some logs, by file and quantity. Forces replace a base."""
     some = [replace(r, **{key: getattr(r, key)[:150] for key in ("time", "command", "values")}) for r in logs]
-    tests = load_tests(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
+    return asked_of(folder_of(write_folder(folder, some), rov, FORCES if "base" not in rov else {}))
+
+
+def asked_of(folder: Path) -> dict[tuple[str, str], str]:
+    """Return what is asked about the files of a folder, by file and quantity."""
+    tests = load_tests(folder)
     known, recorded, rows = begin(tests)
     objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
     found = slips(tests, known, objective, objective.mean, np.full(len(objective.mean), np.inf))
@@ -213,6 +218,30 @@ def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> No
     assert not told(write_folder(tmp_path, recordings(axis)[:2]))
 
 
+def mirrored(folder: Path, *columns: str) -> Path:
+    """Write dives in all axes, and return the last one, in which some columns have the other sign."""
+    COMPLETE["pilot"].write(0, folder)
+    file = sorted(folder.glob("*.csv"))[-1]
+    header, *rows = (line.split(",") for line in file.read_text(encoding="utf-8").splitlines())
+    for index in map(header.index, columns):
+        for row in rows:
+            row[index] = str(-float(row[index])) if row[index] else ""
+    file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
+    return file
+
+
+@pytest.mark.long
+def test_a_mirrored_frame_is_one_question(tmp_path: Path) -> None:
+    """Depth and heading are wrong together, as in a frame that is up and to port. The velocity ahead is right."""
+    file = mirrored(tmp_path, "depth [m]", "heading [deg]")
+    for other in {*tmp_path.glob("*.csv")} - {file}:
+        other.unlink()
+    file.write_text("\n".join(file.read_text(encoding="utf-8").splitlines()[:401]), encoding="utf-8")  # 20 s are enough
+    ((of, words),) = asked_of(tmp_path).items()
+    assert of == (file.name, "frame")
+    assert "north-east-down" in words
+
+
 @pytest.mark.parametrize(
     "column",
     [
@@ -223,13 +252,7 @@ def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> No
 )
 def test_a_mirrored_column_of_a_dive_in_all_axes_is_the_only_one_named(column: str, tmp_path: Path) -> None:
     """The other columns of the file are right, though all thrusters move the vehicle at once."""
-    COMPLETE["pilot"].write(0, tmp_path)
-    file = sorted(tmp_path.glob("*.csv"))[-1]
-    header, *rows = (line.split(",") for line in file.read_text(encoding="utf-8").splitlines())
-    index = header.index(column)
-    for row in rows:
-        row[index] = str(-float(row[index])) if row[index] else ""
-    file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
+    file = mirrored(tmp_path, column)
     quantity, _ = column.split(" [")
     (line,) = told(tmp_path)
     assert names([line], file.name, rf"{quantity}.*{_TURNED}")

@@ -12,6 +12,10 @@ Added mass is never negative, so an inertia below the vehicle's own is as unlike
 distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s. So is
 the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
+A frame forward, to starboard, down that is read as one forward, to port, up changes the signs of several channels of a
+source together, and so does the other way round. With north-east-down read as east-north-up, headings and positions are
+the mirror image of the true ones, and where north is does not matter here. So the frame of a source is a scaling, too.
+
 Only few scalings are fitted. The vehicle of the priors first simulates every log, which takes two runs of the filter:
 only a channel that would agree with this motion for another k, but not for 1, is suspected. The priors do not tell
 knots and feet from metres. These are suspected where the inertia is too small, or where two channels of an axis differ
@@ -24,7 +28,7 @@ from math import hypot, log, pi
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import REVERSE, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, SWAY, YAW, Axis
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
@@ -37,6 +41,7 @@ from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.search import Adopted
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import Slip
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel, Log
 
@@ -52,6 +57,8 @@ _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
 _KNOTS, _FEET = 3600.0 / 1852.0, 1.0 / 0.3048
 _CUSTOMARY = {_KNOTS: "in knots", _FEET: "in {}"}
 """What the scales of other units of length and speed mean; `{}` is the unit with feet."""
+_MIRRORED = (SWAY, HEAVE, PITCH, YAW)
+"""The axes along which a motion has the other sign in a frame forward, to port, up."""
 _SAME = 0.15
 """The largest logarithm of the ratio of two channels to that of their units."""
 _NEAR = 0.5 * log(10.0)
@@ -107,7 +114,8 @@ def slips(
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
-    untried = {*_scalings(suspected)}
+    frames = {*_frames(compared, suspected)}
+    untried = {*_scalings(suspected), *frames}
     if not untried:
         return ()
 
@@ -119,12 +127,15 @@ def slips(
     while untried:  # The best explanation may need fewer channels than it has.
         J |= {one: least(one) for one in untried}
         first = min(J, key=lambda one: J[one])
-        untried = {first - {member} for member in first} - J.keys() - {frozenset()}
+        fewer = set[Scaling]() if first in frames else {first - {member} for member in first}
+        untried = fewer - J.keys() - {frozenset()}
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
     for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
         for match, scale in scaling:
-            words = told.setdefault((match.file, match.channel.quantity.name), {})
-            words.setdefault(_words(match.channel, scale), as_it_is - J[scaling])
+            name, question = match.channel.quantity.name, _words(match.channel, scale)
+            if scaling in frames:
+                name, question = _frame_in_words(scaling)
+            told.setdefault((match.file, name), {}).setdefault(question, as_it_is - J[scaling])
     return tuple(
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
@@ -189,6 +200,26 @@ def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
         yield frozenset((one, scale) for one, scales in likely.items() if scale in scales)
     if likely:
         yield frozenset((one, scales[0]) for one, scales in likely.items())
+
+
+def _frames(compared: Sequence[_Match], suspected: Collection[_Match]) -> Iterator[Scaling]:
+    """Yield the channels of each source, and of each file, whose signs its frame decides.
+
+    At least one of them is suspected of the other sign.
+    """
+    turned = [m for m in compared if m.channel.quantity.axis in _MIRRORED]
+    sources = grouped(((m.file, source), m) for m in turned for source in (m.channel.source, ""))
+    for some in sources.values():
+        has_two = len({m.channel.quantity.axis for m in some}) > 1
+        if has_two and any(m in suspected and -1.0 in m.scales for m in some):
+            yield frozenset((m, -1.0) for m in some)
+
+
+def _frame_in_words(frame: Scaling) -> tuple[str, str]:
+    """Return what the frame of some channels is called, and a mistake in it as a question."""
+    sources = {match.channel.source for match, _ in frame}
+    question = "do up and down, and port and starboard, have the other meaning (north-east-down is not east-north-up)"
+    return f"frame of {sources.pop()}" if len(sources) == 1 else "frame", question
 
 
 def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Array | None = None) -> float:
