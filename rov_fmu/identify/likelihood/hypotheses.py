@@ -324,7 +324,7 @@ HYPOTHESES = {
         0.02,
         _with_both_velocities,
         _with_parameter(TURN),
-        tuple(radians(degrees) for degrees in (45.0, 90.0, 135.0, 180.0, -135.0, -90.0, -45.0)),
+        tuple(sign * radians(degrees) for degrees in (6.0, 15.0, 45.0, 90.0, 135.0, 175.0) for sign in (1.0, -1.0)),
         "the velocity sensor is turned by {value} about the vertical axis, positive to starboard{odds}. The fit turns "
         "its values back. Correct the angle of mounting where the log is made",
         least=0.05,

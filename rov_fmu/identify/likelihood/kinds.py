@@ -7,7 +7,7 @@ deviation is estimated from one effect.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import inf, log
+from math import inf, log, pi
 from typing import Any, Literal
 
 import numpy as np
@@ -528,8 +528,8 @@ KINDS = {
         "angle of the velocity sensor about the vertical axis",
         ". The vehicle file does not have it, because it describes the vehicle without its sensors",
         deviation=1.5,
-        low=-4.0,
-        high=4.0,
+        low=-pi,
+        high=pi,
         null=0.0,
         unit="rad",
         is_of_structure=True,
