@@ -2,6 +2,8 @@
 
 import gc
 import hashlib
+import os
+import sys
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from functools import partial
@@ -24,6 +26,10 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, with_rotors
+
+# Containers often forbid bytecode. Each worker then rewrites all tests, and each command compiles its modules, anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 compile_anew = compilation._Library.compile
 """The method that compiles a library even if another test has done so."""
