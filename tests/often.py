@@ -15,7 +15,7 @@ def often(name: str, usual: Any, long: Any, weekly: Any = None) -> pytest.MarkDe
 
 
 def spread(cases: Iterable[Any], default: Collection[Any] = (), long: Collection[Any] = ()) -> list[Any]:
-    """Return the cases of a property: some for the default tests, some for the long ones, the others for once a week."""
+    """Return the cases of a property: some for the default tests, some for the long ones, others for once a week."""
 
     def kind(case: Any) -> Any:
         return () if case in default else pytest.mark.long if case in long else pytest.mark.weekly
