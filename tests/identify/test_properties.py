@@ -46,11 +46,10 @@ def least_without_evidence(fit: Fit) -> float:
     return minimise(fit.objective.without(places), fit.best.z).value if places else fit.best.value
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_the_file_is_a_minimum_without_the_weakest_effects(seed: int, tmp_path: Path) -> None:
+def test_the_file_is_a_minimum_without_the_weakest_effects(tmp_path: Path) -> None:
     """J rises by 2 at most, to a tenth. `written` compares J of the numbers of the file with that of the fit, and a fit
     from elsewhere is not better."""
-    fit, vehicle, _ = drawn(tmp_path, 0.01, 0.02, seed)
+    fit, vehicle, _ = drawn(tmp_path, 0.01, 0.02, 1)
     file, parameters = fit.file, fit.file.posterior.table.parameters
     assert file.posterior.absent
     assert file.minimum.value - least_without_evidence(fit) <= 2.1

@@ -126,8 +126,6 @@ FORWARD, STARBOARD, DOWN = (
 QUESTIONS = {
     "heave up": DOWN,
     "depths a hundredfold": "is it in cm",
-    "distances a hundredfold": "is it in cm",
-    "depths a tenth": "are its numbers 10 times too small for its unit",
     "distances a tenth": "are its numbers 10 times too small for its unit",
     "radians under degrees": "is it in radians instead of degrees",
     "degrees under radians": "is it in degrees instead of radians",
