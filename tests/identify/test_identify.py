@@ -349,7 +349,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
 
 @pytest.mark.parametrize(
     "key",
-    spread([key for key in PRIORS if not key.endswith("noise")], ["thrust_shape"], ["voltage", "lag", "drag_power", "load"]),
+    spread([key for key in PRIORS if not key.endswith("noise")], ["thrust_shape"], ["voltage", "lag", "drag_power"]),
 )
 def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
     rov = f'base = "videoray"\nagainst = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'

@@ -10,6 +10,7 @@ from tests.identify.scenarios.judge import at_least
 from tests.identify.scenarios.outcome import Estimate, Outcome, outcome
 from tests.identify.scenarios.verdicts import RIGHT, WRONG, Line, broken, off, run
 
+
 def test_a_right_model_is_good() -> None:
     """The others are run every week."""
     line = Line.of([run("load of 0.6 %", 0)])
