@@ -2,7 +2,9 @@
 
 import gc
 import hashlib
-from collections.abc import Callable, Generator, Iterator
+import os
+import sys
+from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -15,9 +17,11 @@ from fmpy.fmi2 import defaultCallbacks, fmi2CallbackLoggerTYPE, printLogMessage
 from hypothesis import settings
 
 from rov_fmu.c import compile as compilation
-from rov_fmu.c.compile import UNITY_FILE, compile_all, host_platform
+from rov_fmu.c.compile import ENGINE_FILE, LANES_FILE, compile_all, host_platform
+from rov_fmu.c.library import engine_sources
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
+from rov_fmu.equation.layout import Layout
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -25,6 +29,11 @@ from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, with_rotors
 
+# Containers often forbid bytecode. Each worker then rewrites all tests, and each command compiles its modules, anew.
+sys.dont_write_bytecode = False
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
+VIDEORAY_LAYOUT = load_vehicle(VIDEORAY).layout
 compile_anew = compilation._Library.compile
 """The method that compiles a library even if another test has done so."""
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
@@ -154,6 +163,24 @@ def videoray3_dir(videoray3_fmu: Path) -> Path:
     return videoray3_fmu.with_suffix("")
 
 
+def out_of_line(sources: Mapping[str, str]) -> dict[str, str]:
+    """Return C files without the inlining that takes most of the compiler's time. They compute the same bits."""
+    return {name: text.replace("always_inline", "noinline") for name, text in sources.items()}
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _engines_quickly() -> Iterator[None]:
+    """Compile the engines of all vehicles but the VideoRay's out of line. Filters have nothing that is inlined."""
+
+    def quick(layout: Layout, file: Path = ENGINE_FILE) -> dict[str, str]:
+        sources = engine_sources(layout, file)
+        return out_of_line(sources) if file in (ENGINE_FILE, LANES_FILE) and layout != VIDEORAY_LAYOUT else sources
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("rov_fmu.c.library.engine_sources", quick)
+        yield
+
+
 @contextmanager
 def without_page() -> Iterator[None]:
     """Let builds in this process leave out the FMU's page, which takes most of their time."""
@@ -166,14 +193,13 @@ def without_page() -> Iterator[None]:
 def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """Write the unzipped FMU of a vehicle, without its page, to a folder, and return the folder.
 
-    It is compiled without the inlining that takes most of the compiler's time. The VideoRay's is built as it ships.
+    It is compiled out of line. The VideoRay's is built as it ships.
     """
     from rov_fmu.fmu.content import native_content
 
     platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi)
     assert platform
-    sources = {**content.sources, UNITY_FILE: f"#define always_inline noinline\n{content.sources[UNITY_FILE]}"}
-    (library,) = compile_all([platform], sources, content.identifier, fmi=fmi).values()
+    (library,) = compile_all([platform], out_of_line(content.sources), content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     binary = f"binaries/{host}/{content.identifier}{fmpy.sharedLibraryExtension}"
     for name, data in {**content.files, binary: library}.items():

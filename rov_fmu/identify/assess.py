@@ -5,7 +5,6 @@ from dataclasses import replace
 from math import isfinite
 
 import numpy as np
-from scipy.stats.qmc import Sobol
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.parts import Curve
@@ -208,6 +207,8 @@ def answers_of_file(vehicle: Vehicle, axis: Axis) -> tuple[Answer, ...]:
     The intervals contain 95 % of the vehicles that its estimates allow; a file without estimates has none, so that they
     have no width.
     """
+    from scipy.stats.qmc import Sobol  # imported here because it is slow
+
     known = vehicle.uncertainty
     drawn = known.drawn(Sobol(max(len(known.names), 1), seed=1).random(_DRAWS)[:, : len(known.names)])
     drawn = np.vstack([[vehicle[name] for name in known.names], drawn])

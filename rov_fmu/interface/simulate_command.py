@@ -10,8 +10,6 @@ from typing import Any
 
 from rov_fmu.equation.layout import Layout
 from rov_fmu.interface.arguments import STEP, TIME, name_at_start, result_times
-from rov_fmu.interface.command_files import read_inputs
-from rov_fmu.interface.fly_command import open_in_browser
 from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
@@ -58,6 +56,8 @@ def simulate_vehicle(path: Path, options: Options) -> None:
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     written = write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
     if opens and picture:
+        from rov_fmu.interface.fly_command import open_in_browser  # imported here because pages are slow
+
         open_in_browser(picture, "--plot FILE.svg")
     if output or picture:
         following = "" if opens else "open the plot" if plot else "add --plot to see the curves"
@@ -87,6 +87,8 @@ def run(vehicle: VehicleModel, options: Options) -> Result:
     commands, stop, step = options.commands, options.stop, options.step
     inputs: dict[str, Any] = {}
     if commands:
+        from rov_fmu.interface.command_files import read_inputs  # imported here because readers of logs are slow
+
         inputs = {**read_inputs(commands, vehicle.layout)}
         if stop is None:
             stop = float(inputs[TIME][-1])

@@ -140,7 +140,7 @@ def test_a_run_is_the_same_in_pieces_and_in_lanes(name: str) -> None:
 
 @pytest.mark.parametrize(
     "axes",
-    [pytest.param(axes, marks=pytest.mark.weekly if n % 4 else pytest.mark.long) for n, axes in enumerate(SUBSETS, 1)],
+    [pytest.param(axes, marks=pytest.mark.weekly if n % 16 else pytest.mark.long) for n, axes in enumerate(SUBSETS, 1)],
 )
 def test_a_run_of_any_vehicle_is_the_same_in_pieces_and_in_lanes(axes: str) -> None:
     """63 subsets of the axes. The engine of each is compiled."""
@@ -172,7 +172,7 @@ def test_a_vehicle_that_cannot_be_computed_affects_no_other_and_the_next_one_tak
     np.testing.assert_allclose(found.values[:, others], good[:, others], rtol=1e-12, atol=1e-14)
 
 
-@often("cases", 10, 100, 1000)
+@often("cases", 10, 30, 1000)
 @pytest.mark.parametrize("name", KNOWN)
 def test_a_step_in_python_may_be_cut_and_is_that_of_the_engine(name: str, cases: int) -> None:
     """Commands act at once, unless others are given that act after the dead time."""

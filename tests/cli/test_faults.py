@@ -13,6 +13,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
 from tests.commands import ALONE, COMMANDS, ROOT, start, without_progress
+from tests.often import spread
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
 OLD = b"the old one"
@@ -32,9 +33,13 @@ def _kill(process: subprocess.Popen[str], folder: Path, after: float | None) -> 
 
 
 @pytest.mark.parametrize(
-    "moments", [pytest.param(3, marks=pytest.mark.long), pytest.param(20, marks=pytest.mark.weekly)]
+    ("keys", "moments"),
+    [
+        pytest.param([("identify", "output"), ("identify", "report")], 3, marks=pytest.mark.long),
+        pytest.param([("identify", "output"), ("identify", "report")], 20, marks=pytest.mark.weekly),
+        pytest.param([("build", "output")], 20, marks=pytest.mark.weekly),
+    ],
 )
-@pytest.mark.parametrize("keys", [[("build", "output")], [("identify", "output"), ("identify", "report")]])
 def test_a_killed_command_leaves_whole_files_and_the_next_one_is_right(
     keys: list[tuple[str, str]], moments: int, tmp_path: Path
 ) -> None:
@@ -117,7 +122,7 @@ _QUICK = (("tune", "output"), ("simulate", "plot"))
 
 @pytest.mark.parametrize(
     "key",
-    [pytest.param(key, marks=() if key in _QUICK else pytest.mark.long) for key in COMMANDS if key[0] != "sitl"],
+    spread([key for key in COMMANDS if key[0] != "sitl"], _QUICK, [("build", "osp"), ("identify", "report")]),
     ids=" ".join,
 )
 def test_an_interrupt_before_the_last_move_leaves_nothing(key: tuple[str, str], tmp_path: Path) -> None:

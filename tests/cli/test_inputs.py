@@ -153,12 +153,12 @@ def test_what_is_no_file_is_one_line_that_names_it(
 
 
 SOME = ["the vehicle of the tables", "the points", "rov.toml", "a tank test"]
-"""The quick cases; the long tests try all."""
+"""The quick cases; the weekly tests try all."""
 
 
 @pytest.mark.parametrize(
     ("cases", "modes"),
-    [(SOME, [0o600]), pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.long)],
+    [(SOME, [0o600]), pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.weekly)],
     ids=["some", "all"],
 )
 def test_what_may_not_be_read_is_one_line_that_names_it(

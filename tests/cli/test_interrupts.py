@@ -20,6 +20,7 @@ from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT, TESTS, endless_compiler, without_progress
+from tests.often import spread
 from tests.recordings import PLANS, run, write_log
 
 fcntl = pytest.importorskip("fcntl", reason="terminals and signals are POSIX")
@@ -115,14 +116,11 @@ class Command:
 
 _MOMENTS = (None, 0.0, 0.02, 0.1, 0.3, 0.6, 1.0, 1.5, 2.0, 3.0)
 """Seconds after the first worker of a study has started; None is when the first runs are written."""
-_OFTEN = (None, 0.0)
-"""Those that are tried on every change."""
 
 
-@pytest.mark.parametrize(
-    "later", [pytest.param(m, marks=pytest.mark.long if m in _OFTEN else pytest.mark.weekly) for m in _MOMENTS]
-)
-@pytest.mark.parametrize("end", [Command.press_ctrl_c, Command.terminate])
+@pytest.mark.long
+@pytest.mark.parametrize("later", spread(_MOMENTS, (), [None]))
+@pytest.mark.parametrize("end", [Command.press_ctrl_c, pytest.param(Command.terminate, marks=pytest.mark.weekly)])
 def test_a_study_ends_with_one_line(
     end: Callable[[Command], str], later: float | None, videoray_fmu: Path, tmp_path: Path
 ) -> None:
@@ -159,7 +157,7 @@ def test_a_compiler_ends_with_its_command(tmp_path: Path) -> None:
     assert not [*(tmp_path / "out").iterdir()]
 
 
-@pytest.mark.parametrize("moment", [b"start 1", *(pytest.param(m, marks=pytest.mark.long) for m in (b"heave", b"dra"))])
+@pytest.mark.parametrize("moment", spread((b"start 1", b"heave", b"dra"), [b"start 1"], [b"dra"]))
 def test_an_interrupted_identification_keeps_the_old_file(moment: bytes, tmp_path: Path) -> None:
     """The moment is a word beside the bar; the last one is the drawing of the report."""
     folder, output = Path(shutil.copytree(TESTS, tmp_path / "tests")), tmp_path / "out" / "rov.toml"

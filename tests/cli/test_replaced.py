@@ -13,6 +13,7 @@ from rov_fmu.io.output import Output, WriteError, check_targets, sealed, write_w
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, FILES, READING, WRITING, without_progress
 from tests.conftest import without_page
+from tests.often import spread
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -63,7 +64,8 @@ _WORK = (
     "rov_fmu.study.study_command.run_study",
     "rov_fmu.build.compile_all",
 )
-_SLOW = dict.fromkeys(("build", "study", "identify", "inspect"), pytest.mark.long) | {"prove": pytest.mark.weekly}
+_SLOW = ("build", "study", "identify", "inspect", "prove")
+_OFTEN = (("build", "osp"), ("study", "output"), ("identify", "output"))
 
 
 def test_every_file_that_a_command_reads_or_writes_is_known_here() -> None:
@@ -95,7 +97,9 @@ def test_no_command_replaces_the_work_of_others(
 
 
 @pytest.mark.parametrize(
-    "key", [pytest.param(key, marks=_SLOW.get(key[0], ()), id=" ".join(key)) for key in WRITING if key[0] != "sitl"]
+    "key",
+    spread([key for key in WRITING if key[0] != "sitl"], [key for key in WRITING if key[0] not in _SLOW], _OFTEN),
+    ids=" ".join,
 )
 def test_a_command_tells_what_it_replaces(
     key: tuple[str, str], videoray_fmu: Path, tmp_path: Path, capsys: Capsys

@@ -17,6 +17,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import BARE, ROOT, without_progress
 from tests.conftest import without_page
+from tests.often import spread
 
 Capsys = pytest.CaptureFixture[str]
 
@@ -25,7 +26,7 @@ _TUNE = ["tune", "videoray", "--axis=yaw", "--command=0.3", "--v-ss=1", "--tau=2
 # ---- By name ---------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", [n if n == "videoray" else pytest.param(n, marks=pytest.mark.long) for n in SHIPPED])
+@pytest.mark.parametrize("name", spread(SHIPPED, ["videoray"], ["bluerov2_heavy"]))
 def test_a_vehicle_that_ships_is_built_by_its_name(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Capsys
 ) -> None:

@@ -15,6 +15,7 @@ import pytest
 from rov_fmu.cli import _commands
 from tests.commands import BARE, ROOT
 from tests.folders import small_folder
+from tests.often import spread
 
 if sys.platform == "win32":
     pytest.skip("a pseudo-terminal is POSIX", allow_module_level=True)
@@ -99,6 +100,8 @@ def folder(tmp_path: Path, videoray_fmu: Path) -> Path:
 
 _TUNE = "tune videoray --axis heave --command 0.3 --v-ss 0.2"
 COMMANDS = ["", "build mistake.toml"]
+OFTEN = ["identify tests --report found.html -o found.toml --force", "tune videoray --axis heave", "study --help"]
+"""Progress with files, an error, and a help. The other commands are run every week."""
 MORE = [
     "tables",
     f"{_TUNE} -o tuned.toml",
@@ -126,7 +129,7 @@ MORE = [
 
 
 @pytest.mark.parametrize("columns", [80, pytest.param(120, marks=pytest.mark.weekly)])
-@pytest.mark.parametrize("words", [*COMMANDS, *(pytest.param(one, marks=pytest.mark.long) for one in MORE)])
+@pytest.mark.parametrize("words", spread([*COMMANDS, *MORE], COMMANDS, OFTEN))
 def test_no_line_is_too_long_no_word_is_broken_and_no_progress_is_left(words: str, columns: int, folder: Path) -> None:
     arguments = words.split()
     unwritten = shutil.copytree(folder, folder / "unwritten", symlinks=True)

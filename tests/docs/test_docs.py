@@ -26,6 +26,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ROOT
 from tests.docs.test_notebooks import NOTEBOOKS
+from tests.often import spread
 from tests.vehicles import VEHICLES
 
 State = dict[str, float]
@@ -220,11 +221,13 @@ for one in PAGES:
     if one not in (*NOTEBOOKS, STOPPING) and not _lines_of([one]) <= _lines_of(SHELL_PAGES):
         SHELL_PAGES.append(one)
 """The pages with a command that no page before them has."""
+PLATFORMS = ROOT / "docs" / "platforms.md"
+"""It builds for all of them, as tests/fmu/test_binaries.py does."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="the pages' commands are written for a POSIX shell")
 @pytest.mark.long
-@pytest.mark.parametrize("page", SHELL_PAGES, ids=name)
+@pytest.mark.parametrize("page", spread(SHELL_PAGES, (), set(SHELL_PAGES) - {PLATFORMS}), ids=name)
 def test_commands_run(page: Path, workplace: Path) -> None:
     for block in runnable(page):
         run(workplace, "bash", "-euc", block)

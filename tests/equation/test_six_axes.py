@@ -13,6 +13,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.often import spread
 from tests.vehicles import (
     SIX,
     Values,
@@ -28,11 +29,9 @@ from verification.references.rigid_vehicle import compared, places
 
 Array = NDArray[np.float64]
 HEAVY = load_vehicle(SHIPPED["bluerov2_heavy"])
-LONG, WEEKLY = pytest.mark.long, pytest.mark.weekly
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n) if {"p", "q"} & {*axes}]
 """The sets of axes with roll or pitch."""
-_SOME = ("uvwpqr",)
-_OFTEN = (*_SOME, "upr")
+_OFTEN = ("uvwpqr", "upr")
 
 
 def gap(a: list[float], b: list[float]) -> float:
@@ -40,7 +39,7 @@ def gap(a: list[float], b: list[float]) -> float:
     return max(abs(float(x - y)) for x, y in zip(a, b, strict=True))
 
 
-@pytest.mark.parametrize("axes", [pytest.param(axes, marks=() if axes in _SOME else LONG) for axes in SUBSETS])
+@pytest.mark.parametrize("axes", spread(SUBSETS, ["upr"], ["uvwpqr", *SUBSETS[::8]]))
 def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(axes: str) -> None:
     """Where the motion is sensitive, a change of the start by 1e-13 tells how far two exact results may differ."""
     rng = random.Random(axes)
@@ -61,7 +60,7 @@ def test_half_a_minute_of_commands_ends_where_the_rigid_body_is(axes: str) -> No
     assert error <= 1e-10 or error <= 100.0 * gap(expected, integrated([x + 1e-13 for x in start]))
 
 
-@pytest.mark.parametrize("axes", [pytest.param(axes, marks=() if axes in _OFTEN else LONG) for axes in SUBSETS])
+@pytest.mark.parametrize("axes", spread(SUBSETS, _OFTEN, SUBSETS[::8]))
 def test_a_step_is_exact(axes: str) -> None:
     rng = random.Random(axes + "step")
     rov = random_body(rng, axes)

@@ -22,6 +22,7 @@ import pytest
 from rov_fmu.c.compile import PLATFORMS, fmi_headers
 from rov_fmu.cli import main
 from tests.conftest import Made
+from tests.often import spread
 from tests.vehicles import VIDEORAY, random_inputs
 from verification.references.c_programs import compile_c, run_program
 
@@ -219,7 +220,7 @@ def trajectory(binaries: Binaries, folder: Path) -> np.ndarray:
     return _run(binaries, "linux64", folder)
 
 
-@pytest.mark.parametrize("name", [*LINUX[1:], *WINDOWS])
+@pytest.mark.parametrize("name", [*LINUX[1:], *spread(WINDOWS, (), ["win64"])])
 def test_every_platform_runs_as_linux64_does(
     binaries: Binaries, folder: Path, trajectory: np.ndarray, name: str
 ) -> None:

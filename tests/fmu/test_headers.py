@@ -129,7 +129,8 @@ _needs_fma = pytest.mark.skipif(
 def _builds() -> Iterator[Any]:
     """Yield header, compiler and flags of each library: every header, compiler and standard, C++, fused products."""
     for i, release in enumerate(RELEASES):
-        yield release, _NAMES[i % len(_NAMES)], (f"-std={_STANDARDS[i % 2]}", "-O2")
+        marks = pytest.mark.long if release in _PLAIN else pytest.mark.weekly
+        yield pytest.param(release, _NAMES[i % len(_NAMES)], (f"-std={_STANDARDS[i % 2]}", "-O2"), marks=marks)
     yield "3.0", "zig", _CPP
     yield pytest.param("2.0.0", _NAMES[-1], ("-O2", "-march=haswell"), marks=_needs_fma)
 

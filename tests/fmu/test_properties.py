@@ -20,6 +20,7 @@ from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import variables
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.often import spread
 from tests.vehicles import (
     EVERYTHING,
     SIX,
@@ -303,7 +304,7 @@ def dependencies(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
 
 # The default tests have the vehicle with most effects.
 _SOME = ("everything",)
-_KINDS = [pytest.param(kind, marks=() if kind in _SOME else pytest.mark.long) for kind in sorted(_OF_REFERENCE)]
+_KINDS = [*spread(sorted(_OF_REFERENCE), _SOME, ("six axes", "surge without drag", "with an input mix"))]
 
 
 def pairs_of(kind: str) -> int:

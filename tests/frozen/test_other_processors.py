@@ -14,6 +14,7 @@ import pytest
 from tests.cli.test_wheel import interpreter, lowest
 from tests.commands import ROOT
 from tests.frozen import test_known_results
+from tests.often import spread
 from verification.fresh_environment import environment
 
 SIMD = np.show_config(mode="dicts")["SIMD Extensions"]
@@ -31,10 +32,7 @@ TOOLS = ("filelock", "hypothesis", "mpmath", "pytest", "pytest-xdist")
 """What the tests of known results import besides the dependencies."""
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(name, marks=pytest.mark.weekly if name == "Haswell" else pytest.mark.long) for name in KERNELS],
-)
+@pytest.mark.parametrize("name", spread(KERNELS, (), ["Nehalem"]))
 def test_the_fits_end_alike_with_other_kernels(name: str) -> None:
     kernels, needed = KERNELS[name]
     if not needed:
@@ -42,7 +40,7 @@ def test_the_fits_end_alike_with_other_kernels(name: str) -> None:
     check_fits(sys.executable, **kernels)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_fits_end_alike_with_the_lowest_versions(tmp_path: Path) -> None:
     python = next(filter(None, map(interpreter, ("3.10", "3.11", "3.12", "3.13"))), None)
     if python is None:

@@ -17,7 +17,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.commands import TESTS, without_progress
 from tests.damage import changed_bytes, changed_cells, changed_course, changed_lines, changed_toml, fuzz
-from tests.often import often
+from tests.often import often, spread
 from tests.recordings import run, write_log
 
 Capsys = pytest.CaptureFixture[str]
@@ -100,7 +100,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
     fuzz(check, examples)
 
 
-@often("examples", 2, 5, 30)
+@pytest.mark.parametrize("examples", [2, pytest.param(30, marks=pytest.mark.weekly)])
 @pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", pytest.param(LOG, marks=pytest.mark.long)])
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
@@ -146,10 +146,10 @@ def test_a_strange_recording_is_identified_or_one_clear_line(
     assert not said or LOG in said
 
 
-HARDLY = ("20,-0.001;50,0.01;70,3", "20,1;50,1;70,0.5;100,-0.02", "20,0;50,0;-50,-1.6", "20,0;50,1e-200")
+HARDLY = ("20,0;50,0", "20,-0.001;50,0.01;70,3", "20,1;50,1;70,0.5;100,-0.02", "20,0;50,0;-50,-1.6", "20,0;50,1e-200")
 
 
-@pytest.mark.parametrize("forces", ["20,0;50,0", *(pytest.param(forces, marks=pytest.mark.long) for forces in HARDLY)])
+@pytest.mark.parametrize("forces", spread(HARDLY, ["20,0;50,0"], ["20,0;50,1e-200"]))
 def test_a_thrust_curve_that_hardly_pushes_is_one_clear_line_or_a_vehicle(
     forces: str, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:

@@ -22,6 +22,7 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, without_progress
 from tests.folders import BLUEROV2, DOWN, FORCE, HEAD, SPEED, folder_of, read, responses
 from tests.identify.conftest import FORCES, KNOWN, Identified, add_voltage
+from tests.often import spread
 from tests.recordings import PLANS, Measured, run, with_more, write_log
 from tests.vehicles import VIDEORAY
 
@@ -180,7 +181,7 @@ def test_intervals_of_tables_cover_the_truth(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("astern", [0.08, 0.05])
+@pytest.mark.parametrize("astern", [0.08, pytest.param(0.05, marks=pytest.mark.weekly)])
 def test_dead_bands_are_found_from_forces_and_dives(astern: float, tmp_path: Path) -> None:
     """The pool simulates two dives of 80 s with commands of whole per cent, at which J has kinks, for each vehicle."""
     random, covered = np.random.default_rng(0), dict[str, list[bool]]()
@@ -348,11 +349,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
 
 @pytest.mark.parametrize(
     "key",
-    [
-        pytest.param(key, marks=() if key == "voltage" else pytest.mark.long)
-        for key in PRIORS
-        if not key.endswith("noise")
-    ],
+    spread([key for key in PRIORS if not key.endswith("noise")], ["thrust_shape"], ["voltage", "lag", "drag_power"]),
 )
 def test_any_prior_but_that_of_noise_may_be_exact(key: str, tmp_path: Path) -> None:
     rov = f'base = "videoray"\nagainst = "videoray"\n{HEAD}[fit]\nvoltage = true\n[priors]\n{key} = 0\n'

@@ -14,7 +14,7 @@ from verification.fuzzing.campaign import FindingError
 from verification.fuzzing.logs import damaged, try_damaged
 
 
-@often("count", 4, 15, 300)
+@often("count", 2, 15, 300)
 @pytest.mark.parametrize("name", [kind.name for kind in FORMATS])
 def test_a_damaged_file_is_read_or_refused_in_one_line(name: str, count: int, tmp_path: Path) -> None:
     path = SEEDS[name](tmp_path, DIVE)

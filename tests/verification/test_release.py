@@ -5,13 +5,11 @@ import json
 import subprocess
 import sys
 import zipfile
-from importlib.metadata import version
 from pathlib import Path
 
 import pytest
 
 import build_backend
-from rov_fmu import __version__
 from rov_fmu.build import build
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT
@@ -46,53 +44,6 @@ def test_the_inventory_of_an_fmu_names_every_file(fmu: Path) -> None:
     files = {c["name"]: c["hashes"][0]["content"] for c in inventory["components"] if c["type"] == "file"}
     assert files == expected
     assert {c["name"] for c in inventory["components"] if c["type"] == "library"} == {"rov-fmu", "ziglang"}
-
-
-@pytest.mark.long
-def test_the_inventory_of_a_wheel_names_what_it_requires(tmp_path: Path) -> None:
-    wheel = tmp_path / "rov_fmu-0-py3-none-any.whl"
-    lines = ["Metadata-Version: 2.4", "Name: rov-fmu", "Version: 0", "Requires-Dist: numpy>=2"]
-    lines += ["Requires-Dist: tomli>=2; python_version < '3'", "Requires-Dist: mcap>=1; extra == 'ros'", ""]
-    with zipfile.ZipFile(wheel, "w") as archive:
-        archive.writestr("rov_fmu-0.dist-info/METADATA", "\n".join(lines))
-    text = release.wheel_inventory(wheel)
-    assert valid(text)
-    (numpy,) = json.loads(text)["components"]
-    assert numpy["purl"] == f"pkg:pypi/numpy@{numpy['version']}"
-
-
-def test_a_difference_of_two_builds_is_a_line(tmp_path: Path) -> None:
-    first, second = tmp_path / "a", tmp_path / "b"
-    for folder, files in ((first, {"same": b"1", "other": b"2", "one": b""}), (second, {"same": b"1", "other": b"3"})):
-        folder.mkdir()
-        for name, content in files.items():
-            (folder / name).write_bytes(content)
-    assert release.differences(first, second) == [
-        "one: only one of the two builds wrote this file",
-        "other: the two builds have other bytes",
-    ]
-    assert release.differences(first, first) == []
-
-
-def test_an_fmu_in_the_wheel_that_differs_is_named(tmp_path: Path) -> None:
-    for name in ("same", "other"):
-        (tmp_path / f"{name}.fmu").write_bytes(b"beside")
-    wheel = tmp_path / "rov_fmu-0-py3-none-any.whl"
-    with zipfile.ZipFile(wheel, "w") as archive:
-        archive.writestr("rov_fmu/data/prebuilt/same.fmu", b"beside")
-        archive.writestr("rov_fmu/data/prebuilt/other.fmu", b"inside")
-    assert release.other_fmus(wheel, tmp_path) == [f"{wheel.name}: has other bytes of other.fmu"]
-
-
-def test_what_is_no_release_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    numpy = version("numpy")
-    (tmp_path / "constraints.txt").write_text(f"# pinned\nnumpy=={numpy}\nclick==0.1\n", encoding="utf-8")
-    (tmp_path / "CHANGELOG.md").write_text(f"## [Unreleased] – {__version__}\n", encoding="utf-8")
-    (tmp_path / "CITATION.cff").write_text(f"type: software\nversion: {__version__}\n", encoding="utf-8")
-    monkeypatch.setattr(release, "ROOT", tmp_path)
-    pinned, undated = release.obstacles()
-    assert pinned.startswith(f"click {version('click')} is installed, and constraints.txt has 0.1")
-    assert undated.startswith("CHANGELOG.md: must have a line")
 
 
 def test_a_wheel_is_built_with_what_the_package_needs_in_the_pinned_versions(monkeypatch: pytest.MonkeyPatch) -> None:

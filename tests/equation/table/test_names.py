@@ -215,7 +215,7 @@ ALIKE: dict[str, Names] = {
 """New names of parts that make quantities of the equation alike."""
 
 
-@often("is_compiled", False, True)
+@pytest.mark.parametrize("is_compiled", [False, pytest.param(True, marks=pytest.mark.weekly)])
 @pytest.mark.parametrize("name", ALIKE)
 def test_quantities_that_are_named_alike_stay_different(name: str, is_compiled: bool) -> None:
     """Each of these vehicles takes six seconds to compile."""
@@ -224,7 +224,7 @@ def test_quantities_that_are_named_alike_stay_different(name: str, is_compiled: 
         check(random.Random(1), KEELED, other)
 
 
-@often("vehicles", 1, 6, 300)
+@often("vehicles", 1, 2, 300)
 def test_random_names_change_nothing(vehicles: int) -> None:
     rng, compared = random.Random(8 + vehicles), 0
     while compared < vehicles:

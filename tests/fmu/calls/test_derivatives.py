@@ -24,7 +24,7 @@ from tests.fmi import (
 )
 from tests.fmu.calls.conftest import WRAPPERS, modes_of
 from tests.fmu.results.test_outside import TILTED, excess
-from tests.often import often
+from tests.often import often, spread
 from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, VIDEORAY, State, Values, at_rest, with_rotors
 from verification.references import rigid_vehicle
 
@@ -45,9 +45,7 @@ _SOME = ("videoray_dir", "everything3_dir", "outside3_dir")
 """The FMUs of the default tests: each vehicle once, and both versions of FMI."""
 
 
-@pytest.fixture(
-    scope="module", params=[pytest.param(name, marks=() if name in _SOME else pytest.mark.long) for name in ROVS]
-)
+@pytest.fixture(scope="module", params=spread(ROVS, _SOME, ["rotors_dir"]))
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, or of a vehicle with lag and coupling, with all effects, or with six axes.
 
@@ -127,7 +125,7 @@ def check_slopes(rov: Vehicle, instance: AnyInstance, point: Values, known: str,
         assert d == pytest.approx(expected[name], rel=error, abs=0.01 * error * size), (name, known, side, point)
 
 
-@often("number", 1, 6, 60)
+@often("number", 1, 3, 60)
 def test_directional_derivatives_are_the_slopes_of_the_equations(fmu: Fmu, rov: Vehicle, number: int) -> None:
     """The knowns are all inputs, states and coefficients; the unknowns are all calculated variables."""
     for point, kind in product(points(fmu, number, seed=1), MODES):

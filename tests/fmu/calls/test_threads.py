@@ -32,7 +32,6 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
 @pytest.mark.parametrize(
     ("fmi", "sanitizers", "calls"),
     [
-        pytest.param(2, "thread", 40_000, marks=pytest.mark.long),
         pytest.param(3, "thread", 20_000, marks=pytest.mark.long),
         pytest.param(3, "address,undefined", 40_000, marks=pytest.mark.long),  # the corpus test has it, too
         *(

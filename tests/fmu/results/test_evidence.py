@@ -277,7 +277,7 @@ def test_one_altered_byte_is_named(
     )
 
 
-@often("stride", 7, 1)
+@often("stride", 7, 3, 1)
 def test_no_byte_of_the_meta_data_can_be_altered(stride: int, tmp_path: Path) -> None:
     """Whether it is a name, a hash, a word or a part of the XML: the line names the meta-data."""
     files = {"a": b"1", "b": b"2"}

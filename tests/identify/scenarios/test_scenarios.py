@@ -12,10 +12,8 @@ from tests.identify.scenarios.judge import broken, promises
 from tests.identify.scenarios.outcome import outcome, read_result
 from tests.report.results import without_findings
 
-BY_DEFAULT = {"load of 0.1 N in heave": 1}
-"""The quick scenarios of the default tests, and the number of their seeds."""
-OFTEN = ("gaps while turning", "tilt with roll and pitch")
-"""The scenarios that the long tests run with 2 seeds. All of them are run with more seeds once a week."""
+OFTEN = {"gaps while turning": 1}
+"""The scenarios of the long tests, and the number of their seeds. All are run with more seeds once a week."""
 WEEKLY = {
     **dict.fromkeys(SCENARIOS, 200),
     **dict.fromkeys(OWNERS, 20),
@@ -31,10 +29,8 @@ def judged() -> Iterator[object]:
     """Yield each scenario with each number of seeds."""
     for name in SCENARIOS:
         yield pytest.param(name, WEEKLY[name], marks=pytest.mark.weekly, id=f"{name}-{WEEKLY[name]}")
-    for name in OFTEN:
-        yield pytest.param(name, 2, marks=pytest.mark.long, id=f"{name}-2")
-    for name, seeds in BY_DEFAULT.items():
-        yield pytest.param(name, seeds, id=f"{name}-{seeds}")
+    for name, seeds in OFTEN.items():
+        yield pytest.param(name, seeds, marks=pytest.mark.long, id=f"{name}-{seeds}")
 
 
 @pytest.mark.parametrize(("name", "seeds"), [*judged()])

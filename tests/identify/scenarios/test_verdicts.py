@@ -10,13 +10,10 @@ from tests.identify.scenarios.judge import at_least
 from tests.identify.scenarios.outcome import Estimate, Outcome, outcome
 from tests.identify.scenarios.verdicts import RIGHT, WRONG, Line, broken, off, run
 
-QUICK = ("neither velocity nor heading", "load of 0.6 %")
-"""The kinds of the default tests: those that are identified in a second."""
 
-
-@pytest.mark.parametrize("name", QUICK)
-def test_a_right_model_is_good(name: str) -> None:
-    line = Line.of([run(name, 0)])
+def test_a_right_model_is_good() -> None:
+    """The others are run every week."""
+    line = Line.of([run("load of 0.6 %", 0)])
     assert line.words == ["good"]
     assert line.coverage > 0.8
     assert line.far == (0, 0)
