@@ -25,8 +25,8 @@ static const double REST = 0.1;  /* s, in which the body comes to rest along suc
 
 /* ---- The equation ------------------------------------------------------------------------------------------------ */
 
-/* What moves during a step: velocity over ground and rates, quaternion, position, and the change of the velocity. */
-enum { VELOCITY, ATTITUDE = 6, POSITION = 10, CHANGE = 13, N_STATES = 19 };
+/* What moves during a step: velocity over ground and rates, quaternion, and the change of the velocity so far. */
+enum { VELOCITY, ATTITUDE = 6, CHANGE = 10, N_STATES = 16 };
 enum { FIRST_STATE = N_GIVEN, N_VARIABLES = N_GIVEN + N_STATES };
 
 typedef struct {
@@ -87,7 +87,6 @@ static void accelerate(water *w, const double now[], double after, const double 
     rotation(state + ATTITUDE, R);
     for (int i = 0; i < 3; i++) {
         through[i] = state[VELOCITY + i] - (CURRENT[i] < 0 ? 0.0 : now[CURRENT[i]]);
-        y[BODY_POSITION + i] = state[POSITION + i];
     }
     for (int i = 0; i < 3; i++) {
         y[i] = R[i] * through[0] + R[3 + i] * through[1] + R[6 + i] * through[2];
@@ -121,10 +120,6 @@ static int motion_step(const double now[], const model_numbers *n, double h, dou
     accelerate(n->of, now, 0.0, state, start);
     for (int i = 0; i < 6; i++) {
         middle[VELOCITY + i] = state[VELOCITY + i] + 0.5 * h * (start[i] + outside[i]);
-    }
-    for (int i = 0; i < 3; i++) {
-        middle[POSITION + i] = state[POSITION + i] + 0.5 * h * state[VELOCITY + i];
-        next[POSITION + i] = state[POSITION + i] + h * middle[VELOCITY + i];
     }
     turned(state + ATTITUDE, state + VELOCITY + 3, 0.5 * h, middle + ATTITUDE);
     accelerate(n->of, now, 0.5 * h, middle, mean);
@@ -336,9 +331,6 @@ static int add_forces(member *m, double t, double h, int integrator)
     for (int i = 0; i < 6; i++) {
         state[VELOCITY + i] = FLIP[i] * o->velocity[i];
     }
-    for (int i = 0; i < 3; i++) {
-        state[POSITION + i] = FLIP[i] * o->pose[i];
-    }
     state[ATTITUDE] = o->pose[3], state[ATTITUDE + 1] = o->pose[4];
     state[ATTITUDE + 2] = -o->pose[5], state[ATTITUDE + 3] = -o->pose[6];
     double mean[6], local[6], force[6], turning[6], change[3], *const rates = o->velocity + 3;
@@ -407,11 +399,15 @@ static void move(member *m, double t, double h)
 
 /* ---- For Python -------------------------------------------------------------------------------------------------- */
 
-/* Write the size of a vehicle, and the place in it of the coefficients and the other inputs, both in doubles. */
-EXPORT void water_sizes(int sizes[2])
+/* Write the size of a vehicle, and the place in it of the coefficients and the other inputs, both in doubles; and the
+ * numbers of commands, coefficients, and other inputs. */
+EXPORT void water_sizes(int sizes[5])
 {
     sizes[0] = (int)(sizeof(vehicle) / sizeof(double));
     sizes[1] = (int)((offsetof(vehicle, water) + offsetof(water, at)) / sizeof(double)) + FIRST_COEFFICIENT;
+    sizes[2] = N_COMMANDS;
+    sizes[3] = N_COEFFICIENTS;
+    sizes[4] = N_GIVEN - FIRST_COEFFICIENT - N_COEFFICIENTS;
 }
 
 /* Connect a vehicle with a simulation. What it remembers stays. */

@@ -13,7 +13,7 @@ import numpy as np
 
 from rov_fmu.bridges import sdf
 from rov_fmu.bridges.mcap import hull_size
-from rov_fmu.bridges.mujoco.source import WATER, water_sources
+from rov_fmu.bridges.mujoco.source import water_sources
 from rov_fmu.c.compile import HOSTS, MACHINES, PLATFORMS, compile_for
 from rov_fmu.c.library import load_sources
 from rov_fmu.equation.catalogue import AXES
@@ -74,7 +74,7 @@ def mujoco_files(
     with β = 0, and BuildError if the C cannot be compiled.
     """
     texts = mujoco_texts(vehicle, package, card, draws)
-    libraries = compile_for(HOSTS if platforms is None else platforms, water_sources(vehicle.layout))
+    libraries = compile_for(HOSTS if platforms is None else platforms, _c_of(texts))
     names = {
         name: f"water_{_SYSTEMS[system]}_{processor}{PLATFORMS[name].suffix}"
         for (system, processor), name in MACHINES.items()
@@ -142,7 +142,7 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
     equation = ModuleType("equation")
     exec(compile(equation_module(vehicle, "rov_fmu.equation.python.step"), "<equation>", "exec"), equation.__dict__)
     model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
-    library = load_sources(f"{WATER.name} {vehicle.layout!r}", lambda: water_sources(vehicle.layout))
+    library = load_sources(files["equation.h"], lambda: _c_of(files))
     return connector(equation, library)(model, None, "", **coefficients)
 
 
@@ -161,6 +161,11 @@ def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
     }
     lines = [f"{name} = {value!r}" for name, value in data.items()]
     return "\n".join([printed_accelerations(layout, step), "", *lines, ""])
+
+
+def _c_of(files: Mapping[str, str]) -> dict[str, str]:
+    """Return the C files of a folder. The last one includes the others."""
+    return {name: text for name, text in files.items() if name.endswith((".c", ".h"))}
 
 
 def _text(name: str) -> str:

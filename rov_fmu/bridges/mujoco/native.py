@@ -36,16 +36,18 @@ _REASONS = {_NO_BODY: plugin.NO_BODY, _TOO_MANY_WAIT: TOO_MANY_WAIT, _APART: plu
 class Library:
     """The functions of a vehicle in C, and those of MuJoCo."""
 
-    def __init__(self, own: ctypes.CDLL) -> None:
-        """Raises OSError or AttributeError where this MuJoCo cannot be reached in C."""
+    def __init__(self, own: ctypes.CDLL, equation: Any) -> None:
+        """Raises OSError, AttributeError or ValueError without MuJoCo's library, or with that of another vehicle."""
         files = [*Path(mujoco.__file__).parent.glob(_NAMES.get(sys.platform, "none"))]
         if len(files) != 1 or not all(hasattr(kind, "_address") for kind in (mujoco.MjModel, mujoco.MjData)):
             raise OSError("MuJoCo's library is not beside its Python package, or that does not tell its addresses")
         its = ctypes.CDLL(str(files[0]))
         self.functions = [_address(its, name) for name in _FUNCTIONS]
-        sizes = (ctypes.c_int * 2)()
+        sizes = (ctypes.c_int * 5)()
         own.water_sizes(sizes)
-        self.size, self.outer = sizes
+        self.size, self.outer, *counts = sizes
+        if counts != [len(equation.COMMANDS), len(equation.COEFFICIENTS), len(equation.INPUTS)]:
+            raise OSError("the library belongs to another equation")
         self.step = own.water_step
         self.step.argtypes = [ctypes.c_void_p, ctypes.c_int, ctypes.c_double, ctypes.c_int, ctypes.c_int]
         self.connect, self.forces = own.water_connect, own.water_forces
@@ -68,29 +70,36 @@ class NativeRov(plugin.Rov):
     """A vehicle in a simulation of MuJoCo, whose step is in C."""
 
     FORMAT = FORMAT
+    address = 0
+    """Where the memory of the vehicle is. 0 before it is connected."""
+    scene: Any = None
+    """The vehicles that moved together with this one in the last step, and the arguments of the C."""
 
     def __init__(self, library: Library, *arguments: Any, **coefficients: Any) -> None:
         """Connect it as `plugin.Rov` does, by the library of its equation."""
-        self.library, self._memory, self._of = library, np.zeros(library.size), None
-        self.scene: tuple[tuple[Any, ...], Any] | None = None
+        self.library, self.memory = library, np.zeros(library.size)
         super().__init__(*arguments, **coefficients)
+
+    @property
+    def data(self) -> Any:
+        """The state of the simulation. It may be exchanged for other data of the same model."""
+        return self._data
+
+    @data.setter
+    def data(self, data: Any) -> None:
+        self._data = data
+        if self.address:
+            self._connect()
 
     def _copied(self, model: Any, data: Any) -> plugin.Rov:
         other = super()._copied(model, data)
         assert isinstance(other, NativeRov)
-        other._memory, other._of, other.scene = self._memory.copy(), None, None
-        other.connected()
+        other.memory, other.data = self.memory.copy(), data
         return other
-
-    def connected(self) -> int:
-        """Return the address of what the C knows of the vehicle. It always belongs to the present data."""
-        if self.data is not self._of:
-            self._connect()
-        return self._address
 
     def _connect(self) -> None:
         """Tell the C where everything is, and let both share the coefficients and inputs."""
-        model, data, memory, first = self.model, self.data, self._memory, self.library.outer
+        model, data, memory, first = self.model, self.data, self.memory, self.library.outer
         for numbers in (self.coefficients, self.inputs):
             view = memory[first : first + len(numbers)]
             view[:], numbers.array, first = numbers.array, view, first + len(numbers)
@@ -99,19 +108,21 @@ class NativeRov(plugin.Rov):
         implicit = sum(1 << integrator for integrator in self._implicit)
         places = [self.body, self._pose.start, self._dofs.start, implicit, *self._entries, *self._actuators]
         given = np.array(pointers, np.uintp), np.array(places, np.intc), np.ascontiguousarray(self._rigid)
-        self._of, self._address = data, memory.ctypes.data
-        self.library.connect(self._address, *(one.ctypes.data for one in given))
+        self.address, self.scene = memory.ctypes.data, None
+        self.library.connect(self.address, *(one.ctypes.data for one in given))
 
     def reset(self) -> None:
         """Stop the thrusters and forget the commands that wait for the dead time, as `plugin.Rov.reset` does."""
-        self.library.reset(self.connected())
+        if not self.address:
+            self._connect()
+        self.library.reset(self.address)
 
     @property
     def forces(self) -> dict[str, float]:
         """The force of each thruster, N, by its name in the FMU."""
         names = self.water.equation.FORCES
         found = np.zeros(len(names) + 1)
-        has_moved = self.library.forces(self.connected(), found.ctypes.data)
+        has_moved = self.library.forces(self.address, found.ctypes.data)
         return dict(zip(names, found.tolist(), strict=False)) if has_moved else {}
 
     def step(self, steps: int = 1) -> None:
@@ -122,16 +133,16 @@ class NativeRov(plugin.Rov):
 
     def add_mass(self) -> None:
         """Add the added mass, as `plugin.Rov` does."""
-        _raise(self.library.add_mass(self.connected(), self.data.time))
+        _raise(self.library.add_mass(self.address, self.data.time))
 
     def add_forces(self) -> None:
         """Add the forces of the water, as `plugin.Rov` does."""
         option = self.model.opt
-        _raise(self.library.add_forces(self.connected(), self.data.time, option.timestep, option.integrator))
+        _raise(self.library.add_forces(self.address, self.data.time, option.timestep, option.integrator))
 
     def move(self) -> None:
         """Move the body, as `plugin.Rov` does."""
-        self.library.move(self.connected(), self.data.time, self.model.opt.timestep)
+        self.library.move(self.address, self.data.time, self.model.opt.timestep)
 
 
 def step(*rovs: Any, steps: int = 1) -> None:
@@ -139,16 +150,16 @@ def step(*rovs: Any, steps: int = 1) -> None:
 
     The vehicles may be of several kinds, from several folders. Other threads run meanwhile.
     """
-    first = rovs[0]
-    if getattr(first, "scene", None) is None or first.scene[0] != rovs[1:]:
+    first, others = rovs[0], rovs[1:]
+    scene = getattr(first, "scene", None)
+    if scene is None or scene[0] != others:
         if any(getattr(rov, "FORMAT", None) != FORMAT for rov in rovs):
             plugin.step(*rovs, steps=steps)
             return
-        first.scene = rovs[1:], (ctypes.c_void_p * len(rovs))(*(rov.connected() for rov in rovs))
-    for rov in rovs:
-        rov.connected()
-    option = first.model.opt
-    result = first.library.step(first.scene[1], len(rovs), option.timestep, option.integrator, steps)
+        members = (ctypes.c_void_p * len(rovs))(*(rov.address for rov in rovs))
+        scene = first.scene = others, members, ctypes.addressof(members), len(rovs), first.model.opt
+    _, _, members_at, count, option = scene
+    result = first.library.step(members_at, count, option.timestep, option.integrator, steps)
     if result == _HAS_CALLBACKS:  # their errors could not pass through the C
         plugin.step(*rovs, steps=steps)
     else:
@@ -164,8 +175,8 @@ def _raise(result: int) -> None:
 def connector(equation: Any, library: ctypes.CDLL | None) -> Callable[..., plugin.Rov]:
     """Return the function that connects a vehicle with a model: in C, or in Python without a library that fits."""
     if library is not None:
-        with suppress(AttributeError, OSError, ValueError):  # a function or MuJoCo's library is missing
-            return partial(NativeRov, Library(library), equation)
+        with suppress(AttributeError, OSError, ValueError):
+            return partial(NativeRov, Library(library, equation), equation)
     return partial(plugin.Rov, equation)
 
 

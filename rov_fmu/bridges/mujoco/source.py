@@ -1,15 +1,15 @@
 """The C of a vehicle in MuJoCo: fmu_src/mujoco/water.c, and what depends on the vehicle, printed as equation.h.
 
 The formulas are those that `equation/python/printed.py` prints in Python. All numbers of the equation are in one
-array, at places with the names V_... . What the body does is in another one: the velocities through the water, the
-rotation matrix, the heading, and the position.
+array, at places with the names V_... . What the body does is in another one: the velocities through the water, and the
+rotation matrix.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from rov_fmu.c.compile import C_SOURCES
-from rov_fmu.equation.attitude import ROTATION, TURN
+from rov_fmu.equation.attitude import ROTATION
 from rov_fmu.equation.catalogue import AXES, CURRENT, CURRENT_DOWN
 from rov_fmu.equation.expression import ZERO, Expression, to_c
 from rov_fmu.equation.layout import Layout
@@ -19,9 +19,8 @@ from rov_fmu.io.paths import FMU_SRC
 
 WATER = FMU_SRC / "mujoco" / "water.c"
 _VELOCITIES = tuple(axis.velocity for axis in AXES.values())
-_BODY = {name: n for n, name in enumerate((*_VELOCITIES, *ROTATION, "x", "y", "z"))}
-"""The places of what the body does. The heading of a vehicle that stays level is in its rotation matrix."""
-_IN_BODY = _BODY | dict(zip(TURN, (_BODY["R_11"], _BODY["R_21"]), strict=True))
+_BODY = {name: n for n, name in enumerate((*_VELOCITIES, *ROTATION))}
+"""The places of what the body does."""
 
 
 def outer_names(layout: Layout) -> list[str]:
@@ -42,11 +41,11 @@ def _equation(layout: Layout) -> str:
     """Print equation.h."""
     equation, numbers, mass, rates = accelerations_of(layout)
     used = frozenset[str]().union(*(formula.names for formula in numbers.values()))
-    directions = [name for name in _IN_BODY if name in used]
+    directions = [name for name in _BODY if name in used]
     given = [*layout.commands, *layout.acting.values(), *outer_names(layout)]
     places = dict.fromkeys([*given, *directions, *lagging(equation), *numbers])
     fractions = arrived(equation)
-    in_rates = {name: f"y[{n}]" for name, n in _IN_BODY.items()} | {name: name for name in fractions}
+    in_rates = {name: f"y[{n}]" for name, n in _BODY.items()} | {name: name for name in fractions}
     sizes = {
         "N_COMMANDS": len(layout.commands),
         "FIRST_DELAYED": len(layout.commands),
@@ -57,8 +56,7 @@ def _equation(layout: Layout) -> str:
         "N_FORCES": len(layout.thrusters),
         "N_NUMBERS": len(places),
         "N_BODY": len(_BODY),
-        "BODY_ROTATION": _BODY["R_11"],
-        "BODY_POSITION": _BODY["x"],
+        "BODY_ROTATION": len(_VELOCITIES),
     }
     current = [given.index(name) if name in given else -1 for name in (*CURRENT, *CURRENT_DOWN)]
     after = {f"after_{n}": formula for n, formula in enumerate(lagging(equation).values())}
@@ -67,7 +65,7 @@ def _equation(layout: Layout) -> str:
 enum {{ {", ".join(f"V_{name} = {n}" for n, name in enumerate(places))} }};
 enum {{ {", ".join(f"{name} = {n}" for name, n in sizes.items())} }};
 #define HAS_DEAD_TIME {int(layout.has_dead_time)}
-{_array("int", "DIRECTIONS", (_IN_BODY[name] for name in directions))} /* their places in the body */
+{_array("int", "DIRECTIONS", (_BODY[name] for name in directions))} /* their places in the body */
 {_array("int", "FORCES", (f"V_F_{thruster.name}" for thruster in layout.thrusters))}
 {_array("int", "CURRENT", current)} /* the places of the current, or -1 */
 {_array("int", "LACKS", (int(name not in layout.velocities) for name in _VELOCITIES))} /* 1 along axes that it lacks */

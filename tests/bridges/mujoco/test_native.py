@@ -317,6 +317,12 @@ def test_without_a_library_that_fits_the_step_is_in_python(content: bytes | None
     assert library_in(package.FOLDER)
 
 
+def test_a_library_of_another_vehicle_is_not_taken() -> None:
+    (_, package), (_, other) = loaded("videoray"), loaded("bluerov2")
+    rov = connector(package.equation, library_in(other.FOLDER))(package.load().model)
+    assert type(rov).__name__ == "Rov"
+
+
 def test_without_the_library_of_mujoco_the_step_is_in_python(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _, package = loaded("videoray")
     library, model = library_in(package.FOLDER), package.load().model
