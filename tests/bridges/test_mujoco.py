@@ -518,13 +518,14 @@ def test_a_mujoco_whose_contacts_would_not_feel_the_added_mass_is_one_line(monke
 
 
 @pytest.mark.parametrize("name", ["bluerov2", "every_option"])
-@pytest.mark.parametrize("impossible", [{"m_rov": -50.0}, {"beta_u": 0.0}])
+@pytest.mark.parametrize("impossible", [{"m_rov": -50.0}, {"beta_u": 0.0}, {"m_rov": np.nan}])
 def test_ballast_that_no_body_has_is_one_line(name: str, impossible: dict[str, float]) -> None:
-    rov = loaded(name)[1].load()
-    rov.step()
-    rov.coefficients |= impossible
-    with pytest.raises(ValueError, match=r"^coefficients: the mass matrix must be positive definite"):
+    _, package = loaded(name)
+    for rov in (package.load(), package.plugin.Rov(package.equation, package.load().model)):
         rov.step()
+        rov.coefficients |= impossible
+        with pytest.raises(ValueError, match=r"^coefficients: the mass matrix must be positive definite"):
+            rov.step()
 
 
 def test_an_unknown_coefficient_or_input_is_one_line() -> None:

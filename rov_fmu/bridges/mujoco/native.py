@@ -91,12 +91,6 @@ class NativeRov(plugin.Rov):
         if self.address:
             self._connect()
 
-    def _copied(self, model: Any, data: Any) -> plugin.Rov:
-        other = super()._copied(model, data)
-        assert isinstance(other, NativeRov)
-        other.memory, other.data = self.memory.copy(), data
-        return other
-
     def _connect(self) -> None:
         """Tell the C where everything is, and let both share the coefficients and inputs."""
         model, data, memory, first = self.model, self.data, self.memory, self.library.outer

@@ -101,9 +101,11 @@ class Water:
         still, there = dict.fromkeys("uvwpqr", 0.0), [n for n in range(6) if n not in self.lacking]
         try:
             mass = np.array(self.equation.mass(self._numbers({**self.equation.COMMANDS, **still})))
-            np.linalg.cholesky(mass[np.ix_(there, there)])
+            root = np.linalg.cholesky(mass[np.ix_(there, there)])
         except (ZeroDivisionError, np.linalg.LinAlgError) as error:
             raise ValueError(NO_BODY) from error
+        if not np.isfinite(root).all():
+            raise ValueError(NO_BODY)
         return mass
 
     def __copy__(self) -> "Water":
@@ -218,7 +220,6 @@ class Rov:
         """
         self.model, self.data = model, mujoco.MjData(model) if data is None else data
         self.water = Water(equation)
-        self.coefficients, self.inputs = self.water.coefficients, self.water.inputs
         self.coefficients.update(coefficients)
         name = prefix + equation.IDENTIFIER
         self.body = model.body(name).id
@@ -245,9 +246,28 @@ class Rov:
 
     def _copied(self, model: Any, data: Any) -> "Rov":
         other = object.__new__(type(self))
-        other.__dict__ = {**self.__dict__, "model": model, "data": data, "water": copy(self.water)}
-        other.coefficients, other.inputs = other.water.coefficients, other.water.inputs
+        own = {name: x.copy() for name, x in self.__dict__.items() if isinstance(x, np.ndarray)}
+        other.__dict__ = {**self.__dict__, **own, "water": copy(self.water)}
+        other.model, other.data = model, data
         return other
+
+    @property
+    def coefficients(self) -> Numbers:
+        """The coefficients by their names in the FMU, in SI units."""
+        return self.water.coefficients
+
+    @coefficients.setter
+    def coefficients(self, values: Mapping[str, float]) -> None:
+        self.water.coefficients.update(values)
+
+    @property
+    def inputs(self) -> Numbers:
+        """The inputs that are no commands, by their names in the FMU, in SI units."""
+        return self.water.inputs
+
+    @inputs.setter
+    def inputs(self, values: Mapping[str, float]) -> None:
+        self.water.inputs.update(values)
 
     def reset(self) -> None:
         """Stop the thrusters and forget the commands that wait for the dead time.

@@ -299,7 +299,9 @@ def test_coefficients_change_and_are_never_added_or_removed(python: bool) -> Non
     _, package = loaded("videoray")
     rov = in_python(package, world(package)) if python else package.load()
     rov.coefficients |= {"m_rov": 7.0}
-    assert rov.coefficients["m_rov"] == 7.0
+    rov.inputs = {"V_N": 0.3}
+    assert (rov.coefficients["m_rov"], rov.inputs["V_N"]) == (7.0, 0.3)
+    assert (rov.water.coefficients["m_rov"], rov.inputs["V_E"]) == (7.0, 0.0)
     assert eval(repr(rov.inputs)) == dict(rov.inputs)
     with pytest.raises(ValueError, match=r"^m_rov: a coefficient or an input can only change$"):
         del rov.coefficients["m_rov"]
