@@ -58,14 +58,17 @@ def world(package: ModuleType, integrator: int = EULER) -> Any:
 def events(rovs: list[Any], vehicles: list[Any]) -> Iterator[None]:
     """Change everything that may change, with a step after each event.
 
-    Commands change every 15 steps, and sometimes for a single step. Coefficients and inputs change twice. MuJoCo is
+    Commands reverse every 40 steps, and once for a single step. Coefficients and inputs change twice. MuJoCo is
     reset to a later, an earlier and the same time.
     """
     random, data = np.random.default_rng(5), rovs[0].data
     data.qvel[:] = random.uniform(-0.3, 0.3, len(data.qvel))
+    signs = random.choice([-1.0, 1.0], len(data.ctrl))
+    for rov in rovs:  # so that commands arrive and rotors reverse between the resets
+        rov.coefficients.update({name: 0.2 * x for name, x in rov.coefficients.items() if name.startswith("T_")})
     for n in range(STEPS):
-        if n % 15 == 0 or n in (50, 51):
-            shares = iter(random.uniform(-0.8, 0.8, len(data.ctrl)))
+        if n % 40 == 0 or n in (50, 51):
+            signs, shares = -signs, iter(signs * random.uniform(0.1, 0.8, len(signs)))
             for rov, vehicle in zip(rovs, vehicles, strict=True):
                 for command, actuator in zip(vehicle.layout.commands, rov._actuators, strict=True):
                     assert rov.model.actuator(actuator).name.endswith(command)
@@ -81,7 +84,7 @@ def events(rovs: list[Any], vehicles: list[Any]) -> Iterator[None]:
         if n == 160:
             for rov in rovs:
                 rov.reset()
-        data.qfrc_applied[:6] = 2.0 * (n > 180)
+        data.qfrc_applied[:6] = 2.0 * (n // 5 % 2)  # until each reset
         yield
 
 
