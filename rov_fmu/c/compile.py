@@ -128,21 +128,21 @@ OTHER_NAMES = {
 """Other names of the platforms, such as those of FMI 3.0, and the names used here for them."""
 
 
-_MACHINES = {
+MACHINES = {
     ("Linux", "x86_64"): "linux64",
     ("Linux", "aarch64"): "aarch64-linux",
     ("Windows", "x86_64"): "win64",
     ("Darwin", "x86_64"): "darwin64",
     ("Darwin", "aarch64"): "aarch64-darwin",
 }
-HOSTS = tuple(_MACHINES.values())
-"""The platforms that this package runs on."""
+"""The platforms that this package runs on, by what `platform` calls the system and the processor there."""
+HOSTS = tuple(MACHINES.values())
 
 
 def host_platform(fmi: int = 2) -> str | None:
     """Return the platform that importers of this version look for on this machine, or None if it is not supported."""
     processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    name = _MACHINES.get((platform.system(), processor))
+    name = MACHINES.get((platform.system(), processor))
     return "darwin64" if name == "aarch64-darwin" and fmi == 2 else name
 
 
@@ -255,9 +255,18 @@ def compile_engine(sources: Mapping[str, str], platform: str | None = None) -> b
 
     It is for one of PLATFORMS, by default for this machine. Raises BuildError.
     """
+    return _one(_engine(sources, platform))
+
+
+def compile_for(platforms: Sequence[str], sources: Mapping[str, str]) -> dict[str, bytes]:
+    """Compile what `compile_engine` compiles for several platforms in parallel. Raises BuildError."""
+    return _compiled({name: [_engine(sources, name)] for name in platforms})
+
+
+def _engine(sources: Mapping[str, str], platform: str | None) -> "_Library":
     *_, file = sources
     reason = "the C compiler failed for the engine"
-    return _one(_Library("engine.library", sources, engine_flags(file, platform), reason, most_lines=1))
+    return _Library("engine.library", sources, engine_flags(file, platform), reason, most_lines=1)
 
 
 @dataclass(frozen=True)

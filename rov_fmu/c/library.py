@@ -6,6 +6,7 @@ import json
 import platform
 import sys
 import warnings
+from collections.abc import Callable
 from contextlib import suppress
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -55,10 +56,17 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
 
     Raises BuildError when it cannot be compiled or loaded.
     """
-    key = f"{file.name} {vehicle.layout!r}"
+    return load_sources(f"{file.name} {vehicle.layout!r}", lambda: engine_sources(vehicle.layout, file))
+
+
+def load_sources(key: str, sources_of: Callable[[], dict[str, str]]) -> ctypes.CDLL:
+    """Return the library of C files (file name to text), the last of which includes the others.
+
+    This process keeps it under the key. Raises BuildError when it cannot be compiled or loaded.
+    """
     with _LOADING:
         if key not in _LOADED:
-            texts = engine_sources(vehicle.layout, file)
+            texts = sources_of()
             try:
                 _LOADED[key] = _load(texts)
             except OSError as error:

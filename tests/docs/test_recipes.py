@@ -146,7 +146,7 @@ state = rov.layout.at_rest | {"w": 0.2, "z": 5.0}
 whole, half = rov.step(inputs, state, 1.0), rov.step(inputs, rov.step(inputs, state, 0.5), 0.5)
 dive = Path(sys.argv[1])
 log, entries = read_table(dive, rov.layout, HEAVE, Names(), format_of(dive).open(dive))
-files = mujoco.mujoco_files(rov, "rov", {}, {})
+files = mujoco.mujoco_texts(rov, "rov", {}, {})
 content = native_content(rov, fmi=3).files
 forces = arrays.forces(rov, inputs, {})
 rates = arrays.rates(rov, [state[name] for name in rov.layout.state], forces, {})

@@ -4,11 +4,19 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.bridges import mujoco
+from rov_fmu.c.compile import host_platform
 from rov_fmu.cli import main
 from tests.commands import ROOT
 
 IDENTIFIED = ROOT / "verification" / "references" / "vehicles" / "identified.toml"
 REFIT = ROOT / "models" / "videoray_refit" / "videoray_refit.toml"
+
+
+@pytest.fixture(autouse=True)
+def for_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Compile no libraries for others, which takes seconds."""
+    monkeypatch.setattr(mujoco, "HOSTS", [*filter(None, [host_platform(fmi=3)])])
 
 
 def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:

@@ -7,10 +7,11 @@ import math
 from collections.abc import Iterable, Mapping
 from functools import lru_cache
 from types import ModuleType
+from typing import NamedTuple
 
 from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
 from ..catalogue import AXES
-from ..expression import FUNCTIONS, PYTHON, Expression, Name, of, total, written
+from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
 from ..layout import Layout
 from ..terms import Equation, Term, equation_of, mass_matrix, rate_formula
 from .step import interpolated
@@ -129,11 +130,22 @@ def left_out_of_accelerations(layout: Layout) -> list[str]:
     return _terms_of_known(equation_of(layout), layout)[1]
 
 
-def accelerations_text(layout: Layout) -> str:
-    """Return this module without its imports."""
+class Accelerations(NamedTuple):
+    """The formulas for a simulator that moves the body itself."""
+
+    equation: Equation
+    numbers: Mapping[str, Expression]
+    """All numbers that follow from coefficients, inputs, directions of motion and what lags, in their order."""
+    mass: list[list[Expression]]
+    """The 6x6 mass matrix; 0 along axes that the vehicle lacks."""
+    rates: Mapping[str, Expression]
+    """The accelerations, by the velocities of the axes that the vehicle has."""
+
+
+def accelerations_of(layout: Layout) -> Accelerations:
+    """Return the formulas for a simulator that moves the body itself."""
     equation = equation_of(layout)
     every = [axis.velocity for axis in AXES.values()]
-    states = [*_KNOWN]
     terms, _ = _terms_of_known(equation, layout)
     rates = {v: rate_formula(own) for v, own in terms.items()}
     formulas = {**equation.program, **equation.forces}
@@ -142,9 +154,15 @@ def accelerations_text(layout: Layout) -> str:
     masses: dict[tuple[str, str], Expression] = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
     for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):
         masses[a, b] = masses[b, a] = equation.names("mass", a + b)
-    rows = "".join(
-        f"        [{', '.join(written(masses.get((a, b), of(0.0)), PYTHON, _value) for b in every)}],\n" for a in every
-    )
+    return Accelerations(equation, numbers, [[masses.get((a, b), of(0.0)) for b in every] for a in every], rates)
+
+
+def accelerations_text(layout: Layout) -> str:
+    """Return this module without its imports."""
+    equation, numbers, mass, rates = accelerations_of(layout)
+    every = [axis.velocity for axis in AXES.values()]
+    states = [*_KNOWN]
+    rows = "".join(f"        [{', '.join(written(x, PYTHON, _value) for x in row)}],\n" for row in mass)
     accelerations = "".join(f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in every)
     return f"""\
 VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
@@ -177,6 +195,31 @@ def accelerations(_numbers):
 {_lagging_text(equation)}"""
 
 
+# ---- What lags ----
+
+TIME = Name("_time")
+"""The time since the numbers were computed, s. No other identifier begins so."""
+
+
+def arrived(equation: Equation) -> dict[str, Expression]:
+    """Return the fraction of each lag that has arrived, by its name."""
+    return {lag.arrived: -call("expm1", -lag.rate * TIME) for lag in equation.lags}
+
+
+def lagging(equation: Equation) -> dict[str, Expression]:
+    """Return the forces and the speeds of rotors that lag, by their names."""
+    return {
+        force: Name(force) - (Name(steady) - Name(force)) * call("expm1", -lag.rate * TIME)
+        for lag in equation.lags
+        for force, steady in lag.steady.items()
+    }
+
+
+def reversals(equation: Equation) -> list[Expression]:
+    """Return the time until each rotor reverses, from when the numbers were computed; infinite if it never does."""
+    return [call("log1p", x) / lag.rate for lag in equation.lags for x in lag.reversals]
+
+
 # ---- Parts of both ---------------------------------------------------------------------------------------------------
 
 
@@ -186,7 +229,7 @@ def _assignments(formulas: Mapping[str, Expression]) -> str:
 
 
 def _value(name: Name) -> str:
-    return f'v["{name.identifier}"]'
+    return name.identifier if name == TIME else f'v["{name.identifier}"]'
 
 
 def _rates(equation: Equation, layout: Layout, states: list[str]) -> str:
@@ -237,7 +280,7 @@ def _states(equation: Equation, states: list[str], indent: str) -> str:
 
 def _arrived(equation: Equation, indent: str) -> str:
     """Print assignments of the arrived fractions of the lags."""
-    return "".join(f"{indent}{lag.arrived} = -expm1(-{lag.rate.identifier} * _time)\n" for lag in equation.lags)
+    return "".join(f"{indent}{name} = {written(x, PYTHON)}\n" for name, x in arrived(equation).items())
 
 
 def _lagging_text(equation: Equation) -> str:
@@ -256,17 +299,12 @@ def until_reversal(v):
 
 def _lagging(equation: Equation) -> Iterable[str]:
     """Print the entries of a dictionary of the forces that lag."""
-    for lag in equation.lags:
-        for force, steady in lag.steady.items():
-            before, after = _value(Name(force)), _value(Name(steady))
-            yield f'"{force}": {before} - ({after} - {before}) * expm1(-{_value(lag.rate)} * _time)'
+    return (f'"{force}": {written(x, PYTHON, _value)}' for force, x in lagging(equation).items())
 
 
 def _reversals(equation: Equation) -> Iterable[str]:
     """Print the time until each rotor reverses, each after a comma."""
-    for lag in equation.lags:
-        for x in lag.reversals:
-            yield f", log1p({written(x, PYTHON, _value)}) / {_value(lag.rate)}"
+    return (f", {written(x, PYTHON, _value)}" for x in reversals(equation))
 
 
 def _tables(equation: Equation) -> str:

@@ -20,6 +20,7 @@ MOST_AT_ONCE = 500
 """Of these, a step may try so many at once, and the others as time passes, as in fmu_src/c/step.c."""
 MOST_WAITING = 1024
 """The largest number of changes of commands that may wait for the dead time, as in fmu_src/c/delay.c."""
+TOO_MANY_WAIT = f"more than {MOST_WAITING} changes of commands wait for the dead time; change them less often"
 BESIDE_NOSE = (1.0, 1e-6, 0.618e-6)
 """A direction of the body just beside the nose, for which turns are counted, as in fmu_src/c/heading.c.
 
@@ -302,9 +303,7 @@ class DelayLine:
             return
         kept = [change for change in self.waiting if change.remaining < dead_time]
         if len(kept) == MOST_WAITING:
-            raise ValueError(
-                f"more than {MOST_WAITING} changes of commands wait for the dead time; change them less often"
-            )
+            raise ValueError(TOO_MANY_WAIT)
         self.waiting = [*kept, Change(dead_time, commands)]
 
     def _receive(self, t: float, passed: float = 0.0) -> None:

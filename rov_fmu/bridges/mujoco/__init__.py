@@ -1,7 +1,7 @@
 """Write a vehicle as a folder for MuJoCo, which is a Python package: the model (MJCF) and what adds the water to it.
 
-The package needs only MuJoCo and NumPy. It contains `mujoco_plugin.py` and `step.py` as they are, and the
-equation of the vehicle, which `equation/python/printed.py` prints.
+The package needs only MuJoCo and NumPy. It contains `plugin.py`, `native.py` and `step.py` as they are, the equation of
+the vehicle, which `equation/python/printed.py` prints, and the same in C (`source.py`), with its libraries.
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,6 +13,9 @@ import numpy as np
 
 from rov_fmu.bridges import sdf
 from rov_fmu.bridges.mcap import hull_size
+from rov_fmu.bridges.mujoco.source import water_sources
+from rov_fmu.c.compile import HOSTS, MACHINES, PLATFORMS, compile_for
+from rov_fmu.c.library import load_sources
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.equation.python import step
@@ -22,21 +25,24 @@ from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
-    from rov_fmu.bridges.mujoco_plugin import Rov
+    from rov_fmu.bridges.mujoco.plugin import Rov
 
-_PLUGIN = Path(__file__).with_name("mujoco_plugin.py")
+_OWN = ("plugin.py", "native.py")
+"""The files of this folder that are part of each exported one."""
+_SYSTEMS = {"Linux": "linux", "Windows": "win32", "Darwin": "darwin"}
+"""The names in `sys.platform`, by those of `platform.system()`. native.py looks for a library with such a name."""
 _PACKAGE = '''\
 """A vehicle in MuJoCo: see README.md. `load` returns it in its world, and `Rov` connects it in a world of your own."""
 
 from functools import partial
 from pathlib import Path
 
-from . import equation, plugin
-from .plugin import step
+from . import equation, native, plugin
+from .native import step
 
 FOLDER = Path(__file__).parent
-Rov = partial(plugin.Rov, equation)
-load = partial(plugin.load, equation, FOLDER / "scene.xml")
+Rov = native.connector(equation, native.library_in(FOLDER))
+load = partial(plugin.load, Rov, FOLDER / "scene.xml")
 draws = partial(plugin.draws, FOLDER / "draws.csv")
 '''
 _MAIN = '''\
@@ -55,13 +61,31 @@ _PROPELLER = 0.05
 
 
 def mujoco_files(
-    vehicle: Vehicle, package: str, card: Mapping[str, Sequence[str]], draws: Mapping[str, Sequence[float]]
-) -> dict[str, str]:
+    vehicle: Vehicle,
+    package: str,
+    card: Mapping[str, Sequence[str]],
+    draws: Mapping[str, Sequence[float]],
+    platforms: Sequence[str] | None = None,
+) -> dict[str, str | bytes]:
     """Return the files of the folder by name. `package` is its own name.
 
-    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. Raises
-    InputError about a vehicle without a mass or with β = 0.
+    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. On `platforms`,
+    by default HOSTS, the step is in C, and on others in Python. Raises InputError about a vehicle without a mass or
+    with β = 0, and BuildError if the C cannot be compiled.
     """
+    texts = mujoco_texts(vehicle, package, card, draws)
+    libraries = compile_for(HOSTS if platforms is None else platforms, _c_of(texts))
+    names = {
+        name: f"water_{_SYSTEMS[system]}_{processor}{PLATFORMS[name].suffix}"
+        for (system, processor), name in MACHINES.items()
+    }
+    return {**texts, **{names[name]: library for name, library in libraries.items()}}
+
+
+def mujoco_texts(
+    vehicle: Vehicle, package: str, card: Mapping[str, Sequence[str]], draws: Mapping[str, Sequence[float]]
+) -> dict[str, str]:
+    """Return the files of the folder without its libraries, as `mujoco_files` does."""
     sdf.check_body(vehicle, "MuJoCo")
     layout = vehicle.layout
     example = layout.example(layout.axes[0].axis)
@@ -88,9 +112,10 @@ def mujoco_files(
         "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
         "__init__.py": _PACKAGE,
         "__main__.py": _MAIN.format(package=package),
-        "plugin.py": _PLUGIN.read_text(encoding="utf-8").replace("from rov_fmu.equation.python.step", "from .step"),
+        **{name: _text(name).replace("from rov_fmu.equation.python.step", "from .step") for name in _OWN},
         **{name: Path(step.__file__).with_name(name).read_text(encoding="utf-8") for name in ("step.py", "dop853.py")},
         "equation.py": equation_module(vehicle),
+        **water_sources(layout),
     }
     rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
     files["draws.csv"] = "\n".join([",".join(draws), *(",".join(map(repr, row)) for row in rows), ""])
@@ -107,21 +132,22 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
         rov.data.ctrl[:] = 0.2  # the commands, -1 to 1
         rov.step()
 
-    Raises InputError as `mujoco_files` does.
+    Raises InputError and BuildError as `mujoco_files` does.
     """
     import mujoco
 
-    from rov_fmu.bridges.mujoco_plugin import Rov
+    from rov_fmu.bridges.mujoco.native import connector
 
-    files = mujoco_files(vehicle, "rov", {}, {})
+    files = mujoco_texts(vehicle, "rov", {}, {})
     equation = ModuleType("equation")
     exec(compile(equation_module(vehicle, "rov_fmu.equation.python.step"), "<equation>", "exec"), equation.__dict__)
     model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
-    return Rov(equation, model, None, "", **coefficients)
+    library = load_sources(files["equation.h"], lambda: _c_of(files))
+    return connector(equation, library)(model, None, "", **coefficients)
 
 
 def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
-    """Return the module with the equation of a vehicle and its numbers, as `mujoco_plugin.py` takes it."""
+    """Return the module with the equation of a vehicle and its numbers, as `plugin.py` takes it."""
     layout = vehicle.layout
     data = {
         "IDENTIFIER": vehicle.identifier,
@@ -135,6 +161,15 @@ def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
     }
     lines = [f"{name} = {value!r}" for name, value in data.items()]
     return "\n".join([printed_accelerations(layout, step), "", *lines, ""])
+
+
+def _c_of(files: Mapping[str, str]) -> dict[str, str]:
+    """Return the C files of a folder. The last one includes the others."""
+    return {name: text for name, text in files.items() if name.endswith((".c", ".h"))}
+
+
+def _text(name: str) -> str:
+    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, object]:

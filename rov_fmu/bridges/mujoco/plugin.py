@@ -3,7 +3,8 @@
 MuJoCo moves the body and solves contacts. In each time step, a `Rov` adds two things: what the vehicle's mass matrix
 has beyond that of the rigid body, above all the added mass, so that contacts, loads and payloads feel it; and the
 forces that give the body the accelerations of the equation. These are computed in the middle of the step, so that the
-errors of the motion are of second order in the length of the step.
+errors of the motion are of second order in the length of the step. native.py does the same in C, where the folder has a
+library for this machine.
 
 The world of the model is north, west, up, and the body forward, port, up. The equation has north, east, down and
 forward, starboard, down, so components along and about the second and third axis have the other sign.
@@ -14,7 +15,8 @@ import os
 import struct
 import sys
 import zlib
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from copy import copy, deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +37,40 @@ _HEAVY = 1e6
 """The mass along, or the inertia about, an axis that the vehicle lacks, relative to that of the rigid body."""
 _REST = 0.1
 """The time constant, s, with which the body comes to rest along such an axis, and becomes level."""
+NO_BODY = "coefficients: the mass matrix must be positive definite; check m_rov and beta"
+APART = "step: all vehicles must be in the same simulation, with the same data"
+
+
+class Numbers(MutableMapping[str, float]):
+    """Coefficients or inputs by their names. They are in an array, which the step in C reads as well."""
+
+    def __init__(self, values: Mapping[str, float]) -> None:
+        self.places = {name: n for n, name in enumerate(values)}
+        self.array = np.array([*values.values()], float)
+
+    def __getitem__(self, name: str) -> float:
+        return float(self.array[self.places[name]])
+
+    def __setitem__(self, name: str, value: float) -> None:
+        if name not in self.places:
+            raise ValueError(f"{name}: the vehicle has no such coefficient or input")
+        self.array[self.places[name]] = value
+
+    def __delitem__(self, name: str) -> None:
+        raise ValueError(f"{name}: a coefficient or an input can only change")
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.places)
+
+    def __len__(self) -> int:
+        return len(self.places)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+    def __ior__(self, values: Mapping[str, float]) -> "Numbers":
+        self.update(values)
+        return self
 
 
 class Water:
@@ -45,8 +81,7 @@ class Water:
 
     def __init__(self, equation: Any) -> None:
         self.equation = equation
-        self.coefficients: dict[str, float] = dict(equation.COEFFICIENTS)
-        self.inputs: dict[str, float] = dict(equation.INPUTS)
+        self.coefficients, self.inputs = Numbers(equation.COEFFICIENTS), Numbers(equation.INPUTS)
         self.lacking = [n for n, v in enumerate("uvwpqr") if v not in equation.VELOCITIES]
         self.reset()
 
@@ -66,19 +101,20 @@ class Water:
         still, there = dict.fromkeys("uvwpqr", 0.0), [n for n in range(6) if n not in self.lacking]
         try:
             mass = np.array(self.equation.mass(self._numbers({**self.equation.COMMANDS, **still})))
-            np.linalg.cholesky(mass[np.ix_(there, there)])
+            root = np.linalg.cholesky(mass[np.ix_(there, there)])
         except (ZeroDivisionError, np.linalg.LinAlgError) as error:
-            raise ValueError("coefficients: the mass matrix must be positive definite; check m_rov and beta") from error
+            raise ValueError(NO_BODY) from error
+        if not np.isfinite(root).all():
+            raise ValueError(NO_BODY)
         return mass
 
-    def check(self) -> None:
-        """Raise ValueError about the first coefficient or input that the vehicle does not have."""
-        has = self.equation.COEFFICIENTS.keys() | self.equation.INPUTS.keys()
-        for name in (name for name in (*self.coefficients, *self.inputs) if name not in has):
-            raise ValueError(f"{name}: the vehicle has no such coefficient or input")
+    def __copy__(self) -> "Water":
+        other = object.__new__(Water)
+        other.__dict__ = {**self.__dict__, "line": copy(self.line)}
+        other.coefficients, other.inputs = Numbers(self.coefficients), Numbers(self.inputs)
+        return other
 
     def _numbers(self, values: Mapping[str, float]) -> dict[str, float]:
-        self.check()
         delayed = {later: values[name] for name, later in self.equation.DELAYED.items()}
         found: dict[str, float] = self.equation.numbers(
             {**self.coefficients, **self.inputs, **delayed, **values, **self.forces}
@@ -140,7 +176,8 @@ class Water:
     def _hold(self, commands: Mapping[str, float], nu: tuple[float, ...]) -> None:
         """Compute the numbers that are constant while the inputs and the directions of motion are held."""
         directions = [-1.0 if x < 0.0 else 1.0 for x in nu]
-        held = *self.coefficients.values(), *self.inputs.values(), *commands.values(), *directions
+        outer = *self.coefficients.array.tolist(), *self.inputs.array.tolist()
+        held = *outer, *commands.values(), *directions
         if held != self.held or self.since >= self.until:
             if self.held:
                 self.forces = self.equation.lagging(self.numbers, self.since)
@@ -183,9 +220,7 @@ class Rov:
         """
         self.model, self.data = model, mujoco.MjData(model) if data is None else data
         self.water = Water(equation)
-        self.coefficients, self.inputs = self.water.coefficients, self.water.inputs
-        self.coefficients |= coefficients
-        self.water.check()
+        self.coefficients.update(coefficients)
         name = prefix + equation.IDENTIFIER
         self.body = model.body(name).id
         self._actuators = [model.actuator(prefix + command).id for command in equation.COMMANDS]
@@ -201,6 +236,39 @@ class Rov:
         self._implicit = _IMPLICIT if model.tree_dofnum[model.dof_treeid[dof]] == len(_FLIP) else _IMPLICIT[:1]
         self.reset()
 
+    def __copy__(self) -> "Rov":
+        """Return the same vehicle in a simulation of its own, in the same state. The model is shared."""
+        return self._copied(self.model, copy(self.data))
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> "Rov":
+        """Return the same with a model of its own. Vehicles that are copied together stay together."""
+        return self._copied(deepcopy(self.model, memo), deepcopy(self.data, memo))
+
+    def _copied(self, model: Any, data: Any) -> "Rov":
+        other = object.__new__(type(self))
+        own = {name: x.copy() for name, x in self.__dict__.items() if isinstance(x, np.ndarray)}
+        other.__dict__ = {**self.__dict__, **own, "water": copy(self.water)}
+        other.model, other.data = model, data
+        return other
+
+    @property
+    def coefficients(self) -> Numbers:
+        """The coefficients by their names in the FMU, in SI units."""
+        return self.water.coefficients
+
+    @coefficients.setter
+    def coefficients(self, values: Mapping[str, float]) -> None:
+        self.water.coefficients.update(values)
+
+    @property
+    def inputs(self) -> Numbers:
+        """The inputs that are no commands, by their names in the FMU, in SI units."""
+        return self.water.inputs
+
+    @inputs.setter
+    def inputs(self, values: Mapping[str, float]) -> None:
+        self.water.inputs.update(values)
+
     def reset(self) -> None:
         """Stop the thrusters and forget the commands that wait for the dead time.
 
@@ -208,7 +276,7 @@ class Rov:
         """
         self.water.reset()
         self._time, self._outside = self.data.time, np.zeros(6)
-        self._weighed: dict[str, float] = {}
+        self._weighed: list[float] = []
 
     @property
     def forces(self) -> dict[str, float]:
@@ -219,9 +287,9 @@ class Rov:
         now = water.equation.numbers({**water.numbers, **water.equation.lagging(water.numbers, water.since)})
         return {name: now[name] for name in water.equation.FORCES}
 
-    def step(self) -> None:
-        """Move the simulation by one time step. For several vehicles in one model, there is the function `step`."""
-        step(self)
+    def step(self, steps: int = 1) -> None:
+        """Move the simulation by some time steps. For several vehicles in one model, there is the function `step`."""
+        step(self, steps=steps)
 
     # ---- The parts of a step, in their order ----
 
@@ -230,8 +298,8 @@ class Rov:
         data = self.data
         if data.time != self._time:
             self.reset()
-        if self._weighed != self.coefficients:
-            self._weighed = dict(self.coefficients)
+        if self._weighed != self.coefficients.array.tolist():
+            self._weighed = self.coefficients.array.tolist()
             self._mass = np.outer(_FLIP, _FLIP) * self.water.mass()
             for n in self.water.lacking:
                 self._mass[n] = self._mass[:, n] = 0.0
@@ -282,23 +350,27 @@ class Rov:
         self._outside = (data.qvel[self._dofs] - velocity) / h - self._accelerated
 
 
-def step(*rovs: Rov) -> None:
-    """Move the simulation of some vehicles, which share a model and its data, by one time step.
+def step(*rovs: Rov, steps: int = 1) -> None:
+    """Move the simulation of some vehicles, which share a model and its data, by some time steps.
 
     This is MuJoCo's own step (`mj_step1`, `mj_step2`) by its integrator Euler, implicit or implicitfast. Raises
-    ValueError when more commands wait for the dead time than a vehicle can keep.
+    ValueError about vehicles in different simulations, and when more commands wait for the dead time than a vehicle
+    can keep.
     """
     model, data = rovs[0].model, rovs[0].data
-    mujoco.mj_step1(model, data)
-    for rov in rovs:
-        rov.add_mass()
-    mujoco.mj_factorM(model, data)
-    mujoco.mj_projectConstraint(model, data)
-    for rov in rovs:
-        rov.add_forces()
-    mujoco.mj_step2(model, data)
-    for rov in rovs:
-        rov.move()
+    if any(rov.data is not data for rov in rovs):
+        raise ValueError(APART)
+    for _ in range(steps):
+        mujoco.mj_step1(model, data)
+        for rov in rovs:
+            rov.add_mass()
+        mujoco.mj_factorM(model, data)
+        mujoco.mj_projectConstraint(model, data)
+        for rov in rovs:
+            rov.add_forces()
+        mujoco.mj_step2(model, data)
+        for rov in rovs:
+            rov.move()
 
 
 def _check(model: Any, body: int, name: str) -> None:
@@ -337,9 +409,9 @@ def _crossed(omega: Any, other: Any) -> Any:
 # ---- The exported folder ---------------------------------------------------------------------------------------------
 
 
-def load(equation: Any, scene: Path, **coefficients: float) -> Rov:
-    """Return the vehicle in its world (MJCF), with other values of some coefficients."""
-    return Rov(equation, mujoco.MjModel.from_xml_path(str(scene)), None, "", **coefficients)
+def load(rov: Callable[..., Rov], scene: Path, **coefficients: float) -> Rov:
+    """Return the vehicle in its world (MJCF), with other values of some coefficients. `rov` connects it there."""
+    return rov(mujoco.MjModel.from_xml_path(str(scene)), None, "", **coefficients)
 
 
 def draws(path: Path) -> list[dict[str, float]]:

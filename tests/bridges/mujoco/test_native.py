@@ -1,0 +1,350 @@
+"""The step in C is that in Python up to rounding errors, for every kind of vehicle, in every order of events.
+
+The step in Python is `plugin.Rov`, which `tests/bridges/test_mujoco.py` compares with the FMU.
+"""
+
+import gc
+import sys
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from copy import copy, deepcopy
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+import rov_fmu
+from rov_fmu.bridges.mujoco import mujoco_files
+from rov_fmu.bridges.mujoco.native import connector, library_in
+from rov_fmu.bridges.mujoco.source import water_sources
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.terms import equation_of
+from tests.bridges.test_mujoco import EULER, FILES, IMPLICIT, loaded, mujoco, scene
+from tests.commands import BARE
+
+Array = NDArray[np.float64]
+KINDS: dict[str, Callable[[Layout], bool]] = {
+    "dead time": lambda layout: layout.has_dead_time,
+    "lag": lambda layout: bool(layout.lagging),
+    "rotors": lambda layout: equation_of(layout).has_rotors,
+    "fins": lambda layout: bool(layout.fins),
+    "tables of thrust": lambda layout: bool(equation_of(layout).tables),
+    "pulse widths": lambda layout: layout.pulse is not None,
+    "a heading alone": lambda layout: not layout.has_attitude,
+    "roll and pitch": lambda layout: layout.has_attitude,
+}
+STEPS = 240
+
+
+def in_python(package: ModuleType, model: Any, data: Any = None, prefix: str = "") -> Any:
+    """Return the vehicle whose step is in Python."""
+    return package.plugin.Rov(package.equation, model, data, prefix)
+
+
+def world(package: ModuleType, integrator: int = EULER) -> Any:
+    """Return a model without a sea bed, with a keyframe at a later time."""
+    spec = scene(package, 0.002)
+    spec.option.integrator = integrator
+    spec.add_key(name="later", time=10.0)
+    model = spec.compile()
+    model.geom_contype[:] = 0
+    return model
+
+
+def events(rovs: list[Any], vehicles: list[Any]) -> Iterator[None]:
+    """Change everything that may change, with a step after each event.
+
+    Commands reverse every 40 steps, and once for a single step. Coefficients and inputs change twice. MuJoCo is
+    reset to a later, an earlier and the same time.
+    """
+    random, data = np.random.default_rng(5), rovs[0].data
+    data.qvel[:] = random.uniform(-0.3, 0.3, len(data.qvel))
+    signs = random.choice([-1.0, 1.0], len(data.ctrl))
+    for rov in rovs:  # so that commands arrive and rotors reverse between the resets
+        rov.coefficients.update({name: 0.2 * x for name, x in rov.coefficients.items() if name.startswith("T_")})
+    for n in range(STEPS):
+        if n % 40 == 0 or n in (50, 51):
+            signs, shares = -signs, iter(signs * random.uniform(0.1, 0.8, len(signs)))
+            for rov, vehicle in zip(rovs, vehicles, strict=True):
+                for command, actuator in zip(vehicle.layout.commands, rov._actuators, strict=True):
+                    assert rov.model.actuator(actuator).name.endswith(command)
+                    data.ctrl[actuator] = vehicle.layout.command_of(next(shares))
+        if n in (40, 130):
+            for rov in rovs:
+                rov.coefficients.update({name: rov.coefficients[name] * 1.1 for name in [*rov.coefficients][::2]})
+                rov.inputs.update({name: 0.1 + x for name, x in rov.inputs.items()})
+        if n == 70:
+            mujoco.mj_resetDataKeyframe(rovs[0].model, data, 0)
+        if n == 110:
+            mujoco.mj_resetData(rovs[0].model, data)
+        if n == 160:
+            for rov in rovs:
+                rov.reset()
+        data.qfrc_applied[:6] = 2.0 * (n // 5 % 2)  # until each reset
+        yield
+
+
+def flown(rovs: list[Any], vehicles: list[Any], step: Callable[..., None]) -> Array:
+    """Return positions, velocities and forces after each step."""
+    rows = []
+    for _ in events(rovs, vehicles):
+        step(*rovs)
+        rows.append([*rovs[0].data.qpos, *rovs[0].data.qvel, *(x for rov in rovs for x in rov.forces.values())])
+    return np.array(rows)
+
+
+def assert_same(found: Array, expected: Array) -> None:
+    assert np.isfinite(expected).all()
+    assert np.ptp(expected, axis=0).max() > 0.1, "it moves"
+    assert (np.abs(found - expected) <= 1e-12 * np.maximum(1.0, np.abs(expected).max(axis=0))).all()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_is_among_the_vehicles(kind: str) -> None:
+    assert any(KINDS[kind](rov_fmu.load(file).layout) for file in FILES.values())
+
+
+@pytest.mark.parametrize("integrator", [EULER, *IMPLICIT], ids=lambda one: one.name)
+@pytest.mark.parametrize("name", FILES)
+def test_it_moves_as_in_python(name: str, integrator: int) -> None:
+    """Also with dead time, lag, rotors, changed coefficients, and after resets to earlier and to later times."""
+    vehicle, package = loaded(name)
+    model = world(package, integrator)
+    native, reference = package.Rov(model), in_python(package, model)
+    assert type(native).__name__ == "NativeRov"
+    expected = flown([reference], [vehicle], package.plugin.step)
+    assert_same(flown([native], [vehicle], package.step), expected)
+
+
+@pytest.mark.parametrize("mixed", [False, True], ids=["in C", "one of them in Python"])
+def test_several_kinds_in_one_scene_move_as_in_python(mixed: bool) -> None:
+    """Each kind has a library of its own. One of them has a current, which another kind does not have at its place."""
+    names = ["every_option", "videoray", "bluerov2", "videoray"]
+    packages = [loaded(name)[1] for name in names]
+    vehicles = [loaded(name)[0] for name in names]
+    spec = scene(packages[0], 0.002)
+    spec.add_key(name="later", time=10.0)
+    for n, package in enumerate(packages[1:], 1):
+        part = mujoco.MjSpec.from_file(str(package.FOLDER / "vehicle.xml"))
+        spec.attach(part, prefix=f"{n}_", frame=spec.worldbody.add_frame(pos=[0.0, 9.0 * n, 0.0]))
+    model = spec.compile()
+    model.geom_contype[:] = 0
+
+    def connected(python: tuple[int, ...]) -> list[Any]:
+        data = mujoco.MjData(model)
+        prefixes = ["", *(f"{n}_" for n in range(1, len(packages)))]
+        return [
+            in_python(package, model, data, prefix) if n in python else package.Rov(model, data, prefix)
+            for n, (package, prefix) in enumerate(zip(packages, prefixes, strict=True))
+        ]
+
+    expected = flown(connected((0, 1, 2, 3)), vehicles, packages[0].plugin.step)
+    assert_same(flown(connected((2,) if mixed else ()), vehicles, packages[1].step), expected)
+
+
+def test_many_steps_at_once_are_as_many_steps() -> None:
+    _, package = loaded("every_option")
+    model = world(package)
+    rovs = [package.Rov(model), package.Rov(model), in_python(package, model)]
+    for rov in rovs:
+        rov.data.ctrl[:] = 0.7 * model.actuator_ctrlrange[:, 1]
+    rovs[0].step(100)
+    for _ in range(100):
+        rovs[1].step()
+    rovs[2].step(100)
+    assert (rovs[0].data.qpos == rovs[1].data.qpos).all()
+    assert rovs[0].data.qpos == pytest.approx(rovs[2].data.qpos, rel=1e-12, abs=1e-12)
+
+
+# ---- Copies ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("python", [False, True])
+@pytest.mark.parametrize("copied", [copy, deepcopy])
+def test_a_copy_goes_on_by_itself_from_the_same_state(copied: Callable[[Any], Any], python: bool) -> None:
+    """Also what lags and what waits for the dead time is copied. The original may be gone."""
+    _, package = loaded("every_option")
+
+    def fly(rov: Any, steps: int, share: float) -> Array:
+        rov.data.ctrl[:] = share * rov.model.actuator_ctrlrange[:, 1]
+        rov.step(steps)
+        return np.array([*rov.data.qpos, *rov.data.qvel, *rov.forces.values()])
+
+    model = world(package)
+    original = in_python(package, model) if python else package.Rov(model)
+    original.coefficients["m_rov"] *= 1.1
+    fly(original, 30, 0.6)
+    other, twin = copied(original), copied(original)
+    other.coefficients["m_rov"] *= 2.0
+    assert original.coefficients["m_rov"] * 2.0 == other.coefficients["m_rov"]
+    expected = fly(original, 20, 0.4)
+    before = twin.data.qpos.copy()
+    del original
+    gc.collect()
+    scrap = [np.full(1000, np.nan) for _ in range(1000)]
+    assert (twin.data.qpos == before).all(), "it was not moved with the original"
+    assert (fly(twin, 20, 0.4) == expected).all()
+    assert np.abs(fly(other, 20, 0.4) - expected).max() > 1e-4
+    assert len(scrap) == 1000
+
+
+def test_vehicles_that_are_copied_together_stay_together() -> None:
+    _, package = loaded("bluerov2")
+    spec = scene(package)
+    part = mujoco.MjSpec.from_file(str(package.FOLDER / "vehicle.xml"))
+    spec.attach(part, prefix="other_", frame=spec.worldbody.add_frame(pos=[0.0, 3.0, 0.0]))
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    both = [package.Rov(model, data, prefix) for prefix in ("", "other_")]
+    package.step(*both)
+    copies = deepcopy(both)
+    assert copies[0].data is copies[1].data is not data
+    for rovs in (both, copies):
+        rovs[0].data.ctrl[:] = 0.3
+        package.step(*rovs, steps=20)
+    assert (copies[0].data.qpos == data.qpos).all()
+    with pytest.raises(ValueError, match=r"^step: all vehicles must be in the same simulation"):
+        package.step(both[0], copies[1])
+    with pytest.raises(ValueError, match=r"^step: all vehicles must be in the same simulation"):
+        package.plugin.step(both[0], copies[1])
+
+
+def test_other_data_of_the_same_model_are_moved() -> None:
+    _, package = loaded("bluerov2")
+    rov, fresh = package.load(), package.load()
+    rov.data.ctrl[:] = 0.5
+    rov.step(20)
+    before = rov.data
+    rov.data, there = mujoco.MjData(rov.model), before.qpos.copy()
+    for one in (rov, fresh):
+        one.data.ctrl[:] = 0.2
+        one.step(20)
+    assert (rov.data.qpos == fresh.data.qpos).all()
+    assert (before.qpos == there).all()
+
+
+# ---- Threads, and functions in Python --------------------------------------------------------------------------------
+
+
+def test_scenes_move_in_threads_as_one_after_the_other() -> None:
+    packages = [loaded(name)[1] for name in ("every_option", "bluerov2_heavy", "every_option", "videoray")]
+
+    def fly(package: ModuleType) -> Array:
+        rov = package.load()
+        rov.data.ctrl[:] = 0.5 * rov.model.actuator_ctrlrange[:, 1]
+        for _ in range(50):
+            rov.step(10)
+        return np.asarray(rov.data.qpos)
+
+    with ThreadPoolExecutor(4) as pool:
+        found = [*pool.map(fly, packages)]
+    assert all((one == fly(package)).all() for one, package in zip(found, packages, strict=True))
+
+
+def test_other_threads_run_during_many_steps() -> None:
+    rov = loaded("bluerov2")[1].load()
+    with ThreadPoolExecutor(1) as pool:
+        job, turns = pool.submit(rov.step, 20_000), 0
+        while not job.done():
+            time.sleep(1e-4)
+            turns += 1
+    assert rov.data.time == pytest.approx(40.0)
+    assert turns > 20
+
+
+@pytest.fixture
+def callback() -> Iterator[Callable[[Any], None]]:
+    yield mujoco.set_mjcb_control
+    mujoco.set_mjcb_control(None)
+
+
+def test_a_function_in_python_that_mujoco_calls_acts_and_its_error_is_raised(callback: Any) -> None:
+    rov, other = (loaded("bluerov2")[1].load() for _ in range(2))
+    other.data.ctrl[:] = 0.4
+    other.step(20)
+
+    def command(_: Any, data: Any) -> None:
+        data.ctrl[:] = 0.4
+
+    callback(command)
+    rov.step(20)
+    assert rov.data.qpos == pytest.approx(other.data.qpos, abs=1e-12)
+    callback(lambda *_: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        rov.step(20)
+
+
+# ---- What it refuses, and where there is no library ------------------------------------------------------------------
+
+
+def test_more_commands_than_a_vehicle_keeps_are_one_line() -> None:
+    _, package = loaded("every_option")
+    model = world(package)
+    model.opt.timestep = 1e-6
+    rov = package.Rov(model)
+    rov.coefficients["T_d"] = 1.0
+
+    def send() -> None:
+        for n in range(1030):
+            rov.data.ctrl[:] = model.actuator_ctrlrange[:, 1] * n / 2000.0
+            rov.step()
+
+    with pytest.raises(ValueError, match=r"^more than 1024 changes of commands wait for the dead time"):
+        send()
+
+
+@pytest.mark.parametrize("python", [False, True])
+def test_coefficients_change_and_are_never_added_or_removed(python: bool) -> None:
+    _, package = loaded("videoray")
+    rov = in_python(package, world(package)) if python else package.load()
+    rov.coefficients |= {"m_rov": 7.0}
+    rov.inputs = {"V_N": 0.3}
+    assert (rov.coefficients["m_rov"], rov.inputs["V_N"]) == (7.0, 0.3)
+    assert (rov.water.coefficients["m_rov"], rov.inputs["V_E"]) == (7.0, 0.0)
+    assert eval(repr(rov.inputs)) == dict(rov.inputs)
+    with pytest.raises(ValueError, match=r"^m_rov: a coefficient or an input can only change$"):
+        del rov.coefficients["m_rov"]
+
+
+@pytest.mark.parametrize("content", [None, b"no library"])
+def test_without_a_library_that_fits_the_step_is_in_python(content: bytes | None, tmp_path: Path) -> None:
+    _, package = loaded("videoray")
+    here = next(package.FOLDER.glob(f"water_{sys.platform}_*"))
+    if content:
+        (tmp_path / here.name).write_bytes(content)
+    rov = connector(package.equation, library_in(tmp_path))(package.load().model)
+    assert type(rov).__name__ == "Rov"
+    rov.step()
+    assert library_in(package.FOLDER)
+
+
+def test_a_library_of_another_vehicle_is_not_taken() -> None:
+    (_, package), (_, other) = loaded("videoray"), loaded("bluerov2")
+    rov = connector(package.equation, library_in(other.FOLDER))(package.load().model)
+    assert type(rov).__name__ == "Rov"
+
+
+def test_without_the_library_of_mujoco_the_step_is_in_python(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    _, package = loaded("videoray")
+    library, model = library_in(package.FOLDER), package.load().model
+    monkeypatch.setattr(mujoco, "__file__", str(tmp_path / "__init__.py"))
+    assert type(connector(package.equation, library)(model)).__name__ == "Rov"
+
+
+def test_the_folder_has_the_c_and_its_libraries_for_all_systems() -> None:
+    bare = rov_fmu.load(BARE)
+    files = mujoco_files(bare, "rov", {}, {})
+    begins = {
+        "water_linux_x86_64.so": b"\x7fELF",
+        "water_linux_aarch64.so": b"\x7fELF",
+        "water_win32_x86_64.dll": b"MZ",
+        "water_darwin_x86_64.dylib": b"\xcf\xfa\xed\xfe",
+        "water_darwin_aarch64.dylib": b"\xcf\xfa\xed\xfe",
+    }
+    libraries = {name: file for name, file in files.items() if isinstance(file, bytes)}
+    assert {name: file[: len(begins[name])] for name, file in libraries.items()} == begins
+    assert water_sources(bare.layout).items() <= files.items()
