@@ -381,6 +381,11 @@ class Layout:
         return position | (HEADING if self.has(YAW) else {})
 
     @cached_property
+    def over_ground(self) -> tuple[str, ...]:
+        """The velocity over ground north, east and down: the derivatives of the position, which are outputs."""
+        return tuple(rate_name(name) for name in POSITION if name in self.pose)
+
+    @cached_property
     def lagging(self) -> dict[str, Declaration]:
         """The forces and the speeds of rotors that follow the commands with a lag, which are the last states."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)

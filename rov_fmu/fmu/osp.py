@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, rate_name
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.units import UNITS, unit_of
 from rov_fmu.io.templates import render
@@ -20,11 +20,7 @@ Members = Mapping[str, str | None]
 
 
 def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
-    """Yield the name and members of every group, including members that this vehicle does not have.
-
-    No group is a mechanical port of force and velocity: power needs velocities over ground, and the outputs are
-    velocities through the water.
-    """
+    """Yield the name and members of every group, including members that this vehicle does not have."""
     commands = list(layout.commands)
     for n in range(0, len(commands), _MAX_MEMBERS):
         number = f"_{n // _MAX_MEMBERS + 1}" if len(commands) > _MAX_MEMBERS else ""
@@ -43,7 +39,8 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     for curve in layout.turning_curves:
         yield f"{curve.name}_torque", {f"tau_{curve.name}": "z"}
     yield "current", {"V_N": "x", "V_E": "y", "V_D": "z"}
-    yield "velocity", {axis.velocity: letter for axis, letter in along}
+    yield "velocity", {rate_name(letter): letter for letter in "xyz"}
+    yield "velocity_through_water", {axis.velocity: letter for axis, letter in along}
     yield "angular_velocity" if layout.has_attitude else "yaw_rate", {axis.velocity: letter for axis, letter in about}
     yield "position", {"x": "x", "y": "y"}
     yield "depth", {"z": "z"}
@@ -56,7 +53,8 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
 
 def osp_model_description(layout: Layout) -> bytes:
     """Return the XML document. Every input and output is in one group; those that `_groups` lacks have their own."""
-    units = {name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()}
+    declared = layout.inputs | layout.state | layout.calculated
+    units = {name: one.unit for name, one in declared.items()} | dict.fromkeys(layout.over_ground, "m/s")
     groups = []
     possible = [*_groups(layout)]
     placed = {variable for _, members in possible for variable in members}

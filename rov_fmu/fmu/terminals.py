@@ -45,6 +45,7 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),
         Terminal("body_velocity", "output", "plug", "Velocity through the water, body frame", tuple(layout.velocities)),
+        Terminal("velocity", "output", "plug", "Velocity over ground, north, east and down", layout.over_ground),
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),

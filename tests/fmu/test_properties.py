@@ -1,6 +1,7 @@
 """Any vehicle has a valid description, the same in both versions of FMI, with the right groups and dependencies."""
 
 import random
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -186,6 +187,18 @@ def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
         assert len({v.get("memberName") for v in variable_names}) == len(variable_names)
 
 
+@pytest.mark.parametrize("kind", ROVS)
+def test_every_velocity_says_of_what_it_is_and_those_over_ground_are_outputs(kind: str) -> None:
+    """The derivative of a position is a velocity over ground; other derivatives are local."""
+    declared = {v.name: v for v in variables(ROVS[kind])}
+    rates = {v.name: v.causality for v in declared.values() if v.derivative_of}
+    over_ground = {f"der({x})" for x in "xyz" if x in ROVS[kind].layout.state}
+    assert rates == {name: "output" if name in over_ground else "local" for name in rates}
+    for v in (v for v in declared.values() if v.unit == "m/s"):
+        assert re.search("current" if v.causality == "input" else "(over ground|through the water)", v.description)
+        assert ("over ground" in v.description) == (v.name in over_ground)
+
+
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
 
 # The elements for motion in the sequence of the schema, with the dimension of their variables.
@@ -203,9 +216,9 @@ SEQUENCE = {
 LETTERS = {
     name: letter
     for letter, names in {
-        "x": "u p x phi X_ext K_ext V_N",
-        "y": "v q y theta Y_ext M_ext V_E",
-        "z": "w r z psi Z_ext N_ext V_D",
+        "x": "u p x der(x) phi X_ext K_ext V_N",
+        "y": "v q y der(y) theta Y_ext M_ext V_E",
+        "z": "w r z der(z) psi Z_ext N_ext V_D",
     }.items()
     for name in names.split()
 }
