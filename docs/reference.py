@@ -52,7 +52,8 @@ def tables() -> dict[str, Table]:
     schema = json_schema()
     named = {"vehicle": "FileHead", "estimated": "Estimated"}
     named |= {
-        name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
+        name.lower(): name
+        for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Point", "Battery", "Commands")
     }
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())

@@ -15,6 +15,7 @@ from lxml import etree
 from rov_fmu.c import compile as build_options
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Vector
 from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.model_description import build_description, model_description
 from rov_fmu.fmu.osp import osp_model_description
@@ -31,6 +32,7 @@ from tests.vehicles import (
     pulsed,
     random_body,
     random_vehicle,
+    tied,
     with_axes,
 )
 from verification.references.rigid_vehicle import QUATERNION, calculated
@@ -41,6 +43,9 @@ Slopes = dict[tuple[str, str], float]
 
 ROVS = VEHICLES | {"six axes": SIX, "dead time": load_vehicle(THRUST_EFFECTS), "everything": load_vehicle(EVERYTHING)}
 ROVS |= {f"{axes} alone": with_axes(axes) for axes in ("q", "wp", "upr")}
+_POINTS: dict[str, Vector] = {"tether": (-0.3, 0.1, -0.2), "hook": (0.2, -0.1, 0.4)}
+ROVS |= {f"tied, {name}": tied(VEHICLES[name], **_POINTS) for name in ("VideoRay", "yaw only", "heave only")}
+ROVS |= {"tied, Heavy": tied(VEHICLES["Heavy"], hook=(0.2, -0.1, 0.4)), "tied, six": tied(SIX, **_POINTS)}
 _OF_REFERENCE = [*ROVS.keys() - {"dead time"}]
 """The vehicles of which the reference has the equations."""
 ROVS |= {"drawn, four axes": random_vehicle(random.Random(0)), "drawn, six": random_body(random.Random(0), "uvwpqr")}
@@ -196,7 +201,7 @@ def test_every_velocity_says_of_what_it_is_and_those_over_ground_are_outputs(kin
     assert rates == {name: "output" if name in over_ground else "local" for name in rates}
     for v in (v for v in declared.values() if v.unit == "m/s"):
         assert re.search("current" if v.causality == "input" else "(over ground|through the water)", v.description)
-        assert ("over ground" in v.description) == (v.name in over_ground)
+        assert ("over ground" in v.description) == (v.name in over_ground or v.name in ROVS[kind].layout.calculated)
 
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
@@ -315,7 +320,7 @@ def dependencies(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
 
 
 # The default tests have the vehicle with most effects.
-_SOME = ("everything",)
+_SOME = ("everything", "tied, VideoRay")
 _KINDS = [pytest.param(kind, marks=() if kind in _SOME else pytest.mark.long) for kind in sorted(_OF_REFERENCE)]
 
 
@@ -343,8 +348,9 @@ def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
 
     found = {pair: strength for pair in samples[0][0] if (strength := strongest(pair))}
     outputs = {v.name for v in variables(rov) if v.causality == "output"}
+    rates = {v.name for v in variables(rov) if v.derivative_of}
     assert {pair: s for pair, s in found.items() if pair[0] in outputs} == dependencies(rov, "Outputs")
-    assert {pair: s for pair, s in found.items() if pair[0].startswith("der(")} == dependencies(rov, "Derivatives")
+    assert {pair: s for pair, s in found.items() if pair[0] in rates} == dependencies(rov, "Derivatives")
 
 
 _BEYOND_THEIR_RANGES = [(angle, f"{angle}_0") for angle in ("phi", "theta", "psi")]
@@ -363,6 +369,10 @@ def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> 
     points = [m | parameters(rov, rng, [False, True]) for m in motions(sorted(known), rng, pairs_of(kind))]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in known}
-    found = {pair: "dependent" if vary(of) else "constant" for pair, of in values.items() if any(of)}
+    found = {  # the kind for a parameter, such as the place of a point, is always dependent
+        pair: "dependent" if vary(of) or pair[1] in rov.coefficients else "constant"
+        for pair, of in values.items()
+        if any(of)
+    }
     found |= dict.fromkeys(_BEYOND_THEIR_RANGES if rov.layout.has_attitude else (), "dependent")
     assert found == dependencies(rov, "InitialUnknowns")
