@@ -278,7 +278,7 @@ def _terminals() -> Table:
             terminal.causality,
             terminal.rule,
             terminal.description,
-            ", ".join(f"`{name}`" for name in terminal.members),
+            ", ".join(f"`{name}`" for name in terminal.variables),
         )
         for terminal in terminals(load_vehicle(VIDEORAY).layout)
     ]

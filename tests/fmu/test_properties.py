@@ -179,13 +179,22 @@ def members(terminal: etree._Element) -> list[str]:
 
 @pytest.mark.parametrize("kind", ROVS)
 def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
-    """The members of a terminal have the same causality, and its name is unique."""
+    """The members of a terminal have the same causality, unless it is the port of a point; its name is unique."""
     declared = {v.name: v.causality for v in variables(ROVS[kind])}
     found = terminals_of(terminals_and_icons(ROVS[kind].layout))
     grouped = [name for terminal in found.values() for name in members(terminal)]
     assert sorted(grouped) == sorted(name for name, causality in declared.items() if causality in {"input", "output"})
-    for terminal in found.values():
-        assert len({declared[member] for member in members(terminal)}) == 1
+    for point in ROVS[kind].layout.points:
+        port = found[f"point_{point.name}"]
+        names = [*(f"F_{d}" for d in "NED"), *"xyz", *(f"der({x})" for x in "xyz")]
+        assert [v.get("memberName") for v in port.iter("TerminalMemberVariable")] == names
+        assert members(port) == [
+            name.replace(")", f"_{point.name})") if ")" in name else f"{name}_{point.name}" for name in names
+        ]
+        assert [declared[name] for name in members(port)] == ["input"] * 3 + ["output"] * 6
+        assert port.get("matchingRule") == "bus"
+    for name, terminal in found.items():
+        assert name.startswith("point_") or len({declared[member] for member in members(terminal)}) == 1
         assert terminal.get("terminalKind") is None
         variable_names = terminal.findall("TerminalMemberVariable")
         assert {v.get("variableKind") for v in variable_names} == {"signal"}
@@ -239,6 +248,19 @@ def groups_of(layout: Layout) -> list[etree._Element]:
     return list(parent)
 
 
+def test_a_point_is_a_port_of_force_and_velocity_over_ground() -> None:
+    """Its force goes in and its velocity comes out, as OSP-IS has it, after all groups of one unit."""
+    groups = {group.get("name"): group for group in groups_of(ROVS["tied, VideoRay"].layout)}
+    for point in _POINTS:
+        port = groups[f"point_{point}"]
+        assert port.tag == f"{NAMESPACE}LinearMechanicalPort"
+        force, velocity = ([(v.get("ref"), v.get("unit"), v.get("axis")) for v in part] for part in port)
+        assert [part.tag.removeprefix(NAMESPACE) for part in port] == ["Force", "LinearVelocity"]
+        assert force == [(f"F_{d}_{point}", "N", axis) for d, axis in zip("NED", "xyz", strict=True)]
+        assert velocity == [(f"der({axis}_{point})", "m/s", axis) for axis in "xyz"]
+    assert [*groups][-len(_POINTS) :] == [f"point_{point}" for point in _POINTS]
+
+
 def references(group: etree._Element) -> list[str]:
     assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
     return [variable.get("ref") for variable in group]
@@ -248,11 +270,13 @@ def references(group: etree._Element) -> list[str]:
 def test_every_input_and_output_is_in_one_group(kind: str) -> None:
     """The variables of a group have the same causality and unit, and different axes."""
     rov = ROVS[kind]
-    groups = groups_of(rov.layout)
+    every = groups_of(rov.layout)
+    groups = [group for group in every if not group.tag.endswith("Port")]
+    groups += [part for group in every if group.tag.endswith("Port") for part in group]
     declared = {v.name: v for v in variables(rov)}
     grouped = sorted(name for group in groups for name in references(group))
     assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
-    names = [group.get("name") for group in groups]
+    names = [group.get("name") for group in every]
     assert all(names)
     assert len(set(names)) == len(names)
     for group in groups:
@@ -263,7 +287,7 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         (unit,) = {v.unit for v in members}
         of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == unit_of(unit).exponents] or ["Generic"]
         assert of_unit == [group.tag.removeprefix(NAMESPACE)]
-    order = [[*SEQUENCE].index(group.tag.removeprefix(NAMESPACE)) for group in groups]
+    order = [[*SEQUENCE, "LinearMechanicalPort"].index(group.tag.removeprefix(NAMESPACE)) for group in every]
     assert order == sorted(order)
     axes = {variable.get("ref"): variable.get("axis") for group in groups for variable in group}
     directions = {f"F_{one.name}": map(one.effect, (SURGE, SWAY, HEAVE)) for one in rov.layout.thrusters}
@@ -272,7 +296,13 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         for name, parts in directions.items()
     }
     about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
-    assert axes == {name: (LETTERS | along | about).get(name) for name in axes}
+    of_points = {
+        name.format(x, point): axis
+        for point in (point.name for point in rov.layout.points)
+        for name, letters in (("F_{}_{}", "NED"), ("{}_{}", "xyz"), ("der({}_{})", "xyz"))
+        for x, axis in zip(letters, "xyz", strict=True)
+    }
+    assert axes == {name: (LETTERS | along | about | of_points).get(name) for name in axes}
 
 
 # ---- Dependencies, against slopes of the equations of the reference ----
