@@ -110,26 +110,28 @@ INLINE mask motion_waits(const motion *m, const series *s)
 /* Find the components that move, and set the first coefficients of the others to 0. */
 INLINE void motion_find_moving(const motion *m, series *s)
 {
+    const int *const component_of = STRUCTURE(m, COMPONENT_OF);
+    const int components = SIZE_OF(m, COMPONENTS), dynamic = SIZE_OF(m, DYNAMIC);
     s->moving = s->blocks = 0;
     for (int i = 0; i < N_SERIES; i++) {
-        const uint64_t bit = UINT64_C(1) << STRUCTURE(m, COMPONENT_OF)[i];
+        const uint64_t bit = UINT64_C(1) << component_of[i];
         s->c[1][i] = m->settled & bit ? 0.0 : s->c[1][i];
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
-    for (int k = 0; k < SIZE_OF(m, COMPONENTS); k++) {
+    for (int k = 0; k < components; k++) {
         s->moving |= STRUCTURE(m, COMPONENT_INPUTS)[k] & s->moving ? UINT64_C(1) << k : 0U;
     }
-    if (SIZE_OF(m, DYNAMIC) < SIZE_OF(m, COMPONENTS)) { /* a component without an effect need not be computed */
+    if (dynamic < components) { /* a component without an effect need not be computed */
         uint64_t still = 0U; /* one bit for each velocity that stays 0 */
         for (int i = 0; i < N_MONITORED; i++) {
-            still |= m->y[i] == 0.0 && !(s->moving >> STRUCTURE(m, COMPONENT_OF)[i] & 1U) ? UINT64_C(1) << i : 0U;
+            still |= m->y[i] == 0.0 && !(s->moving >> component_of[i] & 1U) ? UINT64_C(1) << i : 0U;
         }
-        for (int k = SIZE_OF(m, DYNAMIC); k < SIZE_OF(m, COMPONENTS); k++) {
+        for (int k = dynamic; k < components; k++) {
             s->moving &= STRUCTURE(m, NEEDED_WITH)[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
         }
     }
     for (int i = 0; i < N_SERIES; i++) {
-        const bool moves = s->moving >> STRUCTURE(m, COMPONENT_OF)[i] & 1U;
+        const bool moves = s->moving >> component_of[i] & 1U;
         s->c[1][i] = moves ? s->c[1][i] : 0.0;
         s->pace[i] = moves ? s->unit : 0.0;
         s->blocks |= moves ? 1U << BLOCK_OF[i] : 0U;
