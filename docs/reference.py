@@ -52,7 +52,8 @@ def tables() -> dict[str, Table]:
     schema = json_schema()
     named = {"vehicle": "FileHead", "estimated": "Estimated"}
     named |= {
-        name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
+        name.lower(): name
+        for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Point", "Battery", "Commands")
     }
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
@@ -277,7 +278,7 @@ def _terminals() -> Table:
             terminal.causality,
             terminal.rule,
             terminal.description,
-            ", ".join(f"`{name}`" for name in terminal.members),
+            ", ".join(f"`{name}`" for name in terminal.variables),
         )
         for terminal in terminals(load_vehicle(VIDEORAY).layout)
     ]

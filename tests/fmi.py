@@ -119,6 +119,7 @@ class Fmu(ABC):
         self.states: list[str] = [unknown.variable.derivative.name for unknown in self.description.derivatives]
         self.derivatives: list[str] = [unknown.variable.name for unknown in self.description.derivatives]
         self.outputs: list[str] = [unknown.variable.name for unknown in self.description.outputs]
+        self.unknowns = [*dict.fromkeys(self.outputs + self.derivatives)]
         self.inputs = [name for name, v in self.variables.items() if v.causality == "input"]
         self.parameters = [name for name, v in self.variables.items() if v.causality == "parameter"]
         self.library = library or folder.joinpath(

@@ -16,6 +16,7 @@ from rov_fmu.equation.parts import (
     Actuator,
     Curve,
     Fin,
+    Point,
     Range,
     SourcedVector,
     Thruster,
@@ -138,6 +139,8 @@ def numbered(layout: Layout, **values: float) -> Vehicle:
     for key, *axes in layout.cross:
         column = 0 if key == "m_a" else 1
         numbers[cross_name(key, *axes)] = 0.1 * sqrt(prod(_AXIS_NUMBERS[axis][column] for axis in axes[:2]))
+    for point in layout.points:
+        numbers |= dict(zip(map(point.coefficient, point.keys), (-0.3, 0.1, -0.2), strict=True))
     numbers |= _BODY_NUMBERS | dict.fromkeys(_factors(layout), 1.0) | values
     return Vehicle(layout, {name: numbers[name] for name in layout.coefficients})
 
@@ -255,6 +258,13 @@ def with_axes(axes: str) -> Vehicle:
     """Return the vehicle SIX with only some of its axes, nothing between them, and no weight."""
     forms = tuple(form for form in SIX.layout.axes if form.axis.velocity in axes)
     return numbered(replace(SIX.layout, axes=forms, cross=(), restoring=()))
+
+
+def tied(rov: Vehicle, **points: Vector) -> Vehicle:
+    """Return a vehicle with points at which forces act, at these positions in its frame, m."""
+    layout = replace(rov.layout, points=tuple(Point(name=name) for name in points))
+    at = {f"r_{axis}_{name}": x for name, place in points.items() for axis, x in zip("xyz", place, strict=True)}
+    return replace(rov, layout=layout, coefficients={**rov.coefficients, **at})
 
 
 def with_rotors(rov: Vehicle) -> Vehicle:

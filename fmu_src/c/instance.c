@@ -566,8 +566,7 @@ static outcome differentiate(fmu *f, const unsigned unknowns[], size_t n_unknown
 static bool is_output(unsigned reference)
 {
     const unsigned place = place_of(reference);
-    const bool rate = place >= FIRST_CALCULATED && place < FIRST_CALCULATED + N_STATES;
-    return is_unknown(reference) && !rate;
+    return place < N_VARIABLES && VARIABLES[place].is_output;
 }
 
 /* Return the first time derivatives of outputs while the inputs are held. */

@@ -270,7 +270,7 @@ static int series_cut(const series *s, double *length)
     int reversed = NONE;
     for (int k = 0; k < N_MONITORED; k++) {
         bool reverses;
-        if (!(s->moving >> COMPONENT_OF[k] & 1U)) {
+        if (s->pace[k] == 0.0) {
             continue;
         }
         const double end = series_sign_kept(s, k, *length, &reverses);

@@ -19,6 +19,14 @@
  * loads and velocities, time hardly passes, and the step is refused soon. */
 #define MOST_AT_ONCE 1000
 
+#if defined HAS_POINTS && LANES == 1
+#define STRUCTURE(m, table) ((m)->loaded ? table : FREE_##table)
+#define SIZE_OF(m, what) ((m)->loaded ? N_##what : N_FREE_##what)
+#else
+#define STRUCTURE(m, table) table
+#define SIZE_OF(m, what) N_##what
+#endif
+
 typedef struct {
     model_held q;
     real y[N_SERIES];              /* the states at the start of a piece */
@@ -34,6 +42,9 @@ typedef struct {
     real unit;                     /* the longest unit of time for the next series */
     mask reverse[N_MONITORED];     /* 1 for each velocity whose coefficients are those of the negative direction */
     const model_numbers *n;
+#if defined HAS_POINTS && LANES == 1
+    bool loaded;                   /* true when a force acts at a point, so that all depends on the attitude */
+#endif
     uint64_t settled;              /* one bit for each component; it is set once the component has settled */
 } motion;
 
@@ -88,7 +99,7 @@ INLINE mask motion_waits(const motion *m, const series *s)
 {
     mask waits = NO;
     for (int i = 0; i < N_MONITORED; i++) {
-        if (s->moving >> COMPONENT_OF[i] & 1U) {
+        if (s->moving >> STRUCTURE(m, COMPONENT_OF)[i] & 1U) {
             waits |= s->c[0][i] == 0.0 && s->c[1][i] == 0.0;
         }
     }
@@ -99,26 +110,28 @@ INLINE mask motion_waits(const motion *m, const series *s)
 /* Find the components that move, and set the first coefficients of the others to 0. */
 INLINE void motion_find_moving(const motion *m, series *s)
 {
+    const int *const component_of = STRUCTURE(m, COMPONENT_OF);
+    const int components = SIZE_OF(m, COMPONENTS), dynamic = SIZE_OF(m, DYNAMIC);
     s->moving = s->blocks = 0;
     for (int i = 0; i < N_SERIES; i++) {
-        const uint64_t bit = UINT64_C(1) << COMPONENT_OF[i];
+        const uint64_t bit = UINT64_C(1) << component_of[i];
         s->c[1][i] = m->settled & bit ? 0.0 : s->c[1][i];
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
-    for (int k = 0; k < N_COMPONENTS; k++) {
-        s->moving |= COMPONENT_INPUTS[k] & s->moving ? UINT64_C(1) << k : 0U;
+    for (int k = 0; k < components; k++) {
+        s->moving |= STRUCTURE(m, COMPONENT_INPUTS)[k] & s->moving ? UINT64_C(1) << k : 0U;
     }
-    if (N_DYNAMIC < N_COMPONENTS) { /* a component without an effect need not be computed */
+    if (dynamic < components) { /* a component without an effect need not be computed */
         uint64_t still = 0U; /* one bit for each velocity that stays 0 */
         for (int i = 0; i < N_MONITORED; i++) {
-            still |= m->y[i] == 0.0 && !(s->moving >> COMPONENT_OF[i] & 1U) ? UINT64_C(1) << i : 0U;
+            still |= m->y[i] == 0.0 && !(s->moving >> component_of[i] & 1U) ? UINT64_C(1) << i : 0U;
         }
-        for (int k = N_DYNAMIC; k < N_COMPONENTS; k++) {
-            s->moving &= NEEDED_WITH[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
+        for (int k = dynamic; k < components; k++) {
+            s->moving &= STRUCTURE(m, NEEDED_WITH)[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
         }
     }
     for (int i = 0; i < N_SERIES; i++) {
-        const bool moves = s->moving >> COMPONENT_OF[i] & 1U;
+        const bool moves = s->moving >> component_of[i] & 1U;
         s->c[1][i] = moves ? s->c[1][i] : 0.0;
         s->pace[i] = moves ? s->unit : 0.0;
         s->blocks |= moves ? 1U << BLOCK_OF[i] : 0U;
@@ -251,6 +264,9 @@ INLINE void motion_start(motion *m, const real at[], const model_numbers *n, rea
     m->n = n;
     m->length = m->rest = m->unit = h;
     m->heading = heading;
+#if defined HAS_POINTS && LANES == 1
+    m->loaded = model_is_loaded(at);
+#endif
     memcpy(m->state, at + FIRST_STATE, sizeof m->state);
     model_start(at, n, &m->q, m->y, m->scale);
 }
@@ -339,7 +355,7 @@ static bool motion_fades(motion *m, int component, double rest)
 {
     double y[N_SERIES], lost[N_SERIES], rate[N_SERIES];
     for (int i = 0; i < N_SERIES; i++) {
-        const bool own = COMPONENT_OF[i] == component;
+        const bool own = STRUCTURE(m, COMPONENT_OF)[i] == component;
         if (own && fmax(fabs(m->y[i]) / m->largest[GROUP[i]], fabs(m->y[i]) * rest / m->covered[i]) > 0.0625 * DBL_EPSILON) {
             return false;
         }
@@ -348,7 +364,7 @@ static bool motion_fades(motion *m, int component, double rest)
     }
     model_rates(m->n, &m->q, y, rate);
     for (int i = 0; i < N_SERIES; i++) {
-        if (COMPONENT_OF[i] == component && rate[i] != 0.0) {
+        if (STRUCTURE(m, COMPONENT_OF)[i] == component && rate[i] != 0.0) {
             return false;
         }
     }
@@ -369,13 +385,13 @@ static void motion_settle(motion *m, double rest)
     model_direct(m->n, m->reverse, &m->q);
     model_rates(m->n, &m->q, m->y, rate);
     model_sizes(m->n, &m->q, m->y, size);
-    for (int k = 0; k < N_DYNAMIC; k++) {
-        if ((COMPONENT_INPUTS[k] & ~m->settled) != 0) {
+    for (int k = 0; k < SIZE_OF(m, DYNAMIC); k++) {
+        if ((STRUCTURE(m, COMPONENT_INPUTS)[k] & ~m->settled) != 0) {
             continue;
         }
         bool still = true;
         for (int i = 0; i < N_SERIES; i++) {
-            still &= COMPONENT_OF[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
+            still &= STRUCTURE(m, COMPONENT_OF)[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
         }
         m->settled |= still || motion_fades(m, k, rest) ? UINT64_C(1) << k : 0U;
     }
@@ -384,11 +400,11 @@ static void motion_settle(motion *m, double rest)
 /* Return true when a dynamic component that moves has changed so little in a piece that it may have settled. */
 static bool motion_is_slow(const motion *m, const series *s, const double change[N_SERIES])
 {
-    bool moves[N_COMPONENTS] = {false};
+    bool moves[N_SERIES] = {false}; /* by component */
     for (int i = 0; i < N_SERIES; i++) {
-        moves[COMPONENT_OF[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
+        moves[STRUCTURE(m, COMPONENT_OF)[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
     }
-    for (int k = 0; k < N_DYNAMIC; k++) {
+    for (int k = 0; k < SIZE_OF(m, DYNAMIC); k++) {
         if (s->moving >> k & 1U && !moves[k]) {
             return true;
         }
@@ -401,7 +417,7 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
 static bool motion_coasts(motion *m)
 {
-    if (m->settled != (UINT64_C(1) << N_DYNAMIC) - 1U) {
+    if (m->settled != (UINT64_C(1) << SIZE_OF(m, DYNAMIC)) - 1U) {
         return false;
     }
     motion_coast(m, m->rest, m->state, &m->heading);

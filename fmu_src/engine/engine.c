@@ -82,7 +82,9 @@ double single_length(const double c[], const double scale[], int order, double *
 {
     series s;
     s.order = order;
-    s.moving = ~UINT64_C(0);
+    for (int i = 0; i < N_MONITORED; i++) {
+        s.pace[i] = 1.0;
+    }
     memcpy(s.c, c, (size_t)(order + 1) * sizeof s.c[0]);
     if (*reach < 1.0) {
         *reach = series_reach(&s, scale);

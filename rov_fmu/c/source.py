@@ -8,6 +8,7 @@ from itertools import groupby, takewhile
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
 from rov_fmu.equation.attitude import QUATERNION, TURN, start_formulas
+from rov_fmu.equation.catalogue import rate_name
 from rov_fmu.equation.expression import (
     PYTHON,
     ZERO,
@@ -21,6 +22,7 @@ from rov_fmu.equation.expression import (
     written,
 )
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.python.step import formula_name
 from rov_fmu.equation.terms import Equation, equation_of, rate_formula
 
 _Run = tuple[str, str, int]
@@ -41,10 +43,23 @@ class EquationSource:
     # ---- Names ----
 
     @cached_property
+    def places(self) -> dict[str, int]:
+        """The places of the variables by their names in formulas, without those of the rates of the states."""
+        rates = {*map(rate_name, self.layout.state)}
+        return {formula_name(name): place for name, place in self.layout.places.items() if name not in rates}
+
+    @cached_property
+    def without_points(self) -> "EquationSource":
+        """The parts of the equation while no force acts at a point."""
+        source = EquationSource(self.layout)
+        source.equation = self.equation.without_points
+        return source
+
+    @cached_property
     def _in_c(self) -> dict[str, str]:
         """The C expression for every name that a formula may contain."""
         equation = self.equation
-        in_c = {name: f"at[REF_{name}]" for name in self.variables}
+        in_c = {name: f"at[REF_{name}]" for name in self.places}
         in_c |= {name: f"n->{name}" for name in equation.parameters}
         in_c |= {name: f"q->{name}" for name in self.piece_names()}
         return in_c | {state: f"y[Y_{state}]" for state in equation.states if state not in self.variables}
@@ -241,7 +256,7 @@ class EquationSource:
         """Return statements that assign the outputs that follow from the states."""
         outputs = self.equation.outputs
         formulas = {**_needed(self.equation.orientation, outputs.values()), **outputs}
-        places = {name: f"at[REF_{name}]" for name in outputs if name in self.layout.calculated}
+        places = {name: f"at[REF_{name}]" for name in outputs if name in self.places}
         return _statements(formulas, places, self._in_c)
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
@@ -269,7 +284,7 @@ class EquationSource:
         """
         given = self.variables - {*self.layout.calculated}
         steps, changes = tangents({**self.equation.program, **self.equation.outputs}, given)
-        calculated = [name for name in self.layout.calculated if name in changes]
+        calculated = [name for name in map(formula_name, self.layout.calculated) if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(self.equation.rates[name], changes)

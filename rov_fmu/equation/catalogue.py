@@ -272,6 +272,11 @@ THRUSTER = {
     ),
 }
 """The coefficients of a thruster."""
+POINT = {
+    f"r_{axis}": Declaration("m", f"Position of the {{point}}, {where} r_{axis}", -100.0, 100.0, tunable=True)
+    for axis, where in (("x", "forward"), ("y", "to starboard"), ("z", "down"))
+}
+"""The position of a point at which forces act on the vehicle."""
 CURVE = {
     "k_t": Declaration("1", "Scale k_t of the table of the {curve}", 1e-3, 1e3, needed=False, tunable=True),
     "V_0": Declaration("V", "Voltage V_0 at which the {curve} was measured", 0.1, 1e3, needed=False),

@@ -11,6 +11,7 @@ from .attitude import QUATERNION, start_angle_formulas, start_formulas
 from .catalogue import rate_name
 from .expression import ZERO, Expression, change_of, tangent
 from .layout import Layout
+from .python.step import formula_name
 from .terms import equation_of
 
 KINDS = ("constant", "fixed", "tunable", "dependent")
@@ -34,7 +35,10 @@ def dependencies_of(layout: Layout) -> dict[str, dict[str, str]]:
             if (slope := tangent(formula, changing)) != ZERO:
                 inner = kinds | {change.identifier: kind_of_slope[other] for other, change in changing.items()}
                 kind_of_slope[name] = slopes[name][known] = max(inner[word] for word in slope.names)
-    return {name: {known: KINDS[kind] for known, kind in slopes[name].items()} for name in _calculated(layout)}
+    return {
+        variable: {known: KINDS[kind] for known, kind in slopes[name].items()}
+        for variable, name in _calculated(layout).items()
+    }
 
 
 def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
@@ -49,18 +53,20 @@ def parameters_of(layout: Layout) -> dict[str, tuple[str, ...]]:
     for name, formula in formulas.items():
         used[name] = set().union(*(used.get(other, {other}) for other in formula.names))
     parameters = (*layout.coefficients, *layout.initial)
-    calculated = (*_calculated(layout), *(name for name in QUATERNION if name in layout.state))
-    return {name: tuple(p for p in parameters if p in used[name]) for name in calculated}
+    calculated = _calculated(layout) | {name: name for name in QUATERNION if name in layout.state}
+    return {variable: tuple(p for p in parameters if p in used[name]) for variable, name in calculated.items()}
 
 
-def _calculated(layout: Layout) -> tuple[str, ...]:
-    return (*map(rate_name, layout.state), *layout.calculated)
+def _calculated(layout: Layout) -> dict[str, str]:
+    """Return the names in formulas of the rates and the calculated variables."""
+    return {name: formula_name(name) for name in (*map(rate_name, layout.state), *layout.calculated)}
 
 
 def _formulas(layout: Layout) -> dict[str, Expression]:
     """Return all formulas of a vehicle. Each uses only inputs, states, parameters and formulas before it."""
     equation = equation_of(layout)
-    return equation.program | {rate_name(name): equation.rates[name] for name in layout.state} | dict(equation.outputs)
+    rates = {formula_name(rate_name(name)): equation.rates[name] for name in layout.state}
+    return equation.program | rates | dict(equation.outputs)
 
 
 def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:

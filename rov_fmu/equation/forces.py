@@ -11,8 +11,8 @@ from functools import cached_property
 from itertools import chain
 
 from .attitude import ROTATION, TURN, entry
-from .catalogue import AXES, HEADING, HEAVE, POSITION, REVERSE, YAW, Axis, cross_name
-from .expression import ONE, Expression, Name, Names, Operation, directed, product, total
+from .catalogue import AXES, HEADING, HEAVE, POINT, POSITION, REVERSE, YAW, Axis, cross_name
+from .expression import ONE, ZERO, Expression, Name, Names, Operation, directed, product, total
 from .layout import Layout
 from .parts import FAINT, Curve, Thruster, effect_along
 
@@ -43,6 +43,7 @@ DEAD_BAND = Effect("dead band", "the dead band (c_0)", "dead band")
 DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
 ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
 STEERING = Effect("steering", "the fins")
+POINTS = Effect("points", "the forces at points")
 EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
@@ -123,6 +124,7 @@ def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield all forces and moments of a vehicle along its axes, in the order of its equation."""
     yield from _loads(layout, names)
     yield from chain(_drag(layout), _restoring(layout, names), advance(layout, names), _steering(layout, names))
+    yield from _at_points(layout)
 
 
 def effects_of(layout: Layout) -> list[Effect]:
@@ -258,3 +260,27 @@ def _steering(layout: Layout, names: Names) -> Iterator[Force]:
         acting = total(effect * lift for effect, lift in parts if abs(effect) > FAINT)
         if acting.names:
             yield Force(STEERING, axis.velocity, acting * abs(u) * u)  # Y_uuδ |u| u δ
+
+
+def _at_points(layout: Layout) -> Iterator[Force]:
+    """Yield the forces at points, R^T F, and their moments, r x R^T F. F is held in the earth frame."""
+    R = rotation(layout)
+    for point in layout.points:
+        F, r = [Name(point.force(direction)) for direction in "NED"], [Name(point.coefficient(key)) for key in POINT]
+        for axis in layout.bare_axes:
+            arms: list[tuple[Expression, int]] = [(ONE, axis.place)]
+            if axis.is_rotation:
+                second, third = (axis.place + 1) % 3, (axis.place + 2) % 3
+                arms = [(r[second], third), (-r[third], second)]
+            for arm, column in arms:
+                for force, row in zip(F, R, strict=True):  # R^T F
+                    if row[column] != ZERO:
+                        yield Force(POINTS, axis.velocity, row[column] * arm * force)
+
+
+def rotation(layout: Layout) -> list[list[Expression]]:
+    """Return the rotation matrix from the body frame to the earth frame by its rows, as the table of terms has it."""
+    if layout.has_attitude:
+        return [[Name(entry(row, column)) for column in (1, 2, 3)] for row in (1, 2, 3)]
+    c, s = map(Name, TURN) if layout.has(YAW) else (ONE, ZERO)
+    return [[c, -s, ZERO], [s, c, ZERO], [ZERO, ZERO, ONE]]

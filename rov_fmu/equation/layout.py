@@ -32,6 +32,7 @@ from .catalogue import (
     HEAVE,
     OUTSIDE,
     PITCH,
+    POINT,
     POSITION,
     RESTORING,
     ROLL,
@@ -53,11 +54,13 @@ from .catalogue import (
     velocity_declaration,
     voltage_declaration,
 )
-from .parts import FAINT, BodyForce, Curve, Fin, Part, Range, SourcedVector, Thruster, VehicleAxis
+from .parts import FAINT, BodyForce, Curve, Fin, Part, Point, Range, SourcedVector, Thruster, VehicleAxis
 from .words import (
     actuator_words,
     command_words,
     curve_words,
+    point_declarations,
+    point_words,
     rotor_declaration,
     thrust_declaration,
     torque_declaration,
@@ -115,6 +118,8 @@ class Layout:
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
     voltage_source: str = field(default="", compare=False)
     """The source of `voltage`."""
+    points: tuple[Point, ...] = ()
+    """The points at which forces act."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
@@ -270,6 +275,7 @@ class Layout:
                 for t in self.thrusters
             ),
             (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
+            *(_declared(("point", p.name), POINT, p.keys, p.coefficient, point_words(p)) for p in self.points),
         ]
         return tuple(chain(*tables))
 
@@ -346,7 +352,23 @@ class Layout:
         if self.voltage is not None:
             lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
             inputs["voltage"] = voltage_declaration(min(lows), max(highs), self.voltage)
-        return inputs
+        return inputs | self.forces_at_points
+
+    @cached_property
+    def forces_at_points(self) -> dict[str, Declaration]:
+        """The forces at the points, which are the last inputs."""
+        return {name: one for point in self.points for name, one in point_declarations(point)[0].items()}
+
+    @cached_property
+    def motion_of_points(self) -> dict[str, Declaration]:
+        """The position and the velocity over ground of each point."""
+        return {name: one for point in self.points for name, one in point_declarations(point)[1].items()}
+
+    @cached_property
+    def turns(self) -> bool:
+        """True when the cosine and the sine of the heading are states: the vehicle stays level, and they turn what is
+        in the earth frame."""
+        return self.has(YAW) and not self.has_attitude and (self.has(SURGE, SWAY) or bool(self.points))
 
     @cached_property
     def voltage_ranges(self) -> dict[tuple[float, float], str]:
@@ -381,6 +403,11 @@ class Layout:
         return position | (HEADING if self.has(YAW) else {})
 
     @cached_property
+    def over_ground(self) -> tuple[str, ...]:
+        """The velocity over ground north, east and down: the derivatives of the position, which are outputs."""
+        return tuple(rate_name(name) for name in POSITION if name in self.pose)
+
+    @cached_property
     def lagging(self) -> dict[str, Declaration]:
         """The forces and the speeds of rotors that follow the commands with a lag, which are the last states."""
         curves = ((t, self.curve_of[t.name]) for t in self.thrusters)
@@ -398,7 +425,7 @@ class Layout:
     @cached_property
     def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates."""
-        return self.thrust | self.angles | self.outside
+        return self.thrust | self.angles | self.outside | self.motion_of_points
 
     @cached_property
     def thrust(self) -> dict[str, Declaration]:

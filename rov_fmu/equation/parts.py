@@ -5,7 +5,7 @@ from math import sin
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from .catalogue import REVERSE, YAW, Axis, Lag, coefficient_name
+from .catalogue import POINT, REVERSE, YAW, Axis, Lag, coefficient_name
 from .python.step import interpolated
 
 
@@ -58,7 +58,7 @@ class CurrentTable:
 
 
 class Part:
-    """A part of a layout with coefficients: a thrust curve, an axis, a thruster or a fin."""
+    """A part of a layout with coefficients: a thrust curve, an axis, a thruster, a fin or a point."""
 
     name: str
     keys: tuple[str, ...]
@@ -201,6 +201,25 @@ class Fin(Actuator):
         """Return the part of a lift of 1 N along an axis, or its moment about the axis; 0 if it is a rounding error."""
         effect = effect_along(axis, self.direction.value, self.place)
         return effect if abs(effect) > FAINT else 0.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point(Part):
+    """A point of the vehicle at which forces act on it, such as that of a tether."""
+
+    name: str
+    """The name in the FMU: the force has the components `F_N_<point>`, `F_E_<point>` and `F_D_<point>`."""
+    description: str = ""
+    keys: tuple[str, ...] = tuple(POINT)
+    """The keys of POINT."""
+
+    def force(self, direction: str) -> str:
+        """Return the name of a component of the force, on the vehicle: along N, E or D."""
+        return f"F_{direction}_{self.name}"
+
+    def coordinate(self, name: str) -> str:
+        """Return the name of a coordinate of the point: north x, east y or down z."""
+        return f"{name}_{self.name}"
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,8 @@ In Fossen's notation, with the velocities nu = (u, v, w, p, q, r) through the wa
     C(nu) nu     Coriolis and Munk terms               MassMatrix.coriolis (mass.py)
     D(nu) nu     linear and quadratic damping, lift    _drag (forces.py)
     g(eta)       weight and buoyancy                   _restoring, or the net weight in _loads (forces.py)
-    tau          thrust, its loss with speed, fins,    _loads, advance, _steering (forces.py),
-                 loads from outside                    from the commands: thrust_formulas (thrust.py)
+    tau          thrust, its loss with speed, fins,    _loads, advance, _steering, _at_points (forces.py),
+                 loads from outside, forces at points  from the commands: thrust_formulas (thrust.py)
     J(eta) nu    kinematics                            _Table.pose here, rotation_terms (attitude.py)
 
 Multiplied by M^-1, and with the cosine and sine of the heading (or the rotation matrix) as states, this is a quadratic
@@ -23,8 +23,9 @@ new effect is a new force (forces.py).
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
+from operator import mul
 
 from rov_fmu.io.groups import grouped
 
@@ -37,12 +38,13 @@ from .attitude import (
     rotation_formulas,
     rotation_terms,
 )
-from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
+from .catalogue import HEAVE, POINT, POSITION, SURGE, SWAY, YAW, cross_name, rate_name
 from .expression import ONE, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
-from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
+from .forces import COUPLING, POINTS, Effect, Force, advance, forces_of, rotation, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
+from .python.step import formula_name
 from .thrust import Lag, add_rotor, lags_of, steady_name, thrust_formulas
 
 
@@ -99,6 +101,12 @@ class Equation:
     def states(self) -> tuple[str, ...]:
         """The states of the table."""
         return tuple(self.rows)
+
+    @cached_property
+    def without_points(self) -> "Equation":
+        """The equation while no force acts at a point. Fewer of its states depend on each other."""
+        rows = {name: tuple(term for term in terms if term.effect is not POINTS) for name, terms in self.rows.items()}
+        return replace(self, rows=rows)
 
     @cached_property
     def lagging(self) -> dict[str, tuple[Expression, Expression]]:
@@ -244,7 +252,7 @@ def equation_of(layout: Layout) -> Equation:
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
         table.lags,
-        outputs=angles | _outside(layout, table.names),
+        outputs=angles | _outside(layout, table.names) | _motion_of_points(layout, rows),
         ends=quaternion,
         tables=_tables(layout),
         names=table.names,
@@ -382,7 +390,7 @@ class _Table:
             turned = {x: [Term(ONE, (v, entry(i, n))) for n, v in enumerate("uvw", 1)] for i, x in enumerate("xyz", 1)}
         else:
             turned = {x: [Term(ONE, (v,))] for x, v in zip("xyz", "uvw", strict=True)}
-            if layout.has(YAW) and "x" in layout.pose:
+            if layout.turns:
                 rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
                 turned["x"] = [Term(ONE, ("u", "cos_psi")), Term(-ONE, ("v", "sin_psi"))]
                 turned["y"] = [Term(ONE, ("u", "sin_psi")), Term(ONE, ("v", "cos_psi"))]
@@ -481,6 +489,21 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
             beyond = formulas.define(_beyond(x, one), "outside", *owners)
             largest = formulas.define(where(largest < beyond, beyond, largest), "largest", *owners)
     return {**formulas, "outside": largest}
+
+
+def _motion_of_points(layout: Layout, rows: Mapping[str, Sequence[Term]]) -> dict[str, Expression]:
+    """Return formulas for the position of each point, that of the vehicle and R r, and for the velocity over ground."""
+    formulas: dict[str, Expression] = {}
+    omega = [Name(v) if v in layout.velocities else of(0.0) for v in "pqr"]
+    for point in layout.points:
+        r = [Name(point.coefficient(key)) for key in POINT]
+        turning = [omega[n - 2] * r[n - 1] - omega[n - 1] * r[n - 2] for n in range(3)]  # omega x r
+        for x, row in zip(POSITION, rotation(layout), strict=True):
+            name, at = point.coordinate(x), Name(x) if x in layout.pose else of(0.0)
+            moving = rate_formula(rows[x]) if x in layout.pose else of(0.0)
+            formulas[name] = at + total(map(mul, row, r))
+            formulas[formula_name(rate_name(name))] = moving + total(map(mul, row, turning))
+    return formulas
 
 
 def _beyond(x: Expression, known: Range) -> Expression:

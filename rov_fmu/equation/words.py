@@ -2,8 +2,8 @@
 
 from rov_fmu.io.messages import listed
 
-from .catalogue import HEAVE, LAGS, SURGE, SWAY, Declaration, cited
-from .parts import FAINT, Actuator, Curve, Fin, Thruster
+from .catalogue import HEAVE, LAGS, SURGE, SWAY, Declaration, cited, rate_name
+from .parts import FAINT, Actuator, Curve, Fin, Point, Thruster
 
 
 def curve_words(curve: Curve) -> dict[str, str]:
@@ -16,6 +16,25 @@ def actuator_words(actuator: Actuator) -> dict[str, str]:
     """Return the text of a thruster or a fin for the field of THRUSTER or FIN: what it is called."""
     kind = "fin" if isinstance(actuator, Fin) else "thruster"
     return {kind: actuator.description or f"{kind} {actuator.name}"}
+
+
+def point_words(point: Point) -> dict[str, str]:
+    """Return what a point is called, for the field of POINT."""
+    return {"point": point.description or f"point {point.name}"}
+
+
+def point_declarations(point: Point) -> tuple[dict[str, Declaration], dict[str, Declaration]]:
+    """Return the declarations of the force at a point, and of its position and velocity."""
+    of = point_words(point)["point"]
+    forces, coordinates, velocities = {}, {}, {}
+    for direction, x, words in (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down")):
+        forces[point.force(direction)] = Declaration(
+            "N", f"Force on the vehicle at the {of}, positive {words}", nominal=10.0
+        )
+        name = point.coordinate(x)
+        coordinates[name] = Declaration("m", f"Position of the {of}, {words}", nominal=10.0)
+        velocities[rate_name(name)] = Declaration("m/s", f"Velocity over ground of the {of}, {words}")
+    return forces, coordinates | velocities
 
 
 def name_in_words(actuator: Actuator) -> str:

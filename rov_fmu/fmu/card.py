@@ -46,6 +46,11 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
     if tuned := [*_tuned(vehicle)]:
         data += tuned
         trust += ["The predictions are those of the vehicle before it was tuned."] if made else []
+    if points := [point.name for point in vehicle.layout.points]:
+        lacking = [name for name in _AXES if name not in vehicle.layout.by_name]
+        rest = f"; the vehicle does not move in {listed(lacking)}" if lacking else ""
+        at = f"the point{'s' if len(points) > 1 else ''} {listed(points)}"
+        holds.append(f"Forces at {at} act in {listed(vehicle.layout.by_name)}{rest}.")
     if vehicle.layout.identified:
         holds += [f"Tested: {words}." for words in map(_in_words, vehicle.layout.identified) if words]
         holds.append(
@@ -126,7 +131,8 @@ def _left_out(layout: Layout) -> Iterator[str]:
     """Yield what the equation of the vehicle lacks, in sentences."""
     yield from _left_out_of_motion(layout)
     yield from _left_out_of_forces(layout)
-    yield "A tether: it acts only if its force is connected as a load."
+    at = "at a point" if layout.points else "as a load"
+    yield f"A tether: it acts only if its force is connected {at}."
     yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
     level = "" if layout.has_attitude else ", horizontal"
     yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."

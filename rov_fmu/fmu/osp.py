@@ -5,13 +5,18 @@ libcosim and the OSP tools look for it in the folder of the FMU. It changes noth
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, rate_name
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Point
 from rov_fmu.equation.units import UNITS, unit_of
 from rov_fmu.io.templates import render
 
+_PORT = "LinearMechanicalPort"
+"""The element of OSP-IS for a force and a velocity, which comes after those of one unit."""
 _MAX_MEMBERS = 3
 """The largest number of variables in a group."""
 
@@ -20,11 +25,7 @@ Members = Mapping[str, str | None]
 
 
 def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
-    """Yield the name and members of every group, including members that this vehicle does not have.
-
-    No group is a mechanical port of force and velocity: power needs velocities over ground, and the outputs are
-    velocities through the water.
-    """
+    """Yield the name and members of every group, including members that this vehicle does not have."""
     commands = list(layout.commands)
     for n in range(0, len(commands), _MAX_MEMBERS):
         number = f"_{n // _MAX_MEMBERS + 1}" if len(commands) > _MAX_MEMBERS else ""
@@ -43,7 +44,8 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     for curve in layout.turning_curves:
         yield f"{curve.name}_torque", {f"tau_{curve.name}": "z"}
     yield "current", {"V_N": "x", "V_E": "y", "V_D": "z"}
-    yield "velocity", {axis.velocity: letter for axis, letter in along}
+    yield "velocity", {rate_name(letter): letter for letter in "xyz"}
+    yield "velocity_through_water", {axis.velocity: letter for axis, letter in along}
     yield "angular_velocity" if layout.has_attitude else "yaw_rate", {axis.velocity: letter for axis, letter in about}
     yield "position", {"x": "x", "y": "y"}
     yield "depth", {"z": "z"}
@@ -52,26 +54,53 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     yield "quaternion_scalar", {scalar: None}
     yield "quaternion_vector", dict.fromkeys(vector)
     yield "validity", {"outside": None}
+    for point in layout.points:
+        yield f"{point.name}_position", {point.coordinate(axis): axis for axis in "xyz"}
+
+
+class _Group(NamedTuple):
+    """A group of variables of one unit, or a port with two such groups."""
+
+    element: str
+    name: str
+    members: Mapping[str, str | None] = MappingProxyType({})
+    unit: str = ""
+    parts: tuple["_Group", ...] = ()
+
+
+def _port(point: Point) -> _Group:
+    """Return the port of a point: a force that acts there goes in, and the velocity over ground comes out."""
+    directions, coordinates = (
+        zip("NED", "xyz", strict=True),
+        dict(zip(map(point.coordinate, "xyz"), "xyz", strict=True)),
+    )
+    force = {point.force(direction): axis for direction, axis in directions}
+    velocity = {rate_name(name): axis for name, axis in coordinates.items()}
+    parts = _Group("Force", "force", force, "N"), _Group("LinearVelocity", "linear_velocity", velocity, "m/s")
+    return _Group(_PORT, f"point_{point.name}", parts=parts)
 
 
 def osp_model_description(layout: Layout) -> bytes:
     """Return the XML document. Every input and output is in one group; those that `_groups` lacks have their own."""
-    units = {name: declaration.unit for name, declaration in (layout.inputs | layout.state | layout.calculated).items()}
-    groups = []
+    declared = layout.inputs | layout.state | layout.calculated
+    units = {name: one.unit for name, one in declared.items()} | dict.fromkeys(layout.over_ground, "m/s")
+    ports = [*map(_port, layout.points)]
+    groups = [*ports]
+    in_ports = {variable for port in ports for part in port.parts for variable in part.members}
     possible = [*_groups(layout)]
-    placed = {variable for _, members in possible for variable in members}
+    placed = in_ports.union(*(members for _, members in possible))
     possible += [(variable, {variable: None}) for variable in units if variable not in placed]
-    names = [name for name, _ in possible]
+    names = [*(name for name, _ in possible), *(port.name for port in ports)]
     for name, candidates in possible:
         if members := {variable: candidates[variable] for variable in units if variable in candidates}:
             (unit,) = {units[variable] for variable in members}
             # the name of a curve or a thruster may make a name that another group has
             unique = name if names.count(name) == 1 else "_".join((name, *members))
-            groups.append((unit_of(unit).element, unique, unit, members))
-    grouped = [variable for *_, members in groups for variable in members]
-    assert sorted(grouped) == sorted(units), "every variable must be in one group"
-    order = [unit.element for unit in UNITS.values()]
-    groups.sort(key=lambda group: order.index(group[0]))
+            groups.append(_Group(unit_of(unit).element, unique, members, unit))
+    grouped = [variable for group in groups for variable in group.members]
+    assert sorted([*grouped, *in_ports]) == sorted(units), "every variable must be in one group"
+    order = [*(unit.element for unit in UNITS.values()), _PORT]
+    groups.sort(key=lambda group: order.index(group.element))
     return render("osp.xml.j2", groups=groups).encode()
 
 

@@ -176,10 +176,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if self.equation.QUATERNION:
             outputs["psi"] = step.heading(outputs, self.values["psi"])
         for v in self.declared:
-            if v["derivative_of"]:
-                self.values[v["name"]] = outputs[f"der_{v['derivative_of']}"]
-            elif v["causality"] == "output" and v["initial"] == "calculated":
-                self.values[v["name"]] = outputs[v["name"]]
+            if v["initial"] == "calculated" and v["variability"] == "continuous":
+                self.values[v["name"]] = outputs[step.formula_name(v["name"])]
 
     def _warn_of_input(self, v: dict[str, Any], value: float) -> None:
         """Warn once about a command without a signal, and about an input that saturates."""

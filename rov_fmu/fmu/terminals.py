@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from rov_fmu.equation.catalogue import CURRENT, CURRENT_DOWN
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.words import point_declarations, point_words
 from rov_fmu.io.templates import render
 
 FOLDER = "terminalsAndIcons"
@@ -18,16 +19,24 @@ SIGNAL = "signal"
 
 @dataclass(frozen=True)
 class Terminal:
-    """A group of variables of one causality.
+    """A group of variables: inputs, outputs, or both for a port.
 
     A plug is connected as a whole. Of a bus, the variables that both sides have are connected.
     """
 
     name: str
     causality: str
+    """input, output or port."""
     rule: str
     description: str
-    members: tuple[str, ...]
+    variables: tuple[str, ...]
+    own: str = ""
+    """The part of the names of the variables that the names of the members lack, so that those of a tether match."""
+
+    @property
+    def members(self) -> dict[str, str]:
+        """The names of the members by those of the variables."""
+        return {name: "".join(name.rsplit(self.own, 1)) if self.own else name for name in self.variables}
 
 
 def terminals(layout: Layout) -> list[Terminal]:
@@ -45,6 +54,7 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),
         Terminal("body_velocity", "output", "plug", "Velocity through the water, body frame", tuple(layout.velocities)),
+        Terminal("velocity", "output", "plug", "Velocity over ground, north, east and down", layout.over_ground),
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
@@ -52,6 +62,12 @@ def terminals(layout: Layout) -> list[Terminal]:
             "validity", "output", "plug", "How far the motion is beyond what was identified", tuple(layout.outside)
         ),
     ]
+    for point in layout.points:
+        words = (
+            f"Force on the vehicle at the {point_words(point)['point']}, north, east and down; its place and velocity"
+        )
+        port = (name for part in point_declarations(point) for name in part)
+        groups.append(Terminal(f"point_{point.name}", "port", "bus", words, tuple(port), f"_{point.name}"))
     placed = {name for terminal in groups for name in terminal.members}
     for causality, declared in (("input", layout.inputs), ("output", layout.state | layout.calculated)):
         rest = tuple(name for name in declared if name not in placed)

@@ -81,7 +81,7 @@ def _derivatives(layout: Layout) -> dict[str, Declaration]:
         derivatives["x"] = _over_ground(layout, "northward", "V_N", {"u": "+ u cos ψ", "v": "- v sin ψ"})
         derivatives["y"] = _over_ground(layout, "eastward", "V_E", {"u": "+ u sin ψ", "v": "+ v cos ψ"})
     if layout.has(HEAVE) and not layout.has_attitude:
-        derivatives["z"] = Declaration("m/s", "Rate of change of depth, w")
+        derivatives["z"] = Declaration("m/s", "Velocity over ground downward, w")
     if layout.has(YAW):
         derivatives["psi"] = Declaration("rad/s", "Rate of change of heading, r")
     for name, lagging in layout.lagging.items():
@@ -127,9 +127,10 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
             dependencies={name: "constant"},
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
-    for name in layout.state:
-        rest = {"derivative_of": name, "dependencies": dependencies[rate_name(name)]}
-        add(rate_name(name), derivatives[name], "local", "continuous", initial="calculated", **rest)
+    for name, rate in ((name, rate_name(name)) for name in layout.state):
+        causality = "output" if rate in layout.over_ground else "local"
+        rest = {"derivative_of": name, "dependencies": dependencies[rate]}
+        add(rate, derivatives[name], causality, "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
         add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
     for name, declaration in layout.delayed.items():

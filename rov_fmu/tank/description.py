@@ -54,7 +54,7 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
-_HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs")
+_HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs", "point")
 """The tables that are not allowed together with `base`, because the base has its own; [body] may have `coupling`."""
 _FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
 """The source of the directions of the thrusters where neither a base nor a table gives any."""

@@ -28,6 +28,7 @@ from rov_fmu.equation.catalogue import (
 )
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
+from rov_fmu.equation.words import point_declarations
 from rov_fmu.io.messages import did_you_mean, listed, only, shown
 from rov_fmu.io.toml_file import Strict, Toml, entry_label, join_names, key_line
 from rov_fmu.vehicle import schema
@@ -68,14 +69,18 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
 
 
 def check_distinct_names(layout: Layout) -> Iterator[str]:
-    """Yield a line about the first coefficient whose name in the FMU is that of a thrust or of another coefficient.
+    """Yield a line about the first coefficient or point with a name in the FMU that another part has.
 
-    Thrust astern of the curve `main`, a_t_main_reverse, has the name of thrust ahead of the curve `main_reverse`.
+    Thrust astern of the curve `main`, a_t_main_reverse, has the name of thrust ahead of the curve `main_reverse`. The
+    point `B` has the name x_B of the centre of buoyancy, also where a vehicle does not give this.
     """
     places = {f"F_{thruster.name}": f"thruster.{thruster.name}" for thruster in layout.thrusters}
     places |= {layout.curve_of[name].lagging(name): f"thruster.{name}" for name in layout.curve_of}
-    for name, keys, _ in layout.declared:
-        place = ".".join(keys)
+    places |= {name: f"body.{name}" for name in RESTORING}
+    names = [(name, ".".join(keys)) for name, keys, _ in layout.declared]
+    for point in layout.points:
+        names += [(name, f"point.{point.name}") for part in point_declarations(point) for name in part]
+    for name, place in names:
         if (first := places.setdefault(name, place)) != place:
             yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
             return
@@ -112,6 +117,7 @@ def _check_names(parts: Tables, lost: set[str], data: Toml) -> Iterator[str]:
     curves = [*_entries(data, "curves", dict)]
     yield from _check_distinct([(f"curves.{name}", name) for name in curves])
     yield from _check_distinct([(f"inputs.{name}", name) for name in parts.inputs])
+    yield from _check_distinct([(f"point#{n}", point.name) for n, point in enumerate(parts.point, 1)], ".name")
     for n, entry in thrusters:
         if curves and isinstance(curve := entry.get("curve"), str) and curve not in curves:
             reason = f"there is no such curve{only(curve, curves, join_names(curves))}"

@@ -26,6 +26,7 @@ from rov_fmu.equation.catalogue import (
     CURVE,
     FIN,
     LAGS,
+    POINT,
     REPLACED_BY_TABLE,
     RESTORING,
     THRUSTER,
@@ -370,6 +371,30 @@ class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
         return parts.Fin(**self.in_model, keys=_coefficient_keys(self, FIN))
 
 
+class Place(Position):
+    """The position from the origin of the body frame: forward, starboard, down."""
+
+
+class Point(Strict):
+    """A point of the vehicle at which forces act on it, such as that of a tether."""
+
+    name: Symbol
+    """The name in the FMU: the components of the force are `F_N_<name>`, `F_E_<name>` and `F_D_<name>`."""
+    description: Name = ""
+    """For example "tether" or "crane hook"."""
+    position: Place
+
+    @property
+    def coordinates(self) -> dict[str, Quantity]:
+        """The coordinates of the position by the keys of POINT."""
+        at = self.position
+        return {key: Quantity(value=x, unit=at.unit, source=at.source) for key, x in zip(POINT, at.value, strict=True)}
+
+    def for_model(self) -> parts.Point:
+        """Return the point of the model."""
+        return parts.Point(name=self.name, description=self.description)
+
+
 class Battery(Strict):
     """The battery, if thrust depends on its voltage."""
 
@@ -444,6 +469,8 @@ class Tables(Strict):
     """The thrusters, in the order of their variables in the FMU."""
     fin: list[Fin] = Field(default=[], max_length=MOST)
     """The control surfaces."""
+    point: list[Point] = Field(default=[], max_length=MOST)
+    """The points at which forces act."""
     battery: Battery | None = None
     commands: Commands | None = None
     axes: Axes | None = None
@@ -474,14 +501,16 @@ class Tables(Strict):
             voltage=voltage.value if voltage else None,
             voltage_source=voltage.source if voltage else "",
             pulse=commands.pulse if commands else None,
+            points=tuple(point.for_model() for point in self.point),
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
         """Return, for each coefficient of a vehicle, the quantity in these tables, or None if it is missing."""
-        lists: dict[str, list[Any]] = {"thruster": self.thruster, "fin": self.fin}
+        lists: dict[str, list[Any]] = {"thruster": self.thruster, "fin": self.fin, "point": self.point}
         tables: Any = dict(self) | {key: {one.name: one for one in ones} for key, ones in lists.items()}
 
         def entry(table: Any, key: str) -> Any:
+            table = table.coordinates if isinstance(table, Point) else table
             return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
         return {name: reduce(entry, keys, tables) for name, keys in of.keys_in_file.items()}

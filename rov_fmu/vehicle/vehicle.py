@@ -18,7 +18,7 @@ from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
 from rov_fmu.equation.python.printed import model_of
-from rov_fmu.equation.python.step import DelayLine, heading, step
+from rov_fmu.equation.python.step import DelayLine, formula_name, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
@@ -342,7 +342,7 @@ class Vehicle:
         values = self._outputs(inputs, state)
         for name in self.layout.continued:
             values[name] = heading(values, state.get(name, values[name]))
-        return {name: values[name] for name in self.layout.calculated}
+        return {name: values[formula_name(name)] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""

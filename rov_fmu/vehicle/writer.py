@@ -10,8 +10,9 @@ import tomlkit
 from tomlkit.exceptions import TOMLKitError
 from tomlkit.items import InlineTable
 
+from rov_fmu.equation.catalogue import POINT
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import EVERY_COMMAND, Actuator, Curve
+from rov_fmu.equation.parts import EVERY_COMMAND, Actuator, Curve, Point
 from rov_fmu.io.messages import brief, shown
 from rov_fmu.io.output import Output, is_same, sealed, without_seal, write_whole
 from rov_fmu.io.paths import inside_or_shipped, name_of
@@ -68,6 +69,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
             for t in layout.thrusters
         ],
         "fin": [{"name": fin.name, "description": fin.description, **_vectors(fin)} for fin in layout.fins],
+        "point": [_point(vehicle, point) for point in layout.points],
         "axes": {name: {} for name in layout.by_name},
         "cross": {},
         "inputs": layout.mix,
@@ -80,7 +82,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
     }
     for name, (*above, key) in layout.keys_in_file.items():
         basis = vehicle.basis.get(name)
-        if basis and basis.source != NOT_GIVEN:
+        if basis and basis.source != NOT_GIVEN and above[0] != "point":
             value = {"value": vehicle[name], "unit": layout.coefficients[name].unit}
             _table_at(tables, above)[key] = value | {"interval": basis.interval or (), "source": basis.source}
     return tables
@@ -132,6 +134,14 @@ def _vectors(actuator: Actuator) -> dict[str, Any]:
     at = actuator.position
     position = at and {"value": at.value, "unit": "m", "source": at.source}
     return {"direction": actuator.direction._asdict(), "position": position}
+
+
+def _point(vehicle: Vehicle, point: Point) -> dict[str, Any]:
+    """Return the keys of a point. Its coordinates share a source, which names each that they have."""
+    names = [point.coefficient(key) for key in point.keys]
+    sources = dict.fromkeys(vehicle.basis[name].source for name in names if name in vehicle.basis)
+    position = {"value": tuple(vehicle[name] for name in names), "unit": "m", "source": "; ".join(sources)}
+    return {"name": point.name, "description": point.description, "position": position}
 
 
 def _table_at(tables: Any, path: Iterable[str]) -> Any:
@@ -192,7 +202,9 @@ def write_tuned(
             continue
         *above, key = vehicle.layout.keys_in_file[name]
         table = _table_at(document, above)
-        if key in table:
+        if above[0] == "point":
+            table["position"]["value"][[*POINT].index(key)], table["position"]["source"] = value, reason
+        elif key in table:
             table[key]["value"], table[key]["source"] = value, reason
             table[key].pop("interval", None)
         else:

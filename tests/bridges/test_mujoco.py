@@ -32,7 +32,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, frictionless
+from tests.vehicles import VEHICLES, frictionless, tied
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 
@@ -574,6 +574,16 @@ def test_every_kind_of_vehicle_moves_or_is_refused_in_one_line(name: str) -> Non
     for _ in range(20):
         rov.step()
     assert np.abs(rov.data.qvel).max() > 1e-4
+
+
+def test_a_point_is_a_site_in_place_of_the_inputs_for_its_force() -> None:
+    """The frames are those of MuJoCo: forward, port, up."""
+    vehicle = rov_fmu.load(BARE)
+    vehicle = vehicle.with_(tied(vehicle, hook=(0.3, 0.1, -0.2)).layout, r_x_hook=0.3, r_y_hook=0.1, r_z_hook=-0.2)
+    rov = package_of(vehicle).load()
+    assert rov.model.site("point_hook").pos == pytest.approx([0.3, -0.1, 0.2])
+    assert not any("hook" in name for name in (*rov.inputs, *rov.coefficients))
+    rov.step()
 
 
 # ---- The folder ------------------------------------------------------------------------------------------------------

@@ -34,6 +34,7 @@ from tests.vehicles import (
     random_inputs,
     random_state,
     random_vehicle,
+    tied,
     with_rotors,
 )
 
@@ -54,7 +55,11 @@ def late(rov: Vehicle) -> Vehicle:
 
 KNOWN = {"VideoRay": VIDEORAY, "lag": HEAVY, "six axes": SIX, "everything": load_vehicle(EVERYTHING)}
 KNOWN |= {"dead time, lag, tables": load_vehicle(THRUST_EFFECTS), "attitude": load_vehicle(SIX_AXES), "fins": FINNED}
-KNOWN |= {"rotors": with_rotors(SIX), "slow rotors": with_rotors(SIX).with_(T_t200=2.5)}
+KNOWN |= {
+    "tied": tied(SIX, tether=(-0.3, 0.1, -0.2)),
+    "rotors": with_rotors(SIX),
+    "slow rotors": with_rotors(SIX).with_(T_t200=2.5),
+}
 LONG = {"attitude, lag, dead time": late(SIX), "dead time alone": late(KNOWN["attitude"])}
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n)]
 

@@ -168,7 +168,7 @@ found = {
     "allocation": allocation.allocation_files(rov)["allocation.yaml"],
     "mujoco": files["README.md"],
     "osp": osp_model_description(rov.layout).decode(),
-    "terminals": {one.name: one.members for one in terminals(rov.layout)},
+    "terminals": {one.name: one.variables for one in terminals(rov.layout)},
     "read": [*entries],
     "suffixes": LOG_SUFFIXES,
 }

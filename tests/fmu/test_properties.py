@@ -1,6 +1,7 @@
 """Any vehicle has a valid description, the same in both versions of FMI, with the right groups and dependencies."""
 
 import random
+import re
 from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
@@ -14,6 +15,7 @@ from lxml import etree
 from rov_fmu.c import compile as build_options
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Vector
 from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.model_description import build_description, model_description
 from rov_fmu.fmu.osp import osp_model_description
@@ -31,6 +33,7 @@ from tests.vehicles import (
     pulsed,
     random_body,
     random_vehicle,
+    tied,
     with_axes,
 )
 from verification.references.rigid_vehicle import QUATERNION, calculated
@@ -41,6 +44,9 @@ Slopes = dict[tuple[str, str], float]
 
 ROVS = VEHICLES | {"six axes": SIX, "dead time": load_vehicle(THRUST_EFFECTS), "everything": load_vehicle(EVERYTHING)}
 ROVS |= {f"{axes} alone": with_axes(axes) for axes in ("q", "wp", "upr")}
+_POINTS: dict[str, Vector] = {"tether": (-0.3, 0.1, -0.2), "hook": (0.2, -0.1, 0.4)}
+ROVS |= {f"tied, {name}": tied(VEHICLES[name], **_POINTS) for name in ("VideoRay", "yaw only", "heave only")}
+ROVS |= {"tied, Heavy": tied(VEHICLES["Heavy"], hook=(0.2, -0.1, 0.4)), "tied, six": tied(SIX, **_POINTS)}
 _OF_REFERENCE = [*ROVS.keys() - {"dead time"}]
 """The vehicles of which the reference has the equations."""
 ROVS |= {"drawn, four axes": random_vehicle(random.Random(0)), "drawn, six": random_body(random.Random(0), "uvwpqr")}
@@ -174,17 +180,38 @@ def members(terminal: etree._Element) -> list[str]:
 
 @pytest.mark.parametrize("kind", ROVS)
 def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
-    """The members of a terminal have the same causality, and its name is unique."""
+    """The members of a terminal have the same causality, unless it is the port of a point; its name is unique."""
     declared = {v.name: v.causality for v in variables(ROVS[kind])}
     found = terminals_of(terminals_and_icons(ROVS[kind].layout))
     grouped = [name for terminal in found.values() for name in members(terminal)]
     assert sorted(grouped) == sorted(name for name, causality in declared.items() if causality in {"input", "output"})
-    for terminal in found.values():
-        assert len({declared[member] for member in members(terminal)}) == 1
+    for point in ROVS[kind].layout.points:
+        port = found[f"point_{point.name}"]
+        names = [*(f"F_{d}" for d in "NED"), *"xyz", *(f"der({x})" for x in "xyz")]
+        assert [v.get("memberName") for v in port.iter("TerminalMemberVariable")] == names
+        assert members(port) == [
+            name.replace(")", f"_{point.name})") if ")" in name else f"{name}_{point.name}" for name in names
+        ]
+        assert [declared[name] for name in members(port)] == ["input"] * 3 + ["output"] * 6
+        assert port.get("matchingRule") == "bus"
+    for name, terminal in found.items():
+        assert name.startswith("point_") or len({declared[member] for member in members(terminal)}) == 1
         assert terminal.get("terminalKind") is None
         variable_names = terminal.findall("TerminalMemberVariable")
         assert {v.get("variableKind") for v in variable_names} == {"signal"}
         assert len({v.get("memberName") for v in variable_names}) == len(variable_names)
+
+
+@pytest.mark.parametrize("kind", ROVS)
+def test_every_velocity_says_of_what_it_is_and_those_over_ground_are_outputs(kind: str) -> None:
+    """The derivative of a position is a velocity over ground; other derivatives are local."""
+    declared = {v.name: v for v in variables(ROVS[kind])}
+    rates = {v.name: v.causality for v in declared.values() if v.derivative_of}
+    over_ground = {f"der({x})" for x in "xyz" if x in ROVS[kind].layout.state}
+    assert rates == {name: "output" if name in over_ground else "local" for name in rates}
+    for v in (v for v in declared.values() if v.unit == "m/s"):
+        assert re.search("current" if v.causality == "input" else "(over ground|through the water)", v.description)
+        assert ("over ground" in v.description) == (v.name in over_ground or v.name in ROVS[kind].layout.calculated)
 
 
 NAMESPACE = "{https://open-simulation-platform.com/OspModelDescription/1.0.1}"
@@ -204,9 +231,9 @@ SEQUENCE = {
 LETTERS = {
     name: letter
     for letter, names in {
-        "x": "u p x phi X_ext K_ext V_N",
-        "y": "v q y theta Y_ext M_ext V_E",
-        "z": "w r z psi Z_ext N_ext V_D",
+        "x": "u p x der(x) phi X_ext K_ext V_N",
+        "y": "v q y der(y) theta Y_ext M_ext V_E",
+        "z": "w r z der(z) psi Z_ext N_ext V_D",
     }.items()
     for name in names.split()
 }
@@ -222,6 +249,19 @@ def groups_of(layout: Layout) -> list[etree._Element]:
     return list(parent)
 
 
+def test_a_point_is_a_port_of_force_and_velocity_over_ground() -> None:
+    """Its force goes in and its velocity comes out, as OSP-IS has it, after all groups of one unit."""
+    groups = {group.get("name"): group for group in groups_of(ROVS["tied, VideoRay"].layout)}
+    for point in _POINTS:
+        port = groups[f"point_{point}"]
+        assert port.tag == f"{NAMESPACE}LinearMechanicalPort"
+        force, velocity = ([(v.get("ref"), v.get("unit"), v.get("axis")) for v in part] for part in port)
+        assert [part.tag.removeprefix(NAMESPACE) for part in port] == ["Force", "LinearVelocity"]
+        assert force == [(f"F_{d}_{point}", "N", axis) for d, axis in zip("NED", "xyz", strict=True)]
+        assert velocity == [(f"der({axis}_{point})", "m/s", axis) for axis in "xyz"]
+    assert [*groups][-len(_POINTS) :] == [f"point_{point}" for point in _POINTS]
+
+
 def references(group: etree._Element) -> list[str]:
     assert {variable.tag for variable in group} == {f"{NAMESPACE}Variable"}
     return [variable.get("ref") for variable in group]
@@ -231,11 +271,13 @@ def references(group: etree._Element) -> list[str]:
 def test_every_input_and_output_is_in_one_group(kind: str) -> None:
     """The variables of a group have the same causality and unit, and different axes."""
     rov = ROVS[kind]
-    groups = groups_of(rov.layout)
+    every = groups_of(rov.layout)
+    groups = [group for group in every if not group.tag.endswith("Port")]
+    groups += [part for group in every if group.tag.endswith("Port") for part in group]
     declared = {v.name: v for v in variables(rov)}
     grouped = sorted(name for group in groups for name in references(group))
     assert grouped == sorted(v.name for v in declared.values() if v.causality in {"input", "output"})
-    names = [group.get("name") for group in groups]
+    names = [group.get("name") for group in every]
     assert all(names)
     assert len(set(names)) == len(names)
     for group in groups:
@@ -246,7 +288,7 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         (unit,) = {v.unit for v in members}
         of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == unit_of(unit).exponents] or ["Generic"]
         assert of_unit == [group.tag.removeprefix(NAMESPACE)]
-    order = [[*SEQUENCE].index(group.tag.removeprefix(NAMESPACE)) for group in groups]
+    order = [[*SEQUENCE, "LinearMechanicalPort"].index(group.tag.removeprefix(NAMESPACE)) for group in every]
     assert order == sorted(order)
     axes = {variable.get("ref"): variable.get("axis") for group in groups for variable in group}
     directions = {f"F_{one.name}": map(one.effect, (SURGE, SWAY, HEAVE)) for one in rov.layout.thrusters}
@@ -255,7 +297,13 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         for name, parts in directions.items()
     }
     about = {f"tau_{curve.name}": "z" for curve in rov.layout.turning_curves}
-    assert axes == {name: (LETTERS | along | about).get(name) for name in axes}
+    of_points = {
+        name.format(x, point): axis
+        for point in (point.name for point in rov.layout.points)
+        for name, letters in (("F_{}_{}", "NED"), ("{}_{}", "xyz"), ("der({}_{})", "xyz"))
+        for x, axis in zip(letters, "xyz", strict=True)
+    }
+    assert axes == {name: (LETTERS | along | about | of_points).get(name) for name in axes}
 
 
 # ---- Dependencies, against slopes of the equations of the reference ----
@@ -303,7 +351,7 @@ def dependencies(rov: Vehicle, of: str) -> dict[tuple[str, str], str]:
 
 
 # The default tests have the vehicle with most effects.
-_SOME = ("everything",)
+_SOME = ("everything", "tied, VideoRay")
 _KINDS = [*spread(sorted(_OF_REFERENCE), _SOME, ("six axes", "surge without drag", "with an input mix"))]
 
 
@@ -331,8 +379,9 @@ def test_declared_dependencies_are_those_of_the_equations(kind: str) -> None:
 
     found = {pair: strength for pair in samples[0][0] if (strength := strongest(pair))}
     outputs = {v.name for v in variables(rov) if v.causality == "output"}
+    rates = {v.name for v in variables(rov) if v.derivative_of}
     assert {pair: s for pair, s in found.items() if pair[0] in outputs} == dependencies(rov, "Outputs")
-    assert {pair: s for pair, s in found.items() if pair[0].startswith("der(")} == dependencies(rov, "Derivatives")
+    assert {pair: s for pair, s in found.items() if pair[0] in rates} == dependencies(rov, "Derivatives")
 
 
 _BEYOND_THEIR_RANGES = [(angle, f"{angle}_0") for angle in ("phi", "theta", "psi")]
@@ -351,6 +400,10 @@ def test_declared_initial_dependencies_are_those_of_the_equations(kind: str) -> 
     points = [m | parameters(rov, rng, [False, True]) for m in motions(sorted(known), rng, pairs_of(kind))]
     samples = [slopes(rov, point, list(point)) for point in points]
     values = {pair: [sample[pair] for sample in samples] for pair in samples[0] if pair[0] not in known}
-    found = {pair: "dependent" if vary(of) else "constant" for pair, of in values.items() if any(of)}
+    found = {  # the kind for a parameter, such as the place of a point, is always dependent
+        pair: "dependent" if vary(of) or pair[1] in rov.coefficients else "constant"
+        for pair, of in values.items()
+        if any(of)
+    }
     found |= dict.fromkeys(_BEYOND_THEIR_RANGES if rov.layout.has_attitude else (), "dependent")
     assert found == dependencies(rov, "InitialUnknowns")

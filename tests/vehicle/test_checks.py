@@ -88,6 +88,11 @@ _NO_BOOST: dict[str, Any] = {**_ALONE, "thruster.l": GONE, "thruster.r": GONE, "
 
 
 # How the file is changed, and the parts of each line, in their order.
+def _point(name: str, x: float = -0.2) -> dict[str, Any]:
+    """Return a point of a vehicle file."""
+    return {"name": name, "position": place(x, 0.0, -0.1)}
+
+
 MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
     # names
     "a name twice": ({**_ALONE, "thruster.2.name": "1"}, "thruster#2.name = '1': thruster#1 has this name"),
@@ -101,6 +106,30 @@ MISTAKES: dict[str, tuple[dict[str, Any], str]] = {
         + "\n".join(f"thruster.{n}.curve … there is no such curve, only '', {'x' * 193}..." for n in "12345lr"),
     ),
     "a curve of no thruster": ({"curves.spare": _CURVE}, "curves.spare: no thruster has this curve"),
+    "a point with a name of the centre of buoyancy": (
+        {"point": [_point("B")]},
+        "point.B: has the name x_B in the FMU, which body.x_B has too: rename one of them",
+    ),
+    "a point with a name of the centre of mass": (
+        {"point": [_point("hook"), _point("G")]},
+        "point.G: has the name x_G in the FMU, which body.x_G has too: rename one of them",
+    ),
+    "a thruster and a point of one name": (
+        {**_ALONE, "thruster.2.name": "N_hook", "point": [_point("hook")]},
+        "point.hook: has the name F_N_hook in the FMU, which thruster.N_hook has too: rename one of them",
+    ),
+    "two points whose names differ in case": (
+        {"point": [_point("hook"), _point("Hook")]},
+        "point#2.name = 'Hook': point#1 has the name 'hook': they differ only in case",
+    ),
+    "a point without its place": (
+        {"point": [{"name": "hook"}]},
+        "point.hook.position: this key is missing",
+    ),
+    "a point beyond any vehicle": (
+        {"point": [_point("hook", 156.0)]},
+        "point.hook.position.value = [156.0, 0.0, -0.1] … -100 ... 100 m",
+    ),
     "two coefficients of one name": (
         {
             **{"curves.boost": GONE, "curves.frame_reverse": _CURVE},

@@ -11,7 +11,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT
-from tests.vehicles import EVERYTHING, SIX_AXES
+from tests.vehicles import EVERYTHING, SIX_AXES, VEHICLES, a_vehicle, bases, tied
 
 TEXT = REFIT.read_text(encoding="utf-8")
 
@@ -52,3 +52,15 @@ def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
+
+
+def test_a_point_is_written_with_its_place_and_tuned_in_it(tmp_path: Path) -> None:
+    """Its coordinates are coefficients, which share a key and a source in the file."""
+    rov = tied(a_vehicle(VEHICLES["Heavy"]), hook=(0.2, -0.1, 0.4), tether=(-0.3, 0.0, -1.0 / 3.0))
+    rov = replace(rov, basis=bases(dict.fromkeys(rov.coefficients, "A tank test")))
+    write_vehicle(rov, tmp_path / "rov.toml")
+    assert load_vehicle(tmp_path / "rov.toml") == rov
+    write_tuned(tmp_path / "rov.toml", tmp_path / "moved.toml", {"r_y_hook": 0.25}, "a test")
+    moved = load_vehicle(tmp_path / "moved.toml")
+    assert {name: x for name, x in moved.coefficients.items() if x != rov[name]} == {"r_y_hook": 0.25}
+    assert {name for name, source in moved.sources.items() if source == "a test"} == {f"r_{x}_hook" for x in "xyz"}

@@ -65,6 +65,8 @@ class Equations:
     axes: Mapping[str, Axis]
     lags: Mapping[str, Lag]
     coupled: bool
+    points: Sequence[tuple[Sequence[Number], Sequence[Number]]] = ()
+    """Positions in the body frame at which forces act, m, and the forces in the earth frame, N."""
 
     def of(self, number: Callable[[Number], Number]) -> "Equations":
         """Return the equations with other numbers."""
@@ -76,7 +78,7 @@ class Equations:
 
         axes = {name: axis(one) for name, one in self.axes.items()}
         lags = {name: Lag(number(lag.target), number(lag.T)) for name, lag in self.lags.items()}
-        return Equations(axes, lags, self.coupled)
+        return Equations(axes, lags, self.coupled, [([*map(number, r)], [*map(number, F)]) for r, F in self.points])
 
     @cached_property
     def places(self) -> list[int]:
@@ -117,7 +119,13 @@ class Equations:
         u, v, w, r = self.level(y[:n])
         s, c = sin_cos(y[n + 3])
         lagging = [(lag.target - F) / lag.T for lag, F in zip(self.lags.values(), y[n + 4 :], strict=True)]
-        return [*self.accelerations(y[:n], y[n + 4 :], signs), u * c - v * s, u * s + v * c, w, r, *lagging]
+        accelerations = self.accelerations(y[:n], y[n + 4 :], signs)
+        for (x, y_, _), (N, E, D) in self.points:
+            X, Y = c * N + s * E, c * E - s * N
+            for place, load, axis in zip(self.places, (X, Y, D, x * Y - y_ * X), "uvwr", strict=True):
+                if place >= 0:
+                    accelerations[place] += load / self.axes[axis].inertia
+        return [*accelerations, u * c - v * s, u * s + v * c, w, r, *lagging]
 
     def rates(self, state: Mapping[str, Number], inputs: Mapping[str, float], numbers: Any) -> dict[str, Number]:
         """Return the time derivatives of a state by name."""
@@ -264,7 +272,11 @@ def driven(rov: Vehicle, F: Mapping[str, Number], loads: Mapping[str, Number], n
             [beta * by[name] / mass for name in lags],
             mass / beta if beta else numbers.inf,
         )
-    return Equations(axes, lags, rov.layout.coupled)
+    points = [
+        ([k[f"r_{axis}_{p.name}"] for axis in "xyz"], [numbers.mpf(loads[f"F_{d}_{p.name}"]) for d in "NED"])
+        for p in rov.layout.points
+    ]
+    return Equations(axes, lags, rov.layout.coupled, points)
 
 
 def calculated(rov: Vehicle, values: Mapping[str, Number], numbers: Any) -> dict[str, Number]:

@@ -69,6 +69,8 @@ class Body:
     """2 x 3 x n: a, b and d ahead, and astern. The force at the speed n of the rotor is (a |n| + b) n - d |n| v_a."""
     has_rotor: Array
     """n: True for a thruster whose rotor lags in speed, so that the speed is its state."""
+    points: Sequence[tuple[Array, Array]] = ()
+    """Positions in the body frame at which forces act, m, and the forces in the earth frame, N."""
 
     @cached_property
     def places(self) -> list[int]:
@@ -131,6 +133,11 @@ def quaternion_of(phi: Number, theta: Number, psi: Number) -> list[Number]:
     ]
 
 
+def of_point(at: Array, R: Array, nu: Array, position: Array, current: Array) -> Array:
+    """Return the position of a point of the body in the earth frame, and its velocity over ground."""
+    return np.concatenate([position + R @ at, R @ (nu[:3] + skew(nu[3:]) @ at) + current])
+
+
 def euler_angles(R: Array) -> tuple[Number, Number, Number]:
     """Return the Euler angles phi, theta and psi (zyx) of a rotation matrix, in numbers of mpmath."""
     theta = mp.atan2(-R[2][0], mp.hypot(R[2][1], R[2][2]))
@@ -157,6 +164,8 @@ def forces(body: Body, nu: Array, R: Array, lagging: Array, signs: Array | None 
     thrust = body.alpha * ((steady - advances * (body.wrenches @ nu)) @ body.wrenches)
     fins = body.fins * (side[0] * nu[0] * nu[0])
     tau: Array = body.load - damping + fins + thrust + body.righting @ R[2]
+    for at, F in body.points:
+        tau += np.concatenate([R.T @ F, skew(at) @ (R.T @ F)])
     for (i, j, k), factor in body.bilinear.items():
         tau[i] += factor * nu[j] * nu[k]
     return tau

@@ -16,7 +16,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 from . import equations, rigid_body
 from .equations import commands, of_voltage, rotor_speed, steady_forces
 from .extrapolation import BITS, plain, real, until_reversal
-from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, rigid_body_mass, rotation, skew
+from .rigid_body import VELOCITIES, Array, Body, Floats, Number, euler_angles, of_point, rigid_body_mass, rotation, skew
 
 Values = Mapping[str, Number]
 QUATERNION = ("eta", "epsilon_1", "epsilon_2", "epsilon_3")
@@ -75,7 +75,13 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         np.array([get(name) for name in ("V_N", "V_E", "V_D")]),
         rotors,
         has_rotor,
+        [(at, np.array([get(f"F_{direction}_{name}") for direction in "NED"])) for name, at in _points(rov, get)],
     )
+
+
+def _points(rov: Vehicle, get: Callable[[str], Number]) -> list[tuple[str, Array]]:
+    """Return the names and the positions of the points at which forces act."""
+    return [(one.name, np.array([get(f"r_{axis}_{one.name}") for axis in "xyz"])) for one in rov.layout.points]
 
 
 def _wrench(place: Sequence[Number], force: Sequence[Number]) -> Array:
@@ -191,11 +197,16 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     be float for a faster result with fewer digits.
     """
     layout = rov.layout
+    y = np.array([number(x) for x in places(rov, values)])
+    R, held = rotation(y[6:10]), {name: number(mp.mpf(values.get(name, 0.0))) for name in ("V_N", "V_E", "V_D")}
+    tied: dict[str, Number] = {}
+    for name, at in _points(rov, lambda name: number(mp.mpf(values[name]))):
+        outputs = (*(f"{x}_{name}" for x in "xyz"), *(f"der({x}_{name})" for x in "xyz"))
+        tied |= dict(zip(outputs, of_point(at, R, y[:6], y[10:13], np.array([*held.values()])), strict=True))
     if not layout.has_attitude:
-        return equations.calculated(rov, values, mp)
+        return equations.calculated(rov, values, mp) | tied
     k = Vehicle(layout, {name: values[name] for name in rov.coefficients})
     of_vehicle = body(k, {name: values[name] for name in layout.inputs}, number)
-    y = np.array([number(x) for x in places(k, values)])
     rates = rigid_body.rates(of_vehicle, of_vehicle.inverse, y)
     names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
     found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
@@ -211,4 +222,4 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     for curve in layout.turning_curves:
         own = [t for t in layout.thrusters if t.curve == curve.name]
         found[f"tau_{curve.name}"] = mp.fsum(_wrench(t.place, t.direction.value)[5] * forces[t.name] for t in own)
-    return found | dict(zip(("phi", "theta", "psi"), euler_angles(rotation(y[6:10])), strict=True))
+    return found | tied | dict(zip(("phi", "theta", "psi"), euler_angles(R), strict=True))

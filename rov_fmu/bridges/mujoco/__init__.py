@@ -5,6 +5,7 @@ the vehicle, which `equation/python/printed.py` prints, and the same in C (`sour
 """
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -17,7 +18,7 @@ from rov_fmu.bridges.mujoco.source import water_sources
 from rov_fmu.c.compile import HOSTS, MACHINES, PLATFORMS, compile_for
 from rov_fmu.c.library import load_sources
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.parts import Thruster
+from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python import step
 from rov_fmu.equation.python.printed import left_out_of_accelerations, printed_accelerations
 from rov_fmu.io.messages import listed
@@ -56,6 +57,8 @@ from .plugin import show
 
 show(load(), *map(Path, sys.argv[1:2]))
 '''
+_FLIP = np.array([1.0, -1.0, -1.0])
+"""The signs of components in MuJoCo's frame of the body, relative to forward, starboard, down."""
 _PROPELLER = 0.05
 """The radius, and half the length, of what is drawn for a thruster, relative to the size of the vehicle."""
 
@@ -87,6 +90,8 @@ def mujoco_texts(
 ) -> dict[str, str]:
     """Return the files of the folder without its libraries, as `mujoco_files` does."""
     sdf.check_body(vehicle, "MuJoCo")
+    points = [_point(vehicle, point) for point in vehicle.layout.points]
+    vehicle = _without_points(vehicle)
     layout = vehicle.layout
     example = layout.example(layout.axes[0].axis)
     hull = hull_size(vehicle) / 2.0
@@ -98,6 +103,7 @@ def mujoco_texts(
         "foam": {"at": hull * (0.0, 0.0, 0.72), "size": hull * (1.01, 0.9, 0.3)},
         "range": np.array([low, high]),
         "thrusters": [_drawn(vehicle, thruster, _PROPELLER * float(hull.max()) * 2.0) for thruster in layout.thrusters],
+        "points": points,
         "package": package,
         "example": example,
         "card": card,
@@ -148,6 +154,7 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
 
 def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
     """Return the module with the equation of a vehicle and its numbers, as `plugin.py` takes it."""
+    vehicle = _without_points(vehicle)
     layout = vehicle.layout
     data = {
         "IDENTIFIER": vehicle.identifier,
@@ -172,10 +179,19 @@ def _text(name: str) -> str:
     return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
+def _without_points(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle without its points. MuJoCo has sites there, at which tendons and forces act on the body."""
+    return vehicle.with_(replace(vehicle.layout, points=()))
+
+
+def _point(vehicle: Vehicle, point: Point) -> dict[str, object]:
+    """Return the name and the position of a point, in MuJoCo's frame."""
+    return {"name": point.name, "position": _FLIP * [vehicle[point.coefficient(key)] for key in point.keys]}
+
+
 def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, object]:
     """Return where and how a thruster is drawn, in MuJoCo's frame."""
-    flip = np.array([1.0, -1.0, -1.0])
-    position, direction = flip * place(vehicle, thruster), flip * thruster.direction.value
+    position, direction = _FLIP * place(vehicle, thruster), _FLIP * thruster.direction.value
     ends = np.concatenate([position - radius * direction, position + radius * direction])
     return {"name": thruster.name, "position": position, "direction": direction, "radius": radius, "ends": ends}
 

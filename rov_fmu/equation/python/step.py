@@ -314,6 +314,11 @@ class DelayLine:
 # ---- Numbers ---------------------------------------------------------------------------------------------------------
 
 
+def formula_name(variable: str) -> str:
+    """Return the name that a variable has in the equation: der_x for der(x). Others have their own."""
+    return variable.replace("(", "_").removesuffix(")")
+
+
 def _root(f: Callable[[float], float], b: float, f_0: float, f_b: float) -> float:
     """Return where a function changes its sign between 0 and b, by the Illinois method."""
     a, f_a = 0.0, f_0

@@ -310,6 +310,8 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
     Loads end at the strongest thrust, and others at 1, or at twice their start value if that is more.
     """
     most = {form.axis.external: _round(vehicle.strongest(form.axis)) for form in vehicle.layout.axes}
+    along = [most[axis.external] for axis in vehicle.layout.bare_axes if not axis.is_rotation]
+    most |= dict.fromkeys(vehicle.layout.forces_at_points, max(along, default=1.0))
     for name, declaration in vehicle.layout.inputs.items():
         if name not in vehicle.layout.commands:
             yield name, max(most.get(name, 1.0), 2.0 * abs(start[name])), pretty_unit(declaration.unit)

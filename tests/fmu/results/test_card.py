@@ -7,7 +7,7 @@ import pytest
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.fmu.card import card, card_text, read_card
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle
+from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, tied
 
 _ROVS = {name: a_vehicle(rov) for name, rov in (VEHICLES | {"six axes": SIX}).items()}
 _ROVS |= {path.stem: load_vehicle(path) for path in (EVERYTHING, THRUST_EFFECTS)}
@@ -32,6 +32,15 @@ def test_commands_at_which_thrust_pushes_backward_are_told() -> None:
     assert _holds(turned) == [first, "The rear thrust is negative below 27%."]
     turned = _ROVS["everything"].with_(a_t_frame_reverse=20.0, b_t_frame_reverse=-4.0, b_t_boost=0.0)
     assert _holds(turned)[1:] == ["The frame thrust in reverse is negative below 29%."], "after a dead band of 8.7 %"
+
+
+def test_the_axes_along_which_forces_at_points_act_are_told() -> None:
+    rov = tied(_ROVS["VideoRay"], tether=(-0.2, 0.0, -0.1), hook=(0.1, 0.0, 0.2))
+    words = "Forces at the points tether and hook act in surge, heave and yaw; the vehicle does not move in "
+    assert [*_holds(_ROVS["VideoRay"]), f"{words}sway, pitch and roll."] == _holds(rov)
+    assert _holds(tied(_ROVS["six axes"], tether=(0.0, 0.0, 0.0)))[-1] == (
+        "Forces at the point tether act in surge, sway, heave, roll, pitch and yaw."
+    )
 
 
 def test_ranges_are_told_in_degrees() -> None:
