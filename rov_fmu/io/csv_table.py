@@ -85,8 +85,8 @@ def read_series(
         words = "the first line must be a header that names the columns: the time, and then variables"
         raise DataFileError(f"{path}: {words}")
     wrong = Mistakes(path)
-    for place, name in enumerate(header):
-        if reason := _why_no_variable(header, place, why_wrong):
+    for index, name in enumerate(header):
+        if reason := _why_no_variable(header, index, why_wrong):
             wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
     wrong.check()
     series, numbers, torn = Series({name: array("d") for name in header}), array("L"), TornRows(len(header))
@@ -271,8 +271,8 @@ class TornRows:
             self.line, self.cells = line, cells
 
 
-Places = Mapping[int, Sequence[int | None]]
-"""The place of each column of the header in rows with so many cells, if they have more than the header."""
+Indices = Mapping[int, Sequence[int | None]]
+"""The index of each column of the header in rows with so many cells, if they have more than the header."""
 Lines = Iterator[tuple[int, list[str]]]
 """The lines of a table, each with its number and its cells."""
 
@@ -280,9 +280,9 @@ Lines = Iterator[tuple[int, list[str]]]
 class Grown(NamedTuple):
     """Where the columns of the header are in rows that have more cells."""
 
-    places: Places
+    indices: Indices
     left_out: int
-    """The number of rows that are left out because the places of their columns are unknown."""
+    """The number of rows that are left out because the indices of their columns are unknown."""
     words: Mapping[str, str | float]
     """The words of the finding about it."""
 
@@ -299,9 +299,9 @@ class CsvFile:
         self._open = open_stream or open_text(Path(path))
         self._dialect = _dialect(self._open())
         self._has_decimal_commas = self._dialect.separator != "," or _has_decimal_commas(self._open())
-        self._places: Places = {}
+        self._indices: Indices = {}
         self.left_out = 0
-        """The number of rows that are left out because the places of their columns are unknown."""
+        """The number of rows that are left out because the indices of their columns are unknown."""
         self.assumed: dict[str, Mapping[str, str | float]] = {}
         """What was assumed, as the kind of a finding with its words."""
         if getattr(self._open(), "encoding", "") == _CODE_PAGE:
@@ -322,11 +322,11 @@ class CsvFile:
         """
         width, is_grown = 0, False
         for line, row in self._rows():
-            places = self._places.get(len(row))
-            is_grown = is_grown or places is not None
-            if is_grown and places is None:
+            indices = self._indices.get(len(row))
+            is_grown = is_grown or indices is not None
+            if is_grown and indices is None:
                 continue
-            cells = ["" if place is None else row[place] for place in places] if places else row
+            cells = ["" if index is None else row[index] for index in indices] if indices else row
             while len(cells) > width and not cells[-1]:
                 cells.pop()
             width = width or len(cells)
@@ -353,7 +353,7 @@ class CsvFile:
     def align(self, grown: FindGrown) -> bool:
         """Find the columns of the header in rows that have more cells from some line on. Return True if they are."""
         if found := grown(self._rows()):
-            self._places, self.left_out, self.assumed["grown rows"] = found
+            self._indices, self.left_out, self.assumed["grown rows"] = found
         return bool(found)
 
     def too_many(self, torn: TornRows) -> str:
@@ -364,8 +364,8 @@ class CsvFile:
             hint += (
                 f", and {torn.count} rows have more cells than the header, which has {torn.most}. Complete the header"
             )
-        place = f"line {torn.line}, column {torn.most + 1} = {shown(torn.cells[torn.most])}"
-        return f"{self.path}, {place}: there is no such column{hint}"
+        where = f"line {torn.line}, column {torn.most + 1} = {shown(torn.cells[torn.most])}"
+        return f"{self.path}, {where}: there is no such column{hint}"
 
 
 # ---- Cells -----------------------------------------------------------------------------------------------------------
@@ -382,13 +382,13 @@ def number_of(text: str) -> float | None:
     return number if isfinite(number) else None
 
 
-def _why_no_variable(header: Sequence[str], place: int, why_wrong: Callable[[str], str | None]) -> str | None:
+def _why_no_variable(header: Sequence[str], index: int, why_wrong: Callable[[str], str | None]) -> str | None:
     """Return what is wrong with a name above a column of variables over time, or None."""
-    name = header[place]
-    if name in header[:place]:
+    name = header[index]
+    if name in header[:index]:
         return "this column occurs twice"
-    if place and _UNIT.search(name):
+    if index and _UNIT.search(name):
         return f"must be {shown(_UNIT.sub('', name))} without a unit; a command of 30 % is 0.3 here"
     if (unit := _UNIT.search(name)) and unit[0] != " [s]":
         return "must be the time in s, which is the unit here"
-    return why_wrong(name) if place else None
+    return why_wrong(name) if index else None

@@ -138,8 +138,8 @@ def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_
 
 def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp_path: Path) -> None:
     content = bytearray(_archive(_zeros(20)).getvalue())
-    for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
-        struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
+    for sign, offset in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
+        struct.pack_into("<I", content, content.rindex(sign) + offset, 1000)
     with pytest.raises(FileError, match=r"^a\.fmu: member 'resources/zeros.bin': its header and its content must"):
         unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
     assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
