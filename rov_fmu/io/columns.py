@@ -19,9 +19,9 @@ from rov_fmu.io.csv_table import (
     FindGrown,
     Mistakes,
     OpenStream,
-    TornRows,
     is_blank,
     number_of,
+    read_numbers,
 )
 from rov_fmu.io.messages import MOST, brief, did_you_mean, shown, similar
 
@@ -141,9 +141,10 @@ def read_columns(
     for reason in check_header(headers, _others(header, file_columns)):
         wrong.add(f"{path}, line {line}: {reason}")
     wrong.check()
-    values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+    cells = {index: (column.name, partial(_value, column, loose)) for index, column in file_columns.items()}
+    values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
     if torn.count and file.align(grown):
-        values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+        values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
     if torn.count > len(lines):
         raise DataFileError(file.too_many(torn))
     if not lines:
@@ -163,36 +164,6 @@ def read_columns(
     )
 
 
-def _numbers(
-    file: CsvFile, header: Sequence[str], file_columns: Mapping[int, FileColumn], loose: bool
-) -> tuple[dict[str, "array[float]"], "array[int]", dict[str, "array[int]"], TornRows]:
-    """Return the numbers by column, the line of each row, the rows by column whose cells are unread, and the rows with
-    too many cells. Raises DataFileError."""
-    path = file.path
-    torn, wrong = TornRows(len(header)), Mistakes(path)
-    values = {column.name: array("d") for column in file_columns.values()}
-    lines = array("L")
-    unread = {name: array("L") for name in values}
-    for line, cells in islice(file, 1, None):
-        if len(cells) > len(header):
-            torn.add(line, cells)
-            continue
-        lines.append(line)
-        for (index, column), cell in zip(file_columns.items(), _by_column(cells, file_columns).values(), strict=True):
-            try:
-                value = _value(cell, index < len(cells), column, loose)
-            except ValueError as error:
-                wrong.add(f"{path}, line {line}, column {shown(header[index])}{_content(cell)}: {error}")
-                continue
-            values[column.name].append(value)
-            if isnan(value) and not is_blank(cell):
-                unread[column.name].append(len(lines) - 1)
-    if torn.count and not loose:
-        wrong.add(file.too_many(torn))
-    wrong.check()
-    return values, lines, unread, torn
-
-
 def _rows(file: CsvFile, file_columns: Mapping[int, FileColumn], width: int) -> Iterator[Mapping[str, str]]:
     """Yield the cells of each row that has not more of them than the header, by column."""
     return (_by_column(cells, file_columns) for _, cells in islice(file, 1, None) if len(cells) <= width)
@@ -208,7 +179,7 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
     return {column.name: cells[index] if index < len(cells) else "" for index, column in file_columns.items()}
 
 
-def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> float:
+def _value(file_column: FileColumn, loose: bool, text: str, exists: bool) -> float:
     """Return the number of a cell in the first unit. Raises ValueError with only the reason.
 
     `exists` is False for a cell that its row does not have.

@@ -16,8 +16,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO, TextIOWrapper
-from itertools import islice, zip_longest
-from math import isfinite, nan
+from itertools import islice
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -76,11 +76,10 @@ def read_series(
 
     `why_wrong` returns what is wrong with the name of a variable, or None. Names have no units. Each cell must be a
     finite number, true or false. Raises DataFileError with all mistakes. `open_stream` opens the lines if `path` is not
-    the file itself, but words for its place in an archive.
+    the file itself, but words for its path in an archive.
     """
     file = CsvFile(path, open_stream)
-    lines = iter(file)
-    line, header = next(lines)
+    line, header = next(iter(file))
     if all(NUMBER.fullmatch(name) for name in header):
         words = "the first line must be a header that names the columns: the time, and then variables"
         raise DataFileError(f"{path}: {words}")
@@ -89,28 +88,57 @@ def read_series(
         if reason := _why_no_variable(header, index, why_wrong):
             wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
     wrong.check()
-    series, numbers, torn = Series({name: array("d") for name in header}), array("L"), TornRows(len(header))
-    for line, cells in lines:
-        numbers.append(line)
+    columns = {index: (name, lambda cell, _: finite(cell)) for index, name in enumerate(header)}
+    values, lines, _, _ = read_numbers(file, header, columns, lambda cell: f" = {shown(cell)}")
+    times = values[header[0]]
+    for line, before, time in zip(lines[1:], times, times[1:], strict=False):
+        if time < before:
+            raise DataFileError(f"{path}, line {line}: the time goes back")
+    if not lines or len(header) < 2:
+        raise DataFileError(f"{path}: {'no columns beside the time' if lines else NO_ROWS}")
+    series = Series(values)
+    series.lines = lines
+    return series
+
+
+def read_numbers(
+    file: "CsvFile",
+    header: Sequence[str],
+    columns: Mapping[int, tuple[str, Callable[[str, bool], float]]],
+    content: Callable[[str], str],
+    *,
+    loose: bool = False,
+) -> tuple[dict[str, "array[float]"], "array[int]", dict[str, "array[int]"], "TornRows"]:
+    """Return the numbers by column, the line of each row, the rows by column whose cells are unread, and the rows with
+    too many cells, which are a mistake unless the table is `loose`. Raises DataFileError with all mistakes.
+
+    `columns` has the name of each column that is read, by its index in the header, and returns the number of a cell. It
+    is told whether the row has this cell, and raises ValueError with only the reason. `content` returns the content of
+    a cell for a message.
+    """
+    torn, wrong = TornRows(len(header)), Mistakes(file.path)
+    values = {name: array("d") for name, _ in columns.values()}
+    lines, unread = array("L"), {name: array("L") for name in values}
+    for line, cells in islice(file, 1, None):
         if len(cells) > len(header):
             torn.add(line, cells)
             continue
-        for name, cell in zip_longest(header, cells, fillvalue=""):
+        lines.append(line)
+        for index, (name, number) in columns.items():
+            exists = index < len(cells)
+            cell = cells[index] if exists else ""
             try:
-                series[name].append(finite(cell))
+                value = number(cell, exists)
             except ValueError as error:
-                wrong.add(f"{path}, line {line}, column {shown(name)} = {shown(cell)}: {error}")
-    if torn.count:
+                wrong.add(f"{file.path}, line {line}, column {shown(header[index])}{content(cell)}: {error}")
+                continue
+            values[name].append(value)
+            if isnan(value) and not is_blank(cell):
+                unread[name].append(len(lines) - 1)
+    if torn.count and not loose:
         wrong.add(file.too_many(torn))
     wrong.check()
-    times = series[header[0]]
-    for line, before, time in zip(numbers[1:], times, times[1:], strict=False):
-        if time < before:
-            raise DataFileError(f"{path}, line {line}: the time goes back")
-    if not numbers or len(header) < 2:
-        raise DataFileError(f"{path}: {'no columns beside the time' if numbers else NO_ROWS}")
-    series.lines = numbers
-    return series
+    return values, lines, unread, torn
 
 
 def finite(text: str) -> float:
