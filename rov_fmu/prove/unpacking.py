@@ -13,14 +13,13 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import combinations
+from itertools import accumulate, combinations
 from pathlib import Path
 from typing import IO
 from unicodedata import normalize
 
 from rov_fmu.io.messages import FileError, ProofError, brief, reason_of, shown
 from rov_fmu.io.paths import is_portable
-from rov_fmu.io.reading import open_file
 
 _MOST_UNPACKED = 2_000_000_000
 """The size of all files."""
@@ -53,23 +52,19 @@ _PIECE = 2**14
 """The number of bytes that are unpacked at a time."""
 
 
-def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> None:
+def unpack_fmu(file: IO[bytes], fmu: Path, folder: Path) -> None:
     """Unpack an FMU into a folder.
 
     Raises FileError, which names the FMU by the path `fmu`, if it is damaged, if a file would lie outside the folder or
     is a link, or if the files take too much space.
     """
-    if isinstance(archive, Path):
-        with open_file(archive) as file:
-            return unpack_fmu(file, fmu, folder)
-    with opened_archive(archive, fmu) as zipped:
+    with opened_archive(file, fmu) as zipped:
         check_order(zipped, fmu)
         try:
             zipped.extractall(folder)
         except OSError as error:
             where = f": {os.path.relpath(error.filename, folder)}" if error.filename else ""
             raise FileError(f"{fmu}: cannot be unpacked: {error.strerror or error}{where}") from error
-    return None
 
 
 # ---- The archive -----------------------------------------------------------------------------------------------------
@@ -94,9 +89,10 @@ def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
 def refusal(zipped: zipfile.ZipFile) -> str:
     """Return why an archive may not be unpacked, or an empty text."""
     members = zipped.infolist()
-    paths = [_folded(member.orig_filename) for member in members]
+    # On some systems, capital letters and accents make no other path.
+    paths = [normalize("NFC", member.orig_filename.removesuffix("/")).casefold() for member in members]
     names, times = Counter(member.orig_filename for member in members), Counter(paths)
-    folders = {folder for path in paths for folder in _folders(path)}
+    folders = {folder for path in paths for folder in accumulate(path.split("/")[:-1], "{}/{}".format)}
     for member, path in zip(members, paths, strict=True):
         name = member.orig_filename
         is_valid = all(map(is_portable, name.removesuffix("/").split("/")))
@@ -117,12 +113,11 @@ def refusal(zipped: zipfile.ZipFile) -> str:
             if is_wrong:
                 return f"member {shown(name)}: {reason}"
     total = sum(member.file_size for member in members)
-    packed = zipped.start_dir
     if total > _MOST_UNPACKED:
         return f"would take {total:,} bytes unpacked; at most {_MOST_UNPACKED:,} are allowed"
-    if total > max(_SMALL, _MOST_RATIO * packed):
+    if total > max(_SMALL, _MOST_RATIO * zipped.start_dir):
         return (
-            f"would take {total:,} bytes unpacked, and has {packed:,}; "
+            f"would take {total:,} bytes unpacked, and has {zipped.start_dir:,}; "
             f"above {_SMALL:,} at most {_MOST_RATIO} times those of the archive are allowed"
         )
     return ""
@@ -149,18 +144,6 @@ def _has_other_numbers(entry: zipfile.ZipInfo, fields: dict[int, bytes]) -> bool
     return all(fields[_LARGE] != struct.pack(f"<{n}Q", *some) for n in (1, 2, 3) for some in combinations(numbers, n))
 
 
-def _folded(name: str) -> str:
-    """Return what equal paths have in common: on some systems, capital letters and accents make no other path."""
-    return normalize("NFC", name.removesuffix("/")).casefold()
-
-
-def _folders(path: str) -> Iterator[str]:
-    """Yield the folders that a path leads through."""
-    parts = path.split("/")
-    for n in range(1, len(parts)):
-        yield "/".join(parts[:n])
-
-
 def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
     """Raise FileError if two readers could find different files in an archive.
 
@@ -181,7 +164,7 @@ def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
         size += 46 + len(_encoded(entry)) + len(entry.extra) + len(entry.comment)
     file.seek(offset + size)
     end, count = file.read(100 + len(zipped.comment)), len(zipped.infolist())
-    largest = (2**16 - 1, 2**16 - 1, 2**32 - 1, 2**32 - 1) if end.startswith(b"PK\6\6") else ()
+    largest = (2**16 - 1, 2**32 - 1) if end.startswith(b"PK\6\6") else ()
     end = end[76:] if largest else end  # after the records of large archives, of 56 and 20 bytes
     expected = b"PK\5\6", 0, 0, count, count, size, offset, len(zipped.comment)
     if len(end) != 22 + len(zipped.comment) or any(
@@ -202,12 +185,10 @@ def _end_of(file: IO[bytes], entry: zipfile.ZipInfo, where: str) -> int:
     without a signature (APPNOTE 4.3.9). Raises FileError about an extra field.
     """
     file.seek(entry.header_offset)
-    sign, _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4s5H3L2H", file.read(30))
-    year, month, day, hour, minute, second = entry.date_time
-    modified = hour << 11 | minute << 5 | second // 2, (year - 1980) << 9 | month << 5 | day
-    if (sign, flags, method, time, date) != (b"PK\3\4", entry.flag_bits, entry.compress_type, *modified):
+    sign, _, flags, method, modified, *numbers, name, extra = struct.unpack("<4s3H4s3L2H", file.read(30))
+    if (sign, flags, method) != (b"PK\3\4", entry.flag_bits, entry.compress_type):
         return 0
-    if file.read(name) != _encoded(entry):
+    if modified != entry.FileHeader()[10:14] or file.read(name) != _encoded(entry):
         return 0
     fields = _fields(file.read(extra))
     if fields is None:
