@@ -14,7 +14,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from tests.commands import ROOT
 from verification.identification import __main__ as command
-from verification.identification.data import Recorded, Recording, Split, load
+from verification.identification.data import Recorded, Recording, Split, split_of
 from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH, TINY, Simulated
 from verification.identification.methods.identified import Identified
@@ -32,7 +32,7 @@ HERE = [
 
 @pytest.fixture(scope="module")
 def split(tmp_path_factory: pytest.TempPathFactory) -> Split:
-    return load(TINY, None, tmp_path_factory.mktemp("tiny"))
+    return split_of(TINY, None, tmp_path_factory.mktemp("tiny"))
 
 
 @pytest.fixture(scope="module", params=HERE)
@@ -230,7 +230,7 @@ def test_the_command_writes_the_scores(
     ids=lambda one: one.name,
 )
 def test_our_bands_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Path) -> None:
-    outcome = run(Identified(), load(known, None, tmp_path))
+    outcome = run(Identified(), split_of(known, None, tmp_path))
     assert scores(outcome).inside_95.mean() >= 0.85
     several = numbers(outcome)
     assert len(several) == 20
