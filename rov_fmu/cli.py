@@ -364,13 +364,11 @@ def _fly(
     if identified and not recording:
         raise click.UsageError("fly: --identified needs --recording, the log that it is about")
     with _warnings_printed():
-        written = write_fly_page(
-            [vehicle, against] if against else [vehicle], recording, identified, output, force=force
-        )
+        files = write_fly_page([vehicle, against] if against else [vehicle], recording, identified, output, force=force)
     if output:
-        print_end(written, "open it in a browser")
+        print_end(files, "open it in a browser")
     else:
-        open_in_browser(next(iter(written)), "-o PAGE.html")
+        open_in_browser(next(iter(files)), "-o PAGE.html")
 
 
 # ---- sitl ------------------------------------------------------------------------------------------------------------
@@ -658,7 +656,7 @@ def _identify(
         _inspect_logs(tests, report, drafts=drafts, force=force)
         return
     with parts() as shown:
-        identification, written = identify_tests(tests, output, report, mcap, base=base, force=force, begin=shown.begin)
+        identification, files = identify_tests(tests, output, report, mcap, base=base, force=force, begin=shown.begin)
     print_identification(identification)
     name = identification.vehicle.identifier
     given = ["--base", shipped_name(base) or base] if base else []
@@ -666,7 +664,7 @@ def _identify(
     following = shell_words("rov-fmu", *(("build", output) if output else whole))
     if by_heading(identification.findings)["Warnings"]:
         following = f"check the warnings, then {following}"
-    print_end(written, following)
+    print_end(files, following)
 
 
 # ---- inspect ---------------------------------------------------------------------------------------------------------
@@ -692,13 +690,13 @@ def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, f
     from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_log import print_inspected
 
-    inspected, written = inspect_tests(tests, report, drafts=drafts, force=force)
+    inspected, files = inspect_tests(tests, report, drafts=drafts, force=force)
     print_inspected(inspected, with_draft=not drafts)
-    is_new = inspected.path in written and not inspected.own
+    is_new = inspected.path in files and not inspected.own
     steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
     if not (drafts or inspected.is_enough):
         steps = [shell_words("rov-fmu", "inspect", *tests, "--draft")]
-    print_end(written, ", then ".join(steps))
+    print_end(files, ", then ".join(steps))
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------
@@ -747,12 +745,12 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     from rov_fmu.report.console import print_end, shell_words
     from rov_fmu.report.console_results import print_tuning
 
-    tuning, written = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
+    tuning, files = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
     print_tuning(tuning)
     for message in sentences(implausible(tuning)):
         _warn(message)
     following = shell_words("rov-fmu", "build", output) if output else "add -o TUNED.toml to write the tuned vehicle"
-    print_end(written, following)
+    print_end(files, following)
 
 
 # ---- schema, tables --------------------------------------------------------------------------------------------------

@@ -44,8 +44,8 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
     except OSError as error:
         _end_output()
         about = one_line(os.fsdecode(error.filename or "the output, or a temporary file"))
-        written = isinstance(error, WriteError) or not error.filename
-        reason = f"{'cannot be written: ' if written else ''}{one_line(error.strerror or str(error))}"
+        is_output = isinstance(error, WriteError) or not error.filename
+        reason = f"{'cannot be written: ' if is_output else ''}{one_line(error.strerror or str(error))}"
         return _print_error(program, f"{about}: {reason}", codes[OSError])
     except tuple(codes) as error:
         text = one_line(error.format_message()) if isinstance(error, ClickException) else str(error)

@@ -43,10 +43,10 @@ class Command:
 
     def arguments(self, target: Path, *more: str, fmu: str = "") -> list[str]:
         """Return the words of the command line for the path of that file, and further words."""
-        places = {f"{{f}}/{self.name}": str(target), "{f}": str(target.parent), "{fmu}": fmu}
+        paths = {f"{{f}}/{self.name}": str(target), "{f}": str(target.parent), "{fmu}": fmu}
         words = split(self.line)
-        for name, place in places.items():
-            words = [word.replace(name, place) for word in words]
+        for name, path in paths.items():
+            words = [word.replace(name, path) for word in words]
         return [*words, *more]
 
     def run(self, target: Path) -> int:

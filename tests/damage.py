@@ -125,7 +125,7 @@ def changed_toml(content: bytes, data: st.DataObject) -> bytes:
 def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
     """Return a TOML file with other numbers in place of some of its numbers."""
     document = toml_of(content.decode())
-    places: list[tuple[Any, Any, float]] = []
+    numbers: list[tuple[Any, Any, float]] = []
     tables: list[Any] = [document]
     while tables:
         table = tables.pop()
@@ -133,9 +133,9 @@ def changed_numbers(content: bytes, data: st.DataObject) -> bytes:
             if isinstance(value, dict | list):
                 tables.append(value)
             elif type(value) in (int, float):
-                places.append((table, key, value))
+                numbers.append((table, key, value))
     for _ in range(data.draw(st.integers(1, 3))):
-        table, key, value = data.draw(st.sampled_from(places))
+        table, key, value = data.draw(st.sampled_from(numbers))
         table[key] = value * data.draw(SIZES) if data.draw(st.booleans()) else data.draw(NUMBERS)
     return tomlkit.dumps(document).encode()
 

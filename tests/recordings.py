@@ -132,5 +132,5 @@ def run(k: Vehicle, axis: Axis, plan: Plan, rate: float) -> Run:
     time = np.arange(len(command)) / rate
     thrusters = {name.removeprefix("u_"): sign * command for name, sign in k.layout.signs(axis).items()}
     motion = swim(k, time, thrusters)
-    place = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
-    return Run(axis, time, command, motion[axis.velocity], motion[place])
+    position = {"surge": "x", "sway": "y", "heave": "z", "yaw": "psi"}[axis.name]
+    return Run(axis, time, command, motion[axis.velocity], motion[position])

@@ -101,7 +101,7 @@ class ChildProcess:
         self._answers: SimpleQueue[Any] = SimpleQueue()
         self._open = ExitStack()
         folder = self._open.enter_context(temporary_folder("rov-fmu-child-", temporary))
-        places = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "SQLITE_TMPDIR"), folder)
+        folders = dict.fromkeys(("TMPDIR", "TEMP", "TMP", "SQLITE_TMPDIR"), folder)
         # A thread of OpenBLAS for each processor would reserve some 40 MB each.
         threads = {"OPENBLAS_NUM_THREADS": "1"} if limits.memory else {}
         with UNINTERRUPTED:
@@ -109,7 +109,7 @@ class ChildProcess:
                 [sys.executable, "-c", _PROGRAM.format([*map(os.path.abspath, sys.path)])],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                env={**os.environ, **places, **threads},
+                env={**os.environ, **folders, **threads},
                 cwd=folder,
                 start_new_session=True,
             )

@@ -19,9 +19,9 @@ from rov_fmu.io.csv_table import (
     FindGrown,
     Mistakes,
     OpenStream,
-    TornRows,
     is_blank,
     number_of,
+    read_numbers,
 )
 from rov_fmu.io.messages import MOST, brief, did_you_mean, shown, similar
 
@@ -92,8 +92,8 @@ class Columns:
     def error(self, row: int, column: str, reason: str) -> DataFileError:
         """Return the error about a cell that is wrong."""
         text = next(islice(self.rows(), row, None))[column]
-        place = f"line {self.lines[row]}, column {shown(self.headers[column])}"
-        return DataFileError(f"{self.path}, {place} = {brief(text)}: {reason}")
+        where = f"line {self.lines[row]}, column {shown(self.headers[column])}"
+        return DataFileError(f"{self.path}, {where} = {brief(text)}: {reason}")
 
 
 @dataclass(frozen=True)
@@ -136,14 +136,15 @@ def read_columns(
     line, titles = next(iter(file))
     header = [*map(renamed.get, titles, titles)]
     file_columns = _find_columns(path, line, header, columns, others, hint)
-    headers = {column.name: header[place] for place, column in file_columns.items()}
+    headers = {column.name: header[index] for index, column in file_columns.items()}
     wrong = Mistakes(path)
     for reason in check_header(headers, _others(header, file_columns)):
         wrong.add(f"{path}, line {line}: {reason}")
     wrong.check()
-    values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+    cells = {index: (column.name, partial(_value, column, loose)) for index, column in file_columns.items()}
+    values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
     if torn.count and file.align(grown):
-        values, lines, unread, torn = _numbers(file, header, file_columns, loose)
+        values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
     if torn.count > len(lines):
         raise DataFileError(file.too_many(torn))
     if not lines:
@@ -163,36 +164,6 @@ def read_columns(
     )
 
 
-def _numbers(
-    file: CsvFile, header: Sequence[str], file_columns: Mapping[int, FileColumn], loose: bool
-) -> tuple[dict[str, "array[float]"], "array[int]", dict[str, "array[int]"], TornRows]:
-    """Return the numbers by column, the line of each row, the rows by column whose cells are unread, and the rows with
-    too many cells. Raises DataFileError."""
-    path = file.path
-    torn, wrong = TornRows(len(header)), Mistakes(path)
-    values = {column.name: array("d") for column in file_columns.values()}
-    lines = array("L")
-    unread = {name: array("L") for name in values}
-    for line, cells in islice(file, 1, None):
-        if len(cells) > len(header):
-            torn.add(line, cells)
-            continue
-        lines.append(line)
-        for (place, column), cell in zip(file_columns.items(), _by_column(cells, file_columns).values(), strict=True):
-            try:
-                value = _value(cell, place < len(cells), column, loose)
-            except ValueError as error:
-                wrong.add(f"{path}, line {line}, column {shown(header[place])}{_content(cell)}: {error}")
-                continue
-            values[column.name].append(value)
-            if isnan(value) and not is_blank(cell):
-                unread[column.name].append(len(lines) - 1)
-    if torn.count and not loose:
-        wrong.add(file.too_many(torn))
-    wrong.check()
-    return values, lines, unread, torn
-
-
 def _rows(file: CsvFile, file_columns: Mapping[int, FileColumn], width: int) -> Iterator[Mapping[str, str]]:
     """Yield the cells of each row that has not more of them than the header, by column."""
     return (_by_column(cells, file_columns) for _, cells in islice(file, 1, None) if len(cells) <= width)
@@ -205,10 +176,10 @@ def _content(cell: str) -> str:
 
 def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict[str, str]:
     """Return the cells of a row that are read, by column. One that the row does not have is empty."""
-    return {column.name: cells[place] if place < len(cells) else "" for place, column in file_columns.items()}
+    return {column.name: cells[index] if index < len(cells) else "" for index, column in file_columns.items()}
 
 
-def _value(text: str, exists: bool, file_column: FileColumn, loose: bool) -> float:
+def _value(file_column: FileColumn, loose: bool, text: str, exists: bool) -> float:
     """Return the number of a cell in the first unit. Raises ValueError with only the reason.
 
     `exists` is False for a cell that its row does not have.
@@ -267,15 +238,15 @@ def _find_columns(
     file_columns: dict[int, FileColumn] = {}
     names: set[str] = set()
     wrong = []
-    for place, title in enumerate(header):
+    for index, title in enumerate(header):
         try:
             if column := known.find(title, others):
                 if column.name in names:
                     raise ValueError("this column occurs twice")
-                file_columns[place] = column
+                file_columns[index] = column
                 names.add(column.name)
         except ValueError as error:
-            wrong.append(f"{path}, line {line}, column {place + 1} = {shown(title)}: {error}")
+            wrong.append(f"{path}, line {line}, column {index + 1} = {shown(title)}: {error}")
     missing = {name: column for name, column in columns.items() if name not in names and not column.optional}
     if missing and not wrong:
         reason = _what_lacks(missing, _others(header, file_columns), hint)
@@ -295,7 +266,7 @@ def _why_no_header(header: Sequence[str], columns: Mapping[str, Column], hint: s
 
 def _others(header: Sequence[str], read: Container[int]) -> list[str]:
     """Return the headers of the columns that are not read."""
-    return [title for place, title in enumerate(header) if place not in read]
+    return [title for index, title in enumerate(header) if index not in read]
 
 
 def _what_lacks(missing: Mapping[str, Column], others: Iterable[str], hint: str) -> str:

@@ -16,8 +16,8 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from io import BytesIO, TextIOWrapper
-from itertools import islice, zip_longest
-from math import isfinite, nan
+from itertools import islice
+from math import isfinite, isnan, nan
 from pathlib import Path
 from typing import NamedTuple, TextIO
 
@@ -76,41 +76,69 @@ def read_series(
 
     `why_wrong` returns what is wrong with the name of a variable, or None. Names have no units. Each cell must be a
     finite number, true or false. Raises DataFileError with all mistakes. `open_stream` opens the lines if `path` is not
-    the file itself, but words for its place in an archive.
+    the file itself, but words for its path in an archive.
     """
     file = CsvFile(path, open_stream)
-    lines = iter(file)
-    line, header = next(lines)
+    line, header = next(iter(file))
     if all(NUMBER.fullmatch(name) for name in header):
         words = "the first line must be a header that names the columns: the time, and then variables"
         raise DataFileError(f"{path}: {words}")
     wrong = Mistakes(path)
-    for place, name in enumerate(header):
-        if reason := _why_no_variable(header, place, why_wrong):
+    for index, name in enumerate(header):
+        if reason := _why_no_variable(header, index, why_wrong):
             wrong.add(f"{path}, line {line}, column {shown(name)}: {reason}")
     wrong.check()
-    series, numbers, torn = Series({name: array("d") for name in header}), array("L"), TornRows(len(header))
-    for line, cells in lines:
-        numbers.append(line)
+    columns = {index: (name, lambda cell, _: finite(cell)) for index, name in enumerate(header)}
+    values, lines, _, _ = read_numbers(file, header, columns, lambda cell: f" = {shown(cell)}")
+    times = values[header[0]]
+    for line, before, time in zip(lines[1:], times, times[1:], strict=False):
+        if time < before:
+            raise DataFileError(f"{path}, line {line}: the time goes back")
+    if not lines or len(header) < 2:
+        raise DataFileError(f"{path}: {'no columns beside the time' if lines else NO_ROWS}")
+    series = Series(values)
+    series.lines = lines
+    return series
+
+
+def read_numbers(
+    file: "CsvFile",
+    header: Sequence[str],
+    columns: Mapping[int, tuple[str, Callable[[str, bool], float]]],
+    content: Callable[[str], str],
+    *,
+    loose: bool = False,
+) -> tuple[dict[str, "array[float]"], "array[int]", dict[str, "array[int]"], "TornRows"]:
+    """Return the numbers by column, the line of each row, the rows by column whose cells are unread, and the rows with
+    too many cells, which are a mistake unless the table is `loose`. Raises DataFileError with all mistakes.
+
+    `columns` has the name of each column that is read, by its index in the header, and returns the number of a cell. It
+    is told whether the row has this cell, and raises ValueError with only the reason. `content` returns the content of
+    a cell for a message.
+    """
+    torn, wrong = TornRows(len(header)), Mistakes(file.path)
+    values = {name: array("d") for name, _ in columns.values()}
+    lines, unread = array("L"), {name: array("L") for name in values}
+    for line, cells in islice(file, 1, None):
         if len(cells) > len(header):
             torn.add(line, cells)
             continue
-        for name, cell in zip_longest(header, cells, fillvalue=""):
+        lines.append(line)
+        for index, (name, number) in columns.items():
+            exists = index < len(cells)
+            cell = cells[index] if exists else ""
             try:
-                series[name].append(finite(cell))
+                value = number(cell, exists)
             except ValueError as error:
-                wrong.add(f"{path}, line {line}, column {shown(name)} = {shown(cell)}: {error}")
-    if torn.count:
+                wrong.add(f"{file.path}, line {line}, column {shown(header[index])}{content(cell)}: {error}")
+                continue
+            values[name].append(value)
+            if isnan(value) and not is_blank(cell):
+                unread[name].append(len(lines) - 1)
+    if torn.count and not loose:
         wrong.add(file.too_many(torn))
     wrong.check()
-    times = series[header[0]]
-    for line, before, time in zip(numbers[1:], times, times[1:], strict=False):
-        if time < before:
-            raise DataFileError(f"{path}, line {line}: the time goes back")
-    if not numbers or len(header) < 2:
-        raise DataFileError(f"{path}: {'no columns beside the time' if numbers else NO_ROWS}")
-    series.lines = numbers
-    return series
+    return values, lines, unread, torn
 
 
 def finite(text: str) -> float:
@@ -271,8 +299,8 @@ class TornRows:
             self.line, self.cells = line, cells
 
 
-Places = Mapping[int, Sequence[int | None]]
-"""The place of each column of the header in rows with so many cells, if they have more than the header."""
+Indices = Mapping[int, Sequence[int | None]]
+"""The index of each column of the header in rows with so many cells, if they have more than the header."""
 Lines = Iterator[tuple[int, list[str]]]
 """The lines of a table, each with its number and its cells."""
 
@@ -280,9 +308,9 @@ Lines = Iterator[tuple[int, list[str]]]
 class Grown(NamedTuple):
     """Where the columns of the header are in rows that have more cells."""
 
-    places: Places
+    indices: Indices
     left_out: int
-    """The number of rows that are left out because the places of their columns are unknown."""
+    """The number of rows that are left out because the indices of their columns are unknown."""
     words: Mapping[str, str | float]
     """The words of the finding about it."""
 
@@ -299,9 +327,9 @@ class CsvFile:
         self._open = open_stream or open_text(Path(path))
         self._dialect = _dialect(self._open())
         self._has_decimal_commas = self._dialect.separator != "," or _has_decimal_commas(self._open())
-        self._places: Places = {}
+        self._indices: Indices = {}
         self.left_out = 0
-        """The number of rows that are left out because the places of their columns are unknown."""
+        """The number of rows that are left out because the indices of their columns are unknown."""
         self.assumed: dict[str, Mapping[str, str | float]] = {}
         """What was assumed, as the kind of a finding with its words."""
         if getattr(self._open(), "encoding", "") == _CODE_PAGE:
@@ -322,11 +350,11 @@ class CsvFile:
         """
         width, is_grown = 0, False
         for line, row in self._rows():
-            places = self._places.get(len(row))
-            is_grown = is_grown or places is not None
-            if is_grown and places is None:
+            indices = self._indices.get(len(row))
+            is_grown = is_grown or indices is not None
+            if is_grown and indices is None:
                 continue
-            cells = ["" if place is None else row[place] for place in places] if places else row
+            cells = ["" if index is None else row[index] for index in indices] if indices else row
             while len(cells) > width and not cells[-1]:
                 cells.pop()
             width = width or len(cells)
@@ -353,7 +381,7 @@ class CsvFile:
     def align(self, grown: FindGrown) -> bool:
         """Find the columns of the header in rows that have more cells from some line on. Return True if they are."""
         if found := grown(self._rows()):
-            self._places, self.left_out, self.assumed["grown rows"] = found
+            self._indices, self.left_out, self.assumed["grown rows"] = found
         return bool(found)
 
     def too_many(self, torn: TornRows) -> str:
@@ -364,8 +392,8 @@ class CsvFile:
             hint += (
                 f", and {torn.count} rows have more cells than the header, which has {torn.most}. Complete the header"
             )
-        place = f"line {torn.line}, column {torn.most + 1} = {shown(torn.cells[torn.most])}"
-        return f"{self.path}, {place}: there is no such column{hint}"
+        where = f"line {torn.line}, column {torn.most + 1} = {shown(torn.cells[torn.most])}"
+        return f"{self.path}, {where}: there is no such column{hint}"
 
 
 # ---- Cells -----------------------------------------------------------------------------------------------------------
@@ -382,13 +410,13 @@ def number_of(text: str) -> float | None:
     return number if isfinite(number) else None
 
 
-def _why_no_variable(header: Sequence[str], place: int, why_wrong: Callable[[str], str | None]) -> str | None:
+def _why_no_variable(header: Sequence[str], index: int, why_wrong: Callable[[str], str | None]) -> str | None:
     """Return what is wrong with a name above a column of variables over time, or None."""
-    name = header[place]
-    if name in header[:place]:
+    name = header[index]
+    if name in header[:index]:
         return "this column occurs twice"
-    if place and _UNIT.search(name):
+    if index and _UNIT.search(name):
         return f"must be {shown(_UNIT.sub('', name))} without a unit; a command of 30 % is 0.3 here"
     if (unit := _UNIT.search(name)) and unit[0] != " [s]":
         return "must be the time in s, which is the unit here"
-    return why_wrong(name) if place else None
+    return why_wrong(name) if index else None

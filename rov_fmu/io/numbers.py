@@ -28,15 +28,15 @@ def with_interval(value: float, interval: tuple[float, float] | None, digits: in
     if low <= 0.0 <= high and abs(value) < _NEAR_ZERO * width:
         value = 0.0
     if width > _EXACT * abs(value) and all(map(isfinite, (value, low, high))):
-        place, digits = floor(log10(width / _WIDTH_IN_UNITS)), 2
-        if abs(value) >= 10.0 ** (place + 1):
-            return _rounded(value, place), _rounded(low, place), _rounded(high, place)
+        exponent, digits = floor(log10(width / _WIDTH_IN_UNITS)), 2
+        if abs(value) >= 10.0 ** (exponent + 1):
+            return _rounded(value, exponent), _rounded(low, exponent), _rounded(high, exponent)
     return significant(value, digits), significant(low, digits), significant(high, digits)
 
 
-def _rounded(number: float, place: int) -> str:
+def _rounded(number: float, exponent: int) -> str:
     """Return a number rounded to a multiple of a power of ten: 36.98 for 36.982 and -2."""
-    return _plain(+Decimal(number).quantize(Decimal(1).scaleb(place)))  # the sign makes 0 of -0
+    return _plain(+Decimal(number).quantize(Decimal(1).scaleb(exponent)))  # the sign makes 0 of -0
 
 
 def significant(number: float, digits: int) -> str:

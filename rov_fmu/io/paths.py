@@ -47,10 +47,10 @@ def inside(folder: Path, name: str) -> Path:
     on_windows = PureWindowsPath(name)
     if not name or "\0" in name or "\\" in name or on_windows.drive or on_windows.root:
         raise ValueError("must be a relative path with / between its parts, without a drive, a backslash or a NUL")
-    place = folder / name
-    if not Path(os.path.realpath(place)).is_relative_to(os.path.realpath(folder)):
+    path = folder / name
+    if not Path(os.path.realpath(path)).is_relative_to(os.path.realpath(folder)):
         raise ValueError("must lead to a place inside the folder of this file, after links are followed")
-    return place
+    return path
 
 
 def inside_or_shipped(folder: Path, name: str) -> Path:
@@ -58,16 +58,16 @@ def inside_or_shipped(folder: Path, name: str) -> Path:
 
     If nothing is there, return the path of this name among the shipped vehicles.
     """
-    place, shipped = inside(folder, name), inside(MODELS, name)
-    return shipped if os.path.lexists(shipped) and not os.path.lexists(place) else place
+    path, shipped = inside(folder, name), inside(MODELS, name)
+    return shipped if os.path.lexists(shipped) and not os.path.lexists(path) else path
 
 
-def name_of(place: Path, folder: Path) -> str:
+def name_of(path: Path, folder: Path) -> str:
     """Return the name that `inside_or_shipped` turns into this path. Raises ValueError if there is none."""
-    real = Path(os.path.realpath(place.parent), place.name)
+    real = Path(os.path.realpath(path.parent), path.name)
     for top in (folder, MODELS):
         if real.is_relative_to(os.path.realpath(top)):
             name = real.relative_to(os.path.realpath(top)).as_posix()
             inside(top, name)
             return name
-    raise ValueError(f"{place} is not inside the folder of this file")
+    raise ValueError(f"{path} is not inside the folder of this file")

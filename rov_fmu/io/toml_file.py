@@ -68,7 +68,7 @@ _MOST_SIGNS = 200_000
 """The most keys, parts of keys and values, for which the parsers take up to 1 kB each."""
 Checked = TypeVar("Checked", bound=Strict)
 Toml = dict[str, Any]
-_Place = tuple[int | str, ...]
+_Keys = tuple[int | str, ...]
 _DECIMAL_COMMA = re.compile(r"^[^#\[]*=\s*[-+]?\d+,\d")
 """The beginning of a line that has a number with a decimal comma, outside a list."""
 
@@ -113,13 +113,13 @@ _ENDS = {
 
 def _outside_strings(text: str) -> Iterator[str]:
     """Yield the parts of a TOML file between its strings and comments."""
-    place = 0
-    while start := _STRING.search(text, place):
-        yield text[place : start.start()]
+    offset = 0
+    while start := _STRING.search(text, offset):
+        yield text[offset : start.start()]
         ends = _ENDS[start[0]].finditer(text, start.end())
         end = next((one for one in ends if not one[0].startswith("\\")), None)
-        place = len(text) if end is None else end.end() - (end[0] == "\n")
-    yield text[place:]
+        offset = len(text) if end is None else end.end() - (end[0] == "\n")
+    yield text[offset:]
 
 
 def parse_toml(path: Path, content: bytes, failure: type[FileError]) -> Toml:
@@ -206,8 +206,8 @@ def problem_lines(problems: Sequence[ErrorDetails], data: Toml, model: type[Stri
     A mistake that several entries of a list of tables repeat gives one line. After the first ten the lines are empty,
     because it takes long to find the most similar key for many unknown ones.
     """
-    places = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
-    unknown = grouped((place[:-1], place) for place in places)  # the places of the unknown keys of each table
+    extra = [problem["loc"] for problem in problems if problem["type"] == "extra_forbidden"]
+    unknown = grouped((keys[:-1], keys) for keys in extra)  # those of each table
     number = 0
     for some in grouped((_mistake(problem), problem) for problem in problems).values():
         if number == MOST:
@@ -240,10 +240,10 @@ def entry_label(table: str, entries: Sequence[Any], number: int) -> str:
     return f"{table}.{name or repr('')}" if is_unique else f"{table}#{number + 1}"
 
 
-def _declared(model: type[Strict], place: _Place) -> Any:
-    """Return the type that a model declares for a place in the file, such as a table, a list or a Literal."""
+def _declared(model: type[Strict], keys: _Keys) -> Any:
+    """Return the type that a model declares for a path of keys in the file, such as a table, a list or a Literal."""
     kind: Any = model
-    for step in place:
+    for step in keys:
         if _is_table(kind):
             field = _fields(kind).get(str(step))
             others = kind.__annotations__.get("__pydantic_extra__", dict[str, Any])
@@ -273,11 +273,11 @@ def _constant(kind: Any) -> Any:
     return choices[0] if len(choices) == 1 else None
 
 
-def _syntax(model: type[Strict], place: _Place) -> str:
-    """Return how to write the table, or the list of tables, at a place."""
-    kind = _declared(model, place)
-    key = brief(".".join(str(step) for step in place if isinstance(step, str)))
-    if get_origin(kind) in (list, tuple) or isinstance(place[-1], int):
+def _syntax(model: type[Strict], keys: _Keys) -> str:
+    """Return how to write the table, or the list of tables, at a path of keys."""
+    kind = _declared(model, keys)
+    key = brief(".".join(str(step) for step in keys if isinstance(step, str)))
+    if get_origin(kind) in (list, tuple) or isinstance(keys[-1], int):
         return f"a list of tables: write [[{key}]]"
     if "value" not in _fields(kind):
         return f"a table: write [{key}]"
@@ -295,25 +295,25 @@ def _mistake(problem: ErrorDetails) -> tuple[object, ...]:
     return problem["type"], key, *last, problem["msg"], value
 
 
-def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Place], model: type[Strict]) -> bool:
+def _is_misspelt(problem: ErrorDetails, unknown: Sequence[_Keys], model: type[Strict]) -> bool:
     """Return True when a key is missing, and one of the unknown keys of its table is probably this key, misspelt."""
     if problem["type"] != "missing" or not unknown:
         return False
     *above, key = problem["loc"]
     allowed = _fields(_declared(model, tuple(above)))
-    return any(similar(str(place[-1]), allowed) == [key] for place in unknown[:_COMPARED])
+    return any(similar(str(keys[-1]), allowed) == [key] for keys in unknown[:_COMPARED])
 
 
 def _problem_line(problem: ErrorDetails, data: Toml, model: type[Strict]) -> str:
     """Return the line for one problem."""
-    place, kind, value = problem["loc"], problem["type"], problem["input"]
-    *above, last = place
+    keys, kind, value = problem["loc"], problem["type"], problem["input"]
+    *above, last = keys
     is_table = isinstance(value, dict)
-    key = brief(_key(place, data))
-    if isinstance(last, int) and (kind == "missing" or not (is_table or _is_table(_declared(model, place)))):
+    key = brief(_key(keys, data))
+    if isinstance(last, int) and (kind == "missing" or not (is_table or _is_table(_declared(model, keys)))):
         return _entry_line(problem, last, data, model)
     if kind == "missing":
-        constant = _constant(_declared(model, place))
+        constant = _constant(_declared(model, keys))
         return f"{key}: this key is missing" + (f": write {last} = {json.dumps(constant)}" if constant else "")
     if kind == "extra_forbidden":
         allowed = _fields(_declared(model, tuple(above)))
@@ -340,11 +340,11 @@ def _entry_line(problem: ErrorDetails, number: int, data: Toml, model: type[Stri
 
 def _reason(problem: ErrorDetails, model: type[Strict]) -> str:
     """Return what is allowed where the problem is."""
-    kind, place = problem["type"], problem["loc"]
-    if kind in ("model_type", "dict_type") or (kind == "list_type" and _is_table(_declared(model, (*place, 0)))):
-        return f"must be {_syntax(model, place)}"
+    kind, keys = problem["type"], problem["loc"]
+    if kind in ("model_type", "dict_type") or (kind == "list_type" and _is_table(_declared(model, (*keys, 0)))):
+        return f"must be {_syntax(model, keys)}"
     if kind == "literal_error":
-        choices = map(str, get_args(_declared(model, place)))
+        choices = map(str, get_args(_declared(model, keys)))
         return problem["msg"].replace("Input should", "must") + did_you_mean(str(problem["input"]), choices)
     if kind == "float_type" and type(problem["input"]) is int:
         return "must be a number of at most 308 digits"
@@ -354,10 +354,10 @@ def _reason(problem: ErrorDetails, model: type[Strict]) -> str:
     return _PYDANTIC_START.sub("must ", message).replace(" after validation", "")
 
 
-def _key(place: _Place, data: Any) -> str:
-    """Return a place in the file as a dotted key; an entry of a list of tables has its name or its number."""
+def _key(keys: _Keys, data: Any) -> str:
+    """Return a path of keys in the file as a dotted key; an entry of a list of tables has its name or its number."""
     key = ""
-    for step in place:
+    for step in keys:
         if step == "[key]":  # pydantic adds this step if the problem is with the key itself
             continue
         key = entry_label(key, data, step) if isinstance(step, int) else f"{key}.{step or repr('')}"

@@ -79,8 +79,8 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
         }
         for classification in root.iterfind("{*}Classification")
     }
-    before = entries.get(ARCHIVE, {}).get(BEFORE, "")
-    return MetaData(entries.get(FILES, {}), entries.get(INPUTS, {}), entries.get(GENERATOR, {}), before)
+    files, inputs, generator = (entries.get(kind, {}) for kind in (FILES, INPUTS, GENERATOR))
+    return MetaData(files, inputs, generator, entries.get(ARCHIVE, {}).get(BEFORE, ""))
 
 
 def _changes(archive: zipfile.ZipFile, evidence: MetaData) -> Iterator[str]:
@@ -103,10 +103,11 @@ def _changes(archive: zipfile.ZipFile, evidence: MetaData) -> Iterator[str]:
     file.seek(0)
     before = hash_of(file, "sha3_256", entry.header_offset).hex()
     if before != evidence.before or file.read(len(expected) + 1) != expected:
-        if evidence.before:
-            yield "the archive was altered after the FMU was built, although its files are the same"
-        else:
-            yield "the archive has no hash, because an earlier rov-fmu built it: build it again"
+        yield (
+            "the archive was altered after the FMU was built, although its files are the same"
+            if evidence.before
+            else "the archive has no hash, because an earlier rov-fmu built it: build it again"
+        )
 
 
 def _hash(archive: zipfile.ZipFile, name: str) -> str:

@@ -16,7 +16,7 @@ from rov_fmu.io.reading import root_of_xml, too_large
 
 TIME_LIMIT = 60.0
 """The seconds that an FMU may take to be loaded and to run one experiment, if nothing else is given."""
-MEMORY, DISK = 4_000_000_000, 1_000_000_000
+_MEMORY, _DISK = 4_000_000_000, 1_000_000_000
 """The address space of the process of an FMU and the size of each file that it writes, in bytes (Linux)."""
 _DESCRIPTION = "modelDescription.xml"
 _MOST_VARIABLES = 100_000
@@ -24,8 +24,9 @@ _MOST_VARIABLES = 100_000
 _MOST_BYTES = 40_000_000
 """The largest size of a file of XML that FMPy reads."""
 _LARGEST = {
-    **dict.fromkeys(("nominal", "factor", "offset", "gain"), float_info.max),
-    **dict.fromkeys(("startTime", "stopTime", "tolerance", "stepSize"), float_info.max),
+    **dict.fromkeys(
+        ("nominal", "factor", "offset", "gain", "startTime", "stopTime", "tolerance", "stepSize"), float_info.max
+    ),
     **dict.fromkeys(("min", "max"), inf),  # and no NaN
     **dict.fromkeys(("numberOfEventIndicators", "numberOfContinuousStates"), _MOST_VARIABLES),
     **dict.fromkeys(("kg", "m", "s", "A", "K", "mol", "cd", "rad"), 1000),
@@ -38,14 +39,18 @@ _HARMLESS = re.compile(
 """Mistakes that many exporters make, and that nothing depends on."""
 
 
+def budget(time: float) -> Limits:
+    """Return the limits of the process of an FMU that may take so many seconds."""
+    return Limits(time=time, memory=_MEMORY, disk=_DISK)
+
+
 def read_description(fmu: Path, folder: Path) -> Any:
     """Return FMPy's description of an unpacked FMU. Raises FileError, which names the FMU by the path `fmu`.
 
     What the schema of FMI forbids is refused, because other code relies on the types of the attributes.
     """
-    limits = Limits(time=TIME_LIMIT, memory=MEMORY, disk=DISK)
     try:
-        with closing(ChildProcess(Functions, limits=limits)) as child:
+        with closing(ChildProcess(Functions, limits=budget(TIME_LIMIT))) as child:
             return child.call("call", described, str(folder))
     except Exception as error:  # what FMPy raises, of which pickle may make another kind
         reason = f"FMPy {error}" if isinstance(error, ChildError) else brief(reason_of(error), 240)

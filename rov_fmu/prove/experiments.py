@@ -2,8 +2,8 @@
 
 import posixpath
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cache, partial
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -78,7 +78,7 @@ class _Member:
         is_outside = path.startswith(("..", "/")) or any(c in path for c in "\\:\0")
         if not parts.path or parts.scheme or parts.netloc or is_outside:
             raise self.error(f"source = {shown(source)} does not lead to a file in the FMU")
-        return _Member(self.fmu, self.folder, path)
+        return replace(self, path=path)
 
     def text(self) -> str:
         """Return the text in this file. Raises FileError."""
@@ -111,8 +111,8 @@ def read_experiments(fmu: Path, folder: Path, description: Any) -> list[Experime
     manifest = _Member(fmu, folder, MANIFEST)
     if not Path(folder, MANIFEST).is_file():
         raise NoResultsError(f"{manifest}: there is no such file: the FMU carries no reference results")
-    reader = _Reader({v.name: v for v in description.modelVariables}, description.defaultExperiment)
-    experiments: list[Experiment] = []
+    reader = _Reader(description)
+    experiments = list[Experiment]()
     for related in manifest.xml("fmiReferences").iterfind("{*}Related"):
         role, _, purpose = related.get("role", "").partition("/")
         if role == "experiment" and purpose != "uncertainty-analysis":
@@ -127,11 +127,11 @@ def read_experiments(fmu: Path, folder: Path, description: Any) -> list[Experime
 class _Reader:
     """The files of the experiments of an FMU. All methods raise FileError."""
 
-    def __init__(self, variables: Mapping[str, Any], default: Any) -> None:
-        """`variables` are FMPy's variables by name, and `default` is the default experiment of the FMU."""
-        self._variables, self._default = variables, default
-        self._read_series: dict[str, Series] = {}
-        """The CSV files by their path, because many experiments may have the same one."""
+    def __init__(self, description: Any) -> None:
+        """`description` is FMPy's description of the FMU."""
+        self._variables, self._default = {v.name: v for v in description.modelVariables}, description.defaultExperiment
+        self._series = cache(self._read_series)
+        """Returns the content of a CSV file, which many experiments may have."""
 
     def read(self, member: _Member) -> Iterator[Experiment]:
         """Read a file of experiments."""
@@ -140,8 +140,7 @@ class _Reader:
             where = f"experiment {shown(name)}"
             parts = {etree.QName(child).localname: child for child in element if isinstance(child.tag, str)}
             parts.pop("Annotations", None)
-            unknown = parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References"}
-            if unknown:
+            if unknown := parts.keys() - {"TransientSimulation", "Parameters", "Stimuli", "References"}:
                 raise member.error(f"{where}: {', '.join(sorted(unknown))} cannot be run")
             # drafts after 1.0.0-beta.1 have the times in a child element
             given = {**element.attrib, **getattr(parts.pop("TransientSimulation", None), "attrib", {})}
@@ -170,16 +169,16 @@ class _Reader:
             name, value = element.get("name", ""), next(iter(element), None)
             if not (variable := self._variables.get(name)):
                 raise member.error(f"the FMU has no variable {shown(name)}")
-            if value is None or value.get("value") is None:
+            if value is None or (text := value.get("value")) is None:
                 raise member.error(f"parameter {shown(name)}: has no value")
-            if value.get("unit") not in (None, variable.unit):
-                raise member.error(f"parameter {shown(name)}: is in {value.get('unit')}, and not in {variable.unit}")
-            values[name] = value.get("value")
+            if (unit := value.get("unit")) not in (None, variable.unit):
+                raise member.error(f"parameter {shown(name)}: is in {unit}, and not in {variable.unit}")
+            values[name] = text
             if variable.type not in ("String", "Boolean"):
-                member.number(values[name], f"parameter {shown(name)}")
+                member.number(text, f"parameter {shown(name)}")
         return values
 
-    def _series(self, member: _Member) -> Series:
+    def _read_series(self, member: _Member) -> Series:
         """Read a CSV file whose first column is the time and whose other columns are variables of the FMU."""
 
         def why_wrong(name: str) -> str | None:
@@ -189,11 +188,7 @@ class _Reader:
                 return "the variable is not a single number"
             return None
 
-        if member.path not in self._read_series:
-            self._read_series[member.path] = read_series(
-                str(member), why_wrong, partial(StringIO, member.text(), newline="")
-            )
-        return self._read_series[member.path]
+        return read_series(str(member), why_wrong, partial(StringIO, member.text(), newline=""))
 
 
 def _why_not_run(start: float, stop: float, step: float, tolerance: float) -> str:

@@ -1,7 +1,5 @@
 """What is measured of an FMU, one function for each claim. A function returns the evidence."""
 
-import hashlib
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, isfinite, nan
@@ -13,7 +11,7 @@ import numpy as np
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, listed
-from rov_fmu.prove.proof import SHARE_OF_NOMINAL, compare, nominal
+from rov_fmu.prove.proof import compare, least_divisor
 from rov_fmu.prove.runs import REAL, Answer, Array, RunError
 from rov_fmu.prove.subject import Subject
 
@@ -69,8 +67,8 @@ def expected(subject: Subject) -> Evidence:
     if not subject.experiments:
         return does_not_apply("the FMU carries no expected results (FMI-LS-REF)")
     findings = compare(subject)
-    by_experiment = grouped((f.experiment, f) for f in findings)
-    worst = [max(own, key=lambda f: f.deviation / f.tolerance) for own in by_experiment.values()]
+    of_each = grouped((f.experiment, f) for f in findings).values()
+    worst = [max(own, key=lambda f: f.deviation / f.tolerance) for own in of_each]
     wrong = [f for f in findings if not f.passed]
     tolerances, deviations = [f.tolerance for f in worst], [f.deviation for f in worst]
     words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(worst)} experiments are as expected"
@@ -100,7 +98,7 @@ def step_size(subject: Subject) -> Evidence:
     if not subject.description.coSimulation.canHandleVariableCommunicationStepSize:
         return does_not_apply("the FMU says that it needs communication steps of one size")
     plan, refused = subject.plan, ""
-    ends: dict[int, Array] = {}
+    ends = dict[int, Array]()
     with subject.runs() as child:
         for steps in (1, *_STEPS):
             try:
@@ -116,13 +114,17 @@ def step_size(subject: Subject) -> Evidence:
     begin = "one step" if least == 1 else f"{least} steps"
     words = f"{subject.words}: {listed(map(str, off))} communication steps in {pieces} end where {begin} ends, "
     words += f"within {in_short(largest)} of the largest value; {allowed:.0e} is allowed.{refused}"
-    curve: dict[str, Sequence[float]] = {"steps": [*off], "deviations": [*off.values()], "allowed": [allowed]}
-    return Evidence(holds_if(largest <= allowed), words[:1].upper() + words[1:], in_short(largest), curve=curve)
+    return Evidence(
+        holds_if(largest <= allowed),
+        words[:1].upper() + words[1:],
+        in_short(largest),
+        curve={"steps": [*off], "deviations": [*off.values()], "allowed": [allowed]},
+    )
 
 
 def _deviation(subject: Subject, values: Array, reference: Array) -> float:
     """Return the largest deviation, relative to the largest value of a variable or to 1 % of its nominal value."""
-    least = [SHARE_OF_NOMINAL * nominal(subject.variables[name]) for name in subject.plan.outputs]
+    least = [least_divisor(subject.variables[name]) for name in subject.plan.outputs]
     scale = np.maximum(np.abs(reference).max(axis=0), least)
     same = (values == reference) | (np.isnan(values) & np.isnan(reference))
     off = float(np.where(same, 0.0, np.abs(values - reference) / scale).max())
@@ -134,23 +136,21 @@ def repeatability(subject: Subject) -> Evidence:
     if subject.obstacle:
         return does_not_apply(subject.obstacle)
     plan = subject.plan
-    counts: Counter[bytes] = Counter()
-    first = None
-    largest = 0.0
+    first: Array | None = None
+    same, largest = 0, 0.0
     for _ in range(_PROCESSES):
         with subject.runs() as child:
             for _ in range(_RUNS // _PROCESSES):
                 values = child.call("run", plan, _STEPS_OF_RUN)
                 first = values if first is None else first
-                counts[hashlib.sha256(values.tobytes()).digest()] += 1
+                same += values.tobytes() == first.tobytes()
                 largest = max(largest, _deviation(subject, values, first))
     assert first is not None
-    same = next(iter(counts.values()))
     words = f"{same} of {_RUNS} runs of {subject.words} in {_PROCESSES} processes, with {first.size} numbers each, "
     words += "have the bits of the first one."
-    if len(counts) > 1:
+    if same < _RUNS:
         words += f" The others deviate by up to {in_short(largest)}."
-    return Evidence(holds_if(len(counts) == 1), words, f"{same} of {_RUNS}")
+    return Evidence(holds_if(same == _RUNS), words, f"{same} of {_RUNS}")
 
 
 def cost(subject: Subject) -> Evidence:
@@ -158,7 +158,7 @@ def cost(subject: Subject) -> Evidence:
     if subject.obstacle:
         return does_not_apply(subject.obstacle)
     plan = subject.plan
-    piece = (plan.stop - plan.start) / len(plan.pieces)
+    piece = plan.length / len(plan.pieces)
     steps = max(1, round(piece / subject.step))
     h = piece / steps
     with subject.runs() as child:
@@ -189,20 +189,20 @@ def limits(subject: Subject) -> Evidence:
     changed = [what for what, answer in answers if answer.kept < answer.refused]
     share = f"{len(answers) - len(accepted)} of {len(answers)}"
     is_free = bool(accepted) and not subject.is_ours
-    words = f"{share} kinds of impossible values and steps are refused{_exceptions(accepted, changed)}"
+    words = f"{share} kinds of impossible values and steps are refused"
+    words += f". Not refused: {listed(accepted)}." if accepted else "." if changed else ", and the old values stay."
+    if changed:
+        words += f" A refusal changes something: {listed(changed)}."
     if is_free:
         words += " FMI leaves that to the FMU, so it is told, and is no failure."
     rows = [(f"{what[:1].upper()}{what[1:]}", f"{a.refused} of {a.tried}", a.words) for what, a in answers]
-    result: Result = "measured" if is_free and not changed else holds_if(not (accepted or changed))
-    return Evidence(result, words, share, ("Asked for", "Refused", "Answer"), rows)
-
-
-def _exceptions(accepted: list[str], changed: list[str]) -> str:
-    """Return the end of the sentence about refusals: what is not refused, and what changes something."""
-    if not (accepted or changed):
-        return ", and the old values stay."
-    words = f". Not refused: {listed(accepted)}." if accepted else "."
-    return words + (f" A refusal changes something: {listed(changed)}." if changed else "")
+    return Evidence(
+        "measured" if is_free and not changed else holds_if(not (accepted or changed)),
+        words,
+        share,
+        ("Asked for", "Refused", "Answer"),
+        rows,
+    )
 
 
 def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
@@ -221,7 +221,7 @@ def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
     for what, length in {
         "a step of 0 s": 0.0,
         f"a step of −{h:g} s": -h,
-        "a step past the stop time": 2.0 * (subject.plan.stop - subject.plan.start),
+        "a step past the stop time": 2.0 * subject.plan.length,
         "a step that is not a number": nan,
     }.items():
         yield what, ("step_tried", length)

@@ -23,7 +23,7 @@ INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"
 """FMPy's name of each interface, by the name on the command line."""
 _SAME = 1e-9
 """The relative difference below which two times are the same."""
-SHARE_OF_NOMINAL = 0.01
+_SHARE_OF_NOMINAL = 0.01
 """The least divisor of a deviation, as a share of the nominal value.
 
 Otherwise the divisor is the largest expected value. FMI recommends the nominal value for absolute tolerances (2.0,
@@ -99,9 +99,9 @@ def remedy(error: Exception) -> str:
     return "; --time-limit allows more" if isinstance(error, LimitError) and error.limit == "time" else ""
 
 
-def nominal(variable: Any) -> float:
-    """Return the size of the nominal value of one of FMPy's variables; 1 if it has none."""
-    return abs(float(variable.nominal or 0.0)) or 1.0
+def least_divisor(variable: Any) -> float:
+    """Return the least divisor of a deviation of one of FMPy's variables; without a nominal value, that of 1."""
+    return _SHARE_OF_NOMINAL * (abs(float(variable.nominal or 0.0)) or 1.0)
 
 
 class _Experiments(Runs):
@@ -112,7 +112,7 @@ class _Experiments(Runs):
         if experiment.references is None:
             return [_failed(experiment, "has no expected results, so nothing is compared")]
         times, *expected = map(np.array, experiment.references.values())
-        names = [*experiment.references][1:]
+        _, *names = experiment.references
         forget_message()
         try:
             result = self._result(experiment, interface, names)
@@ -123,7 +123,7 @@ class _Experiments(Runs):
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         findings = []
         for name, values in zip(names, expected, strict=True):
-            scale = max(float(np.abs(values).max()), SHARE_OF_NOMINAL * nominal(self._variables[name]))
+            scale = max(float(np.abs(values).max()), least_divisor(self._variables[name]))
             off = _deviation(result["time"], result[name], times, values)
             findings.append(Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
         return findings
@@ -132,7 +132,6 @@ class _Experiments(Runs):
         """Return what FMPy returns for an experiment."""
         import fmpy
 
-        kind = INTERFACES[interface]
         share = _TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0
         with redirect_stdout(io.StringIO()):  # FMPy's warnings
             return fmpy.simulate_fmu(
@@ -142,7 +141,7 @@ class _Experiments(Runs):
                 stop_time=experiment.stop,
                 relative_tolerance=experiment.tolerance * share,
                 output_interval=experiment.step,
-                fmi_type=kind[0].upper() + kind[1:],
+                fmi_type=interface.title().replace("-", ""),
                 start_values=dict(experiment.parameters),
                 input=_signals(experiment.stimuli),
                 output=names,
@@ -169,12 +168,10 @@ def _deviation(times: Any, values: Any, at: Any, expected: Any) -> float:
     """Return the largest deviation. At an event, which has two values at one time, the nearer value counts."""
     values = np.asarray(values, dtype=np.float64)
     worst = 0.0
-    for t, value in zip(at.tolist(), expected.tolist(), strict=True):
+    for t, value in zip(at, expected, strict=True):
         there = values[np.abs(times - t) <= _SAME * max(1.0, abs(t))]
         if not there.size:
-            if not times[0] <= t <= times[-1]:
-                return inf
-            there = np.interp([t], times, values)
+            there = np.interp([t], times, values, inf, inf)
         off = float(np.min(np.abs(there - value)))
         worst = inf if isnan(off) else max(worst, off)
     return worst

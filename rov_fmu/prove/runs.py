@@ -19,8 +19,13 @@ WARNING = 1
 _STATUS = ("OK", "warning", "discard", "error", "fatal", "pending")
 """The name of each status, in every version of FMI."""
 REAL = ("Real", "Float64", "Float32")
-_WHOLE = ("Integer", "Boolean", "Enumeration", *(f"{u}Int{size}" for u in ("", "U") for size in (8, 16, 32, 64)))
-NUMBERS = (*REAL, *_WHOLE)
+NUMBERS = (
+    *REAL,
+    "Integer",
+    "Boolean",
+    "Enumeration",
+    *(f"{u}Int{size}" for u in ("", "U") for size in (8, 16, 32, 64)),
+)
 """The types of variables that are numbers, in FMI 2.0 and 3.0."""
 _MESSAGE = [""]
 """The FMU's last warning. It is global, because FMPy passes all messages to the latest logger."""
@@ -42,6 +47,11 @@ class Plan:
     def stop(self) -> float:
         """The time at the end, s."""
         return self.pieces[-1][0]
+
+    @property
+    def length(self) -> float:
+        """The time from the start to the end, s."""
+        return self.stop - self.start
 
 
 @dataclass(frozen=True)
@@ -79,46 +89,40 @@ class Runs:
         """
         with self._instance(plan) as fmu:
             rows = [self._read(fmu, plan.outputs)]
-            for t, h in self._steps(fmu, plan, steps):
-                self._step(fmu, t, h)
-                rows.append(self._read(fmu, plan.outputs))
+            rows += (self._read(fmu, plan.outputs) for _ in self._durations(fmu, plan, steps))
         return np.array(rows, dtype=np.float64)
 
     def durations(self, plan: Plan, steps: int, most: float) -> list[float]:
         """Return the duration of each step of a run, s. The run begins anew until `most` seconds have passed."""
-        durations: list[float] = []
+        durations = list[float]()
         began = perf_counter()
         while perf_counter() - began < most:
             with self._instance(plan) as fmu:
-                for t, h in self._steps(fmu, plan, steps):
-                    begin = perf_counter()
-                    self._step(fmu, t, h)
-                    durations.append(perf_counter() - begin)
+                for duration in self._durations(fmu, plan, steps):
+                    durations.append(duration)
                     if perf_counter() - began > most:
                         break
         return durations
 
-    def _steps(self, fmu: Any, plan: Plan, steps: int) -> Iterator[tuple[float, float]]:
-        """Yield the time and the length of each step of a plan, and set the inputs at the beginning of each piece."""
+    def _durations(self, fmu: Any, plan: Plan, steps: int) -> Iterator[float]:
+        """Take the steps of a plan, with the inputs of each piece, and yield the duration of each step, s."""
         start = plan.start
         for end, inputs in plan.pieces:
             self._set(fmu, inputs)
             for t, after in pairwise(np.linspace(start, end, steps + 1).tolist()):
-                yield t, after - t
+                begin = perf_counter()
+                self._step(fmu, t, after - t)
+                yield perf_counter() - begin
             start = end
 
     def values_tried(self, plan: Plan, values: Sequence[tuple[str, float]]) -> Answer:
         """Set impossible values of inputs after the initialization, or of parameters during it, one after another."""
         is_input = self._variables[values[0][0]].causality == "input"
-        refused = kept = 0
-        words = ""
         with self._instance(plan, initialized=is_input, logging=True) as fmu:
-            for name, value in values:
-                answer = self._asked(fmu, [name], partial(self._set, fmu, {name: value}))
-                refused, kept = refused + answer.refused, kept + answer.kept
-                if answer.refused or not refused:
-                    words = answer.words
-        return Answer(len(values), refused, kept, words)
+            answers = [self._asked(fmu, [name], partial(self._set, fmu, {name: value})) for name, value in values]
+        refusals = [answer for answer in answers if answer.refused]
+        kept = sum(answer.kept for answer in refusals)
+        return Answer(len(values), len(refusals), kept, (refusals or answers)[-1].words)
 
     def step_tried(self, plan: Plan, length: float) -> Answer:
         """Take a step of an impossible length at the start."""
@@ -130,32 +134,23 @@ class Runs:
 
         After an error, FMI lets an FMU refuse to be read.
         """
-        before = now = self._read(fmu, names)
-        status, words = self._answer(call)
-        if status <= WARNING:
-            return Answer(1, 0, 0, words)
-
-        def read() -> None:
-            nonlocal now
-            now = self._read(fmu, names)
-
-        unreadable = self._answer(read)[0] > WARNING
-        return Answer(1, 1, int(unreadable or np.array_equal(now, before, equal_nan=True)), words)
-
-    @staticmethod
-    def _answer(call: Callable[[], object]) -> tuple[int, str]:
-        """Return the status of a call, and the status in words with the FMU's message."""
         from fmpy.fmi1 import FMICallException
 
+        before = now = self._read(fmu, names)
         forget_message()
-        status = 0
+        words = ""
         try:
             call()
         except FMICallException as error:
-            status = int(error.status)
+            words = brief(status_word(int(error.status)) + last_message(": "), 200)
         except RunError as error:
-            return 2, str(error)
-        return status, brief(status_word(status) + (last_message(": ") if status > WARNING else ""), 200)
+            words = str(error)
+        if not words:
+            return Answer(1, 0, 0, _STATUS[0])
+        forget_message()
+        with suppress(FMICallException):
+            now = self._read(fmu, names)
+        return Answer(1, 1, int(np.array_equal(now, before, equal_nan=True)), words)
 
     @contextmanager
     def _instance(self, plan: Plan, *, initialized: bool = True, logging: bool = False) -> Iterator[Any]:
@@ -169,10 +164,11 @@ class Runs:
             fmu = instantiate_fmu(
                 self._folder, self._description, "CoSimulation", debug_logging=logging, logger=keep_message
             )
+            times = {"startTime": plan.start, "stopTime": plan.stop}
             if self._version == "2":
-                fmu.setupExperiment(startTime=plan.start, stopTime=plan.stop)
+                fmu.setupExperiment(**times)
+                times = {}
             apply_start_values(fmu, self._description, dict(plan.parameters))
-            times = {} if self._version == "2" else {"startTime": plan.start, "stopTime": plan.stop}
             fmu.enterInitializationMode(**times)
             self._set(fmu, plan.pieces[0][1])
             if initialized:
@@ -182,7 +178,7 @@ class Runs:
             message = last_message() if isinstance(error, FMICallException) else ""
             raise RunError(brief(f"{reason_of(error).replace(self._folder, '').rstrip('.')}{message}", 240)) from error
         finally:
-            if fmu is not None and fmu.component is not None:
+            if fmu is not None:
                 if initialized:
                     with suppress(Exception):
                         fmu.terminate()
@@ -200,8 +196,9 @@ class Runs:
     def _function(self, fmu: Any, verb: str, name: str) -> Callable[..., Any]:
         """Return the function that gets or sets a variable, which may be called with its value."""
         variable = self._variables[name]
-        of_enumeration = {"2": "Integer", "3": "Int64"}[self._version]
-        kind = of_enumeration if variable.type == "Enumeration" else variable.type
+        kind = variable.type
+        if kind == "Enumeration":
+            kind = {"2": "Integer", "3": "Int64"}[self._version]
         return partial(getattr(fmu, f"{verb}{kind}"), [variable.valueReference])
 
     @staticmethod

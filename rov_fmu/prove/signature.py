@@ -7,7 +7,7 @@ import os
 import re
 import subprocess
 from pathlib import Path
-from typing import IO, Any
+from typing import IO
 
 from rov_fmu.io.messages import FileError, InputError, ProofError
 from rov_fmu.io.reading import open_file, read_bytes
@@ -30,7 +30,7 @@ def check_private_key(path: Path) -> None:
     """Raise FileError if nothing can be signed with a key, and InputError without ssh-keygen."""
     read_bytes(path, most=_MOST_BYTES)
     done = _ssh_keygen("-y", "-P", "", "-f", path.absolute())
-    if done.returncode != 0:
+    if done.returncode:
         reasons = {
             b"passphrase": "has a passphrase; a key to sign with must have none",
             b"permissions": "others may read it: a private key must be for its owner alone (chmod 600)",
@@ -42,7 +42,7 @@ def check_private_key(path: Path) -> None:
 def signed(content: bytes, key: Path) -> bytes:
     """Return the file with the signature of some content. The same content and key of Ed25519 give the same bytes."""
     done = _ssh_keygen("-Y", "sign", "-q", *_NAMESPACE, "-f", key.absolute(), content=content)
-    if done.returncode != 0:
+    if done.returncode:
         raise FileError(f"{key}: ssh-keygen cannot sign with this key")
     return done.stdout.replace(b"\r\n", b"\n")
 
@@ -80,22 +80,21 @@ def check_signature(fmu: Path, key: Path | None = None) -> str:
 def _fingerprint(done: "subprocess.CompletedProcess[bytes]") -> str:
     """Return the fingerprint that ssh-keygen printed; empty if it failed."""
     match = re.search(rb"SHA256:[\w+/]{43}", done.stdout)
-    return match[0].decode() if match and done.returncode == 0 else ""
+    return match[0].decode() if match and not done.returncode else ""
 
 
 def _ssh_keygen(
     *arguments: str | Path, content: bytes | None = None, file: IO[bytes] | None = None
 ) -> "subprocess.CompletedProcess[bytes]":
     """Run ssh-keygen on some content, or on a file. It asks for no passphrase. Raises InputError if it cannot run."""
-    given: dict[str, Any] = {"input": content} if content is not None else {"stdin": file or subprocess.DEVNULL}
-    environment = {**os.environ, "LC_ALL": "C", "SSH_ASKPASS": "", "SSH_ASKPASS_REQUIRE": "force"}
     try:
         return subprocess.run(
             ["ssh-keygen", *map(str, arguments)],
-            **given,
+            stdin=None if content is not None else file or subprocess.DEVNULL,
+            input=content,
             capture_output=True,
             timeout=_SECONDS,
-            env=environment,
+            env={**os.environ, "LC_ALL": "C", "SSH_ASKPASS": "", "SSH_ASKPASS_REQUIRE": "force"},
             check=False,
         )
     except (OSError, subprocess.TimeoutExpired) as error:

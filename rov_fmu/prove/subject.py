@@ -9,11 +9,12 @@ from math import inf
 from pathlib import Path
 from typing import Any
 
-from rov_fmu.io.child_process import ChildProcess, Limits
+from rov_fmu.io.child_process import ChildProcess
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
-from rov_fmu.prove.description import DISK, MEMORY, TIME_LIMIT, read_description
+from rov_fmu.io.reading import open_file
+from rov_fmu.prove.description import TIME_LIMIT, budget, read_description
 from rov_fmu.prove.experiments import (
     DEFAULT_STEPS,
     DEFAULT_TOLERANCE,
@@ -52,8 +53,11 @@ class Subject:
 
     def numbers(self, causality: str, types: Collection[str] = NUMBERS) -> list[str]:
         """Return the names of the variables of a causality that are single numbers of some types."""
-        own = [v for v in self.variables.values() if v.causality == causality and v.type in types]
-        return [v.name for v in own if not getattr(v, "dimensions", None)]
+        return [
+            name
+            for name, v in self.variables.items()
+            if v.causality == causality and v.type in types and not getattr(v, "dimensions", None)
+        ]
 
     def bounds(self, name: str) -> tuple[float, float]:
         """Return the least and the largest value of a variable, which may be those of its type."""
@@ -69,9 +73,8 @@ class Subject:
     @property
     def obstacle(self) -> str:
         """Why the FMU cannot be run for Co-Simulation in FMI 2.0 or 3.0, or an empty text."""
-        version = self.description.fmiVersion
-        if version[:1] not in ("2", "3"):
-            return f"it is an FMU of FMI {version}, and this is measured in FMI 2.0 and 3.0"
+        if self.description.fmiVersion[:1] not in ("2", "3"):
+            return f"it is an FMU of FMI {self.description.fmiVersion}, and this is measured in FMI 2.0 and 3.0"
         if not self.description.coSimulation:
             return "it has no Co-Simulation"
         return "" if self.plan.outputs else "it has no output that is a number"
@@ -83,7 +86,7 @@ class Subject:
     @property
     def step(self) -> float:
         """The communication step of the default experiment, s."""
-        given, length = self._default("stepSize"), self.plan.stop - self.plan.start
+        given, length = self._default("stepSize"), self.plan.length
         return given if length / MOST_STEPS < given <= length else length / DEFAULT_STEPS
 
     @cached_property
@@ -111,13 +114,12 @@ class Subject:
     def words(self) -> str:
         """The simulation in words."""
         name = f"experiment {self.experiment.name}" if self.experiment else "default experiment"
-        return f"the {name} ({self.plan.stop - self.plan.start:.3g} s)"
+        return f"the {name} ({self.plan.length:.3g} s)"
 
     @contextmanager
     def runs(self, time: float | None = None, kind: type[Runs] = Runs) -> Iterator[ChildProcess]:
         """Yield a child process with the FMU, whose calls are limited in time. Raises ChildError."""
-        limits = Limits(time=time or self.time_limit, memory=MEMORY, disk=DISK)
-        with closing(ChildProcess(kind, self.folder, limits=limits)) as child:
+        with closing(ChildProcess(kind, self.folder, limits=budget(time or self.time_limit))) as child:
             yield child
 
 
@@ -137,16 +139,18 @@ def opened(
     import fmpy
 
     check_suffix(fmu, FMU)
-    experiments: list[Experiment] = []
+    experiments = list[Experiment]()
     with temporary_folder("fmu-") as folder:
-        unpack_fmu(fmu, fmu, Path(folder))
+        with open_file(fmu) as file:
+            unpack_fmu(file, fmu, Path(folder))
         description = read_description(fmu, Path(folder))
         with suppress(*([] if needs_results else [NoResultsError])):
             experiments = read_experiments(fmu, Path(folder), description)
         platforms = fmpy.supported_platforms(folder)
         if fmpy.platform not in platforms:
-            has = ", ".join(platforms) or "none"
-            raise FileError(f"{fmu}: has no binary for this machine ({fmpy.platform}): {has}")
+            raise FileError(
+                f"{fmu}: has no binary for this machine ({fmpy.platform}): {', '.join(platforms) or 'none'}"
+            )
         yield Subject(fmu, folder, description, experiments, interface, tolerance, time_limit)
 
 

@@ -13,14 +13,13 @@ import zlib
 from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import combinations
+from itertools import accumulate, combinations
 from pathlib import Path
 from typing import IO
 from unicodedata import normalize
 
 from rov_fmu.io.messages import FileError, ProofError, brief, reason_of, shown
 from rov_fmu.io.paths import is_portable
-from rov_fmu.io.reading import open_file
 
 _MOST_UNPACKED = 2_000_000_000
 """The size of all files."""
@@ -33,7 +32,7 @@ _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 _ENCRYPTED, _SIZES_BEHIND, _UTF_8 = 1, 8, 0x800
 """The flags of a file that is encrypted, of one whose sizes follow its content, and of one whose name is in UTF-8."""
 _LARGE = 0x0001
-"""The extra field with the sizes of a large file, and with its place."""
+"""The extra field with the sizes of a large file, and with its offset."""
 _FORMS = {
     _LARGE: b"(.{8}){1,3}",
     0x000A: b".{4}\1\0\x18\0.{24}",  # times of NTFS
@@ -48,28 +47,24 @@ _FORMS = {
 know them, others give a file another name, or make it a link or an encrypted one."""
 _HAS_MORE = "has an extra field that is damaged, or that could give the file another name or size, or make it a link"
 _END = "<4s4H2LH"
-"""The form of the end of an archive: disks, counts, the size and the place of the directory (APPNOTE 4.3.16)."""
+"""The form of the end of an archive: disks, counts, the size and the offset of the directory (APPNOTE 4.3.16)."""
 _PIECE = 2**14
 """The number of bytes that are unpacked at a time."""
 
 
-def unpack_fmu(archive: Path | IO[bytes], fmu: Path, folder: Path) -> None:
+def unpack_fmu(file: IO[bytes], fmu: Path, folder: Path) -> None:
     """Unpack an FMU into a folder.
 
     Raises FileError, which names the FMU by the path `fmu`, if it is damaged, if a file would lie outside the folder or
     is a link, or if the files take too much space.
     """
-    if isinstance(archive, Path):
-        with open_file(archive) as file:
-            return unpack_fmu(file, fmu, folder)
-    with opened_archive(archive, fmu) as zipped:
+    with opened_archive(file, fmu) as zipped:
         check_order(zipped, fmu)
         try:
             zipped.extractall(folder)
         except OSError as error:
             where = f": {os.path.relpath(error.filename, folder)}" if error.filename else ""
             raise FileError(f"{fmu}: cannot be unpacked: {error.strerror or error}{where}") from error
-    return None
 
 
 # ---- The archive -----------------------------------------------------------------------------------------------------
@@ -94,10 +89,11 @@ def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
 def refusal(zipped: zipfile.ZipFile) -> str:
     """Return why an archive may not be unpacked, or an empty text."""
     members = zipped.infolist()
-    places = [_place(member.orig_filename) for member in members]
-    names, times = Counter(member.orig_filename for member in members), Counter(places)
-    folders = {folder for place in places for folder in _folders(place)}
-    for member, place in zip(members, places, strict=True):
+    # On some systems, capital letters and accents make no other path.
+    paths = [normalize("NFC", member.orig_filename.removesuffix("/")).casefold() for member in members]
+    names, times = Counter(member.orig_filename for member in members), Counter(paths)
+    folders = {folder for path in paths for folder in accumulate(path.split("/")[:-1], "{}/{}".format)}
+    for member, path in zip(members, paths, strict=True):
         name = member.orig_filename
         is_valid = all(map(is_portable, name.removesuffix("/").split("/")))
         is_read_alike = name.isascii() or member.flag_bits & _UTF_8
@@ -111,18 +107,17 @@ def refusal(zipped: zipfile.ZipFile) -> str:
             (member.flag_bits & _ENCRYPTED, "is encrypted"),
             (fields is None or _has_other_numbers(member, fields), _HAS_MORE),
             (names[name] > 1, f"is {names[name]} times in the archive"),
-            (times[place] > 1, "is the path of another member, too, on systems that ignore case"),
-            (place in folders and not member.is_dir(), "is a file, and a folder of other files"),
+            (times[path] > 1, "is the path of another member, too, on systems that ignore case"),
+            (path in folders and not member.is_dir(), "is a file, and a folder of other files"),
         ):
             if is_wrong:
                 return f"member {shown(name)}: {reason}"
     total = sum(member.file_size for member in members)
-    packed = zipped.start_dir
     if total > _MOST_UNPACKED:
         return f"would take {total:,} bytes unpacked; at most {_MOST_UNPACKED:,} are allowed"
-    if total > max(_SMALL, _MOST_RATIO * packed):
+    if total > max(_SMALL, _MOST_RATIO * zipped.start_dir):
         return (
-            f"would take {total:,} bytes unpacked, and has {packed:,}; "
+            f"would take {total:,} bytes unpacked, and has {zipped.start_dir:,}; "
             f"above {_SMALL:,} at most {_MOST_RATIO} times those of the archive are allowed"
         )
     return ""
@@ -142,23 +137,11 @@ def _fields(extra: bytes) -> dict[int, bytes] | None:
 
 
 def _has_other_numbers(entry: zipfile.ZipInfo, fields: dict[int, bytes]) -> bool:
-    """Return True if the directory has sizes or a place of a file in 8 bytes that are not those of the file."""
+    """Return True if the directory has sizes or an offset of a file in 8 bytes that are not those of the file."""
     if _LARGE not in fields:
         return False
     numbers = entry.file_size, entry.compress_size, entry.header_offset
     return all(fields[_LARGE] != struct.pack(f"<{n}Q", *some) for n in (1, 2, 3) for some in combinations(numbers, n))
-
-
-def _place(name: str) -> str:
-    """Return what equal paths have in common: on some systems, capital letters and accents make no other path."""
-    return normalize("NFC", name.removesuffix("/")).casefold()
-
-
-def _folders(place: str) -> Iterator[str]:
-    """Yield the folders that a path leads through."""
-    parts = place.split("/")
-    for n in range(1, len(parts)):
-        yield "/".join(parts[:n])
 
 
 def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
@@ -167,23 +150,23 @@ def check_order(zipped: zipfile.ZipFile, fmu: Path) -> None:
     Some go by the directory at the end of an archive, others by the header before each file. So both must say the same,
     and there may be nothing that belongs to no file.
     """
-    place, size, file = 0, 0, zipped.fp
+    offset, size, file = 0, 0, zipped.fp
     assert file
     for entry in sorted(zipped.infolist(), key=lambda entry: entry.header_offset):
         where = f"{fmu}: member {shown(entry.orig_filename)}"
-        if entry.header_offset != place:
-            raise FileError(f"{where}: must begin at byte {place} of the archive, and not at {entry.header_offset}")
+        if entry.header_offset != offset:
+            raise FileError(f"{where}: must begin at byte {offset} of the archive, and not at {entry.header_offset}")
         if entry.is_dir() and entry.file_size:
             raise FileError(f"{where}: is a folder, and must have no content")
-        place = _end_of(file, entry, where)
-        if not place:
+        offset = _end_of(file, entry, where)
+        if not offset:
             raise FileError(f"{where}: its header and its content must be as the directory of the archive says")
         size += 46 + len(_encoded(entry)) + len(entry.extra) + len(entry.comment)
-    file.seek(place + size)
+    file.seek(offset + size)
     end, count = file.read(100 + len(zipped.comment)), len(zipped.infolist())
-    largest = (2**16 - 1, 2**16 - 1, 2**32 - 1, 2**32 - 1) if end.startswith(b"PK\6\6") else ()
+    largest = (2**16 - 1, 2**32 - 1) if end.startswith(b"PK\6\6") else ()
     end = end[76:] if largest else end  # after the records of large archives, of 56 and 20 bytes
-    expected = b"PK\5\6", 0, 0, count, count, size, place, len(zipped.comment)
+    expected = b"PK\5\6", 0, 0, count, count, size, offset, len(zipped.comment)
     if len(end) != 22 + len(zipped.comment) or any(
         number not in (right, *largest) for number, right in zip(struct.unpack(_END, end[:22]), expected, strict=True)
     ):
@@ -202,12 +185,10 @@ def _end_of(file: IO[bytes], entry: zipfile.ZipInfo, where: str) -> int:
     without a signature (APPNOTE 4.3.9). Raises FileError about an extra field.
     """
     file.seek(entry.header_offset)
-    sign, _, flags, method, time, date, *numbers, name, extra = struct.unpack("<4s5H3L2H", file.read(30))
-    year, month, day, hour, minute, second = entry.date_time
-    written = hour << 11 | minute << 5 | second // 2, (year - 1980) << 9 | month << 5 | day
-    if (sign, flags, method, time, date) != (b"PK\3\4", entry.flag_bits, entry.compress_type, *written):
+    sign, _, flags, method, modified, *numbers, name, extra = struct.unpack("<4s3H4s3L2H", file.read(30))
+    if (sign, flags, method) != (b"PK\3\4", entry.flag_bits, entry.compress_type):
         return 0
-    if file.read(name) != _encoded(entry):
+    if modified != entry.FileHeader()[10:14] or file.read(name) != _encoded(entry):
         return 0
     fields = _fields(file.read(extra))
     if fields is None:

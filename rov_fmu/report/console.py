@@ -70,11 +70,11 @@ def shell_words(*words: str | Path) -> str:
     return subprocess.list2cmdline(clean) if os.name == "nt" else shlex.join(clean)
 
 
-def print_end(written: Mapping[Path, str], following: str = "") -> None:
+def print_end(files: Mapping[Path, str], following: str = "") -> None:
     """Print which files a command wrote and what each replaced, and what to do next: a command line, or words."""
     out = console()
-    files = [shell_words(path) + (f" (replaced {old})" if old else "") for path, old in written.items()]
-    sentences = [f"Wrote {listed(files)}."] if written else []
+    paths = [shell_words(path) + (f" (replaced {old})" if old else "") for path, old in files.items()]
+    sentences = [f"Wrote {listed(paths)}."] if files else []
     sentences += [f"Next: {following}"] if following else []
     if out.is_terminal and len(" ".join(sentences)) > out.width:
         for sentence in sentences:
@@ -234,6 +234,6 @@ def text(value: float | Decimal | None, form: str = "") -> str:
     """Return a number in a format, or a dash for None and NaN. A number that is rounded to 0 has no minus sign."""
     if value is None or isnan(value):
         return "-"
-    written = format(value, form)
-    is_zero = not re.search("[1-9]|inf", written)
-    return written.replace("-", "+" if form.startswith("+") else "") if is_zero else written
+    shown = format(value, form)
+    is_zero = not re.search("[1-9]|inf", shown)
+    return shown.replace("-", "+" if form.startswith("+") else "") if is_zero else shown

@@ -19,11 +19,12 @@ _WIDTH = 7.2
 def inspection_page(inspected: Inspected) -> str:
     """Return the page as HTML."""
 
-    def plot(one: Inspection) -> Markup | None:
-        if one.log is None or not (one.log.commands or any(not c.unused for c in one.log.channels)):
+    def plot(inspection: Inspection) -> Markup | None:
+        log = inspection.log
+        if log is None or not (log.commands or any(not c.unused for c in log.channels)):
             return None
-        draw = with_even_text(partial(plot_log, log=one.log))
-        return inline_svg(f"{one.name} over time", draw, (_WIDTH, height_of(one.log)), salt=str(one.path))
+        draw = with_even_text(partial(plot_log, log=log))
+        return inline_svg(f"{inspection.name} over time", draw, (_WIDTH, height_of(log)), salt=str(inspection.path))
 
     return page(
         "inspection.html.j2",

@@ -42,12 +42,12 @@ def study_plan(
             lambda message: shown.print(f"warning: {message}"),
             force=force,
         )
-    written = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
+    files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
         content = _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))
-        written |= write_whole(Output(motion, content), force=force)
-    print_end(written, "open it in a browser")
+        files |= write_whole(Output(motion, content), force=force)
+    print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
 

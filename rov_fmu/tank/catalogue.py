@@ -151,8 +151,8 @@ class Output:
     """True if a sender spreads its outputs over several messages, whose fields have the numbers from 1 on."""
 
 
-def _each(form: str, places: Iterable[object] = "xyz") -> tuple[str, ...]:
-    return tuple(form.format(place) for place in places)
+def _each(form: str, parts: Iterable[object] = "xyz") -> tuple[str, ...]:
+    return tuple(form.format(part) for part in parts)
 
 
 _MAVLINK = (
@@ -239,7 +239,7 @@ class Validity:
 
     kind: str
     """A regular expression for the whole type of the message."""
-    place: str
+    field: str
     """The field that tells it."""
     about: str
     """A regular expression for the whole names of the fields that it is about."""
@@ -273,14 +273,14 @@ VALIDITIES = (
         for part in ("orientation", "angular_velocity")
     ),
     *(
-        Validity(kind, f"{place}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
+        Validity(kind, f"{prefix}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
         for kind, whole, part, *_ in _COVARIANCES
-        for place in (f"{whole}.", "")
+        for prefix in (f"{whole}.", "")
     ),
     *(
-        Validity(kind, f"{place}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge)
+        Validity(kind, f"{prefix}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge)
         for kind, whole, part, letters, first, huge in _COVARIANCES
-        for place in (f"{whole}.", "")
+        for prefix in (f"{whole}.", "")
         for n, letter in enumerate(letters)
     ),
     Validity(_DVLS[1], "velocity_mode", r"velocity\..", least=1.0, below=2.0),  # others are through the water

@@ -78,7 +78,7 @@ class Topic:
     time: Array
     """n: s, ascending, all different."""
     fields: Mapping[str, Array]
-    """n each: the numbers by their place in a message, such as `pose.pose.position.x` or `channels[0]`. They are NaN
+    """n each: the numbers by their field in a message, such as `pose.pose.position.x` or `channels[0]`. They are NaN
     where the sender marks them as unknown."""
     unused: str = ""
     """Why the reader says that it must not be used; empty if it may be."""
@@ -142,8 +142,8 @@ def channels_of(
     for measurement in measurements:
         is_velocity = measurement.message.gives == VELOCITY
         reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
-        one = replace(measurement, unused=reason)
-        channels += _channels(*_agreeing(one, measurements, attitude), attitude, gravity)
+        judged = replace(measurement, unused=reason)
+        channels += _channels(*_agreeing(judged, measurements, attitude), attitude, gravity)
     return with_one_source(channels)
 
 
@@ -226,14 +226,13 @@ def _standstill(attitude: _Measurement, measurements: Sequence[_Measurement]) ->
     if len(known) < LEAST_SAMPLES or np.ptp(values, axis=0).any():
         return ""
     rates = [m for m in measurements if m.message.gives == RATES and not m.unused]
-    for one in sorted(rates, key=lambda m: m.topic is not attitude.topic)[:1]:
-        ends = first_in_each(one.topic.time, 1.0 / _COMPARED)
-        angles = np.cumsum(np.nan_to_num(one.values[1:]) * np.diff(one.topic.time)[:, None], axis=0)
+    for rate in sorted(rates, key=lambda m: m.topic is not attitude.topic)[:1]:
+        ends = first_in_each(rate.topic.time, 1.0 / _COMPARED)
+        angles = np.cumsum(np.nan_to_num(rate.values[1:]) * np.diff(rate.topic.time)[:, None], axis=0)
         turned = np.abs(np.diff(angles[ends[:-1]], axis=0)).max(initial=0.0)
         if turned > _LEAST_TURN:
-            return (
-                f"it never changes, although {one.topic.source} tells turns of {np.degrees(turned):.3g} deg in a second"
-            )
+            degrees = f"{np.degrees(turned):.3g} deg"
+            return f"it never changes, although {rate.topic.source} tells turns of {degrees} in a second"
     return ""
 
 

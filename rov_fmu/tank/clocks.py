@@ -101,11 +101,11 @@ def usual_delay(pairs: Array) -> float:
 
 def ascending(time: Array, *values: Array) -> tuple[Array, ...]:
     """Return times in order, and the values with them; the last finite value counts where a time is repeated."""
-    times, place = np.unique(time, return_inverse=True)
+    times, inverse = np.unique(time, return_inverse=True)
     merged = np.full((len(values), len(times)), np.nan)
     for row, column in zip(merged, values, strict=True):
         there = np.isfinite(column)
-        row[place[there]] = column[there]
+        row[inverse[there]] = column[there]
     return times, *merged
 
 

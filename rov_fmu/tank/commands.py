@@ -247,13 +247,13 @@ def _activity(series: Mapping[Any, Series]) -> float:
 
 def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
     """Return the other vehicles whose depth or position has a topic of the same name and type as that of a vehicle."""
-    gives_place = [message for message in MESSAGES if message.gives in (POSITION, "depth")]
-    places: dict[tuple[str, str], set[str]] = {}
+    gives_position = [message for message in MESSAGES if message.gives in (POSITION, "depth")]
+    vehicles_of: dict[tuple[str, str], set[str]] = {}
     for source in (topic.source for topic in topics if vehicle):
-        if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_place):
+        if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_position):
             name = source.topic.removeprefix(f"/{source.vehicle}/")
-            places.setdefault((source.kind, name), set()).add(source.vehicle)
-    return {other for vehicles in places.values() if vehicle in vehicles for other in vehicles} - {vehicle}
+            vehicles_of.setdefault((source.kind, name), set()).add(source.vehicle)
+    return {other for vehicles in vehicles_of.values() if vehicle in vehicles for other in vehicles} - {vehicle}
 
 
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
@@ -282,8 +282,8 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
             match = re.search(rule.topic, name)
             if not match or not re.fullmatch(rule.kind, kind) or NOT_COMMANDED & words_of(name):
                 continue
-            for place, values in topic.fields.items():
-                if of_field := re.fullmatch(rule.field, place):
+            for title, values in topic.fields.items():
+                if of_field := re.fullmatch(rule.field, title):
                     is_numbered = bool(match.groups())
                     sender = (topic.source.vehicle, topic.source.part) if rule.spread else topic
                     alike = (name[: match.start(1)], name[match.end(1) :]) if is_numbered else sender
@@ -292,8 +292,8 @@ def _candidates(topics: Sequence[Topic]) -> Iterator[_Outputs]:
         for by_number in found.values():
             numbers = sorted(by_number)
             first, _ = by_number[numbers[0]]
-            places = numbers if rule.spread else range(1, len(numbers) + 1)
-            series = {n: (by_number[k][0].time, by_number[k][1]) for n, k in zip(places, numbers, strict=True)}
+            outputs = numbers if rule.spread else range(1, len(numbers) + 1)
+            series = {n: (by_number[k][0].time, by_number[k][1]) for n, k in zip(outputs, numbers, strict=True)}
             if rule.spread:
                 series = {n: _at_times_of(first.time, *own) for n, own in series.items()}
             yield _Outputs(rule, first.source, series, {topic.source.topic for topic, _ in by_number.values()})
@@ -351,9 +351,9 @@ def _joined(outputs: Sequence[_Outputs], modules: Mapping[str, int]) -> Iterator
         return
     (time, _), topics = next(iter(found[0].series.values())), [topic for one in found for topic in one.topics]
     series = {
-        n + _PER_MODULE * place: _at_times_of(time, *own)
-        for place, one in enumerate(found)
-        for n, own in one.series.items()
+        n + _PER_MODULE * index: _at_times_of(time, *own)
+        for index, outputs in enumerate(found)
+        for n, own in outputs.series.items()
     }
     yield _Outputs(found[0].rule, replace(found[0].source, part=_instances(modules)), series, topics)
 

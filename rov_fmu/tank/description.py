@@ -536,10 +536,10 @@ def _missing_halves(file: RovTables, description: Description) -> Iterator[str]:
     parts: tuple[Part, ...] = (*description.layout.curves, *description.layout.axes)
     for part in parts:
         for keys in _PAIRS:
-            one, other = map(part.name_of, keys)
-            if one in given and other not in given and (one in file.known or not keys[0].endswith(REVERSE)):
-                table = "known" if one in file.known else ".".join(tables[one][:-1])
-                yield key_line(table, f"{one} is given, but {other} is not")
+            name, other = map(part.name_of, keys)
+            if name in given and other not in given and (name in file.known or not keys[0].endswith(REVERSE)):
+                table = "known" if name in file.known else ".".join(tables[name][:-1])
+                yield key_line(table, f"{name} is given, but {other} is not")
 
 
 _THRUST, _DRAG = (("a_t", "b_t"), ("b_t", "a_t")), (("a_d", "b_d"), ("b_d", "a_d"))

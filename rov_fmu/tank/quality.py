@@ -174,14 +174,14 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
     axis, unit = channel.quantity.axis, channel.quantity.unit
     time, values = unwrapped(channel).samples
-    if unit not in ("m", "rad") or not len(places := jumps(time, values)):
+    if unit not in ("m", "rad") or not len(indices := jumps(time, values)):
         return None
     factor, shown_unit = in_degrees(unit)
     steps = factor * np.diff(values)
-    told = [f"{steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in places]
+    told = [f"{steps[n]:+.3g} {shown_unit} at {time[n + 1] - channel.time[0]:.4g} s" for n in indices]
     name = axis.name if axis else ""
     words = ", ".join(first_of(told, MOST))
-    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(places))
+    return about(file, "jumps", name, quantity=channel.quantity.name, jumps=words, count=len(indices))
 
 
 def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[np.intp]:
@@ -229,8 +229,8 @@ def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Chann
     both = (at >= time[0]) & (at <= time[-1])
     if not spread(speeds[both]):
         return None
-    places = np.interp(at[both], time, values)
-    found = disagreement(at[both], places[:, None], speeds[both, None])
+    positions = np.interp(at[both], time, values)
+    found = disagreement(at[both], positions[:, None], speeds[both, None])
     return (velocity, found) if found else None
 
 

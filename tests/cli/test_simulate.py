@@ -39,15 +39,15 @@ def test_every_state_and_angle_can_be_set_at_the_start(name: str) -> None:
     vehicle = rov_fmu.load(name)
     angles = [name.removesuffix("_0") for name in vehicle.layout.initial]
     states = [one for one in vehicle.layout.state if one not in QUATERNION]
-    for one in (*states, *angles):
-        start = read_settings([f"{one}=0.25"], vehicle.layout).start
-        assert vehicle.simulate([0.0, 0.001], start=start)[one][0] == pytest.approx(0.25, rel=1e-14)
-        assert vehicle.simulate([0.0, 0.001], start={one: 0.25})[one][0] == pytest.approx(0.25, rel=1e-14)
-    for one in angles:
-        with pytest.raises(InputError, match=rf"^--set {one}_0=1: {one}_0 is set twice$"):
-            read_settings([f"{one}=1", f"{one}_0=1"], vehicle.layout)
-        with pytest.raises(InputError, match=rf"^start\['{one}_0'\]: {one}_0 is given, too, which is the same$"):
-            vehicle.simulate(1.0, start={one: 1.0, f"{one}_0": 1.0})
+    for state in (*states, *angles):
+        start = read_settings([f"{state}=0.25"], vehicle.layout).start
+        assert vehicle.simulate([0.0, 0.001], start=start)[state][0] == pytest.approx(0.25, rel=1e-14)
+        assert vehicle.simulate([0.0, 0.001], start={state: 0.25})[state][0] == pytest.approx(0.25, rel=1e-14)
+    for state in angles:
+        with pytest.raises(InputError, match=rf"^--set {state}_0=1: {state}_0 is set twice$"):
+            read_settings([f"{state}=1", f"{state}_0=1"], vehicle.layout)
+        with pytest.raises(InputError, match=rf"^start\['{state}_0'\]: {state}_0 is given, too, which is the same$"):
+            vehicle.simulate(1.0, start={state: 1.0, f"{state}_0": 1.0})
 
 
 def test_a_vehicle_that_nothing_moves_is_said_to_need_a_command(capsys: Capsys) -> None:

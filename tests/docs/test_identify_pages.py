@@ -82,9 +82,9 @@ def test_page_and_code_answer_the_question(question: dict[str, str | float]) -> 
 
 def test_the_states_of_the_filter_are_those_of_the_code() -> None:
     code = (ROOT / "fmu_src" / "engine" / "filter.c").read_text("utf-8")
-    (places,) = re.findall(r"enum \{\n +N_AXES.*?\n +N_X,", code, re.DOTALL)
+    (members,) = re.findall(r"enum \{\n +N_AXES.*?\n +N_X,", code, re.DOTALL)
     named = re.findall(r"\| `([A-Z]+)` \|", METHOD.read_text("utf-8"))
-    assert named == re.findall(r"^ +((?!N_)[A-Z]+)(?: =|,)", places, re.MULTILINE)
+    assert named == re.findall(r"^ +((?!N_)[A-Z]+)(?: =|,)", members, re.MULTILINE)
 
 
 def test_the_numbers_of_the_method_are_those_of_the_code() -> None:

@@ -105,8 +105,8 @@ def _paths(shape: Any) -> list[Any]:
     return [*shape.get_paths()]
 
 
-def _point(x: Any, y: Any, place: int) -> str:
-    return f"({x[place]:.4g}, {y[place]:.4g})" if len(x) else "()"
+def _point(x: Any, y: Any, index: int) -> str:
+    return f"({x[index]:.4g}, {y[index]:.4g})" if len(x) else "()"
 
 
 def _ends(values: Any) -> str:
@@ -146,8 +146,8 @@ def _drawn(*vehicles: Vehicle) -> str:
     for rov, (view, scene) in ((one, view) for one in vehicles for view in scenes(one).items()):
         draw_thrusters(ax := Figure(figsize=scene.inches).subplots(), rov, scene)
         for text in ax.texts:
-            places = (*text.get_position(), *getattr(text, "xy", ()))
-            lines.append(f"{rov.name} {view}: {text.get_text()} at {', '.join(f'{x:.4f}' for x in places)}")
+            position = (*text.get_position(), *getattr(text, "xy", ()))
+            lines.append(f"{rov.name} {view}: {text.get_text()} at {', '.join(f'{x:.4f}' for x in position)}")
     return "\n".join(lines)
 
 

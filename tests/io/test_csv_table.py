@@ -99,10 +99,10 @@ def test_decimal_commas_in_quotes(rows: str, tmp_path: Path) -> None:
 def test_all_mistakes_are_reported_together(tmp_path: Path) -> None:
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [m],time [s]\nlong,1\n2,late\n3,4,5\n", time=MAYBE)
-    places = ("line 2, column 'length [m]' = 'long'", "line 3, column 'time [s]' = 'late'", "line 4, column 3 = '5'")
+    where = ("line 2, column 'length [m]' = 'long'", "line 3, column 'time [s]' = 'late'", "line 4, column 3 = '5'")
     lines = str(error.value).splitlines()
     assert len(lines) == 3
-    assert all(place in line for place, line in zip(places, lines, strict=True))
+    assert all(place in line for place, line in zip(where, lines, strict=True))
     with pytest.raises(DataFileError) as error:
         _table(tmp_path, "length [ft],tim [s]\n", time=MAYBE)
     assert len(str(error.value).splitlines()) == 2
@@ -172,24 +172,24 @@ def _grown(rows: int, *steps: tuple[int, int, int], short: int = 0) -> str:
     text = ",".join(TITLES)
     for n in range(rows):
         cells = _cells(n)
-        for start, place, more in sorted(steps, key=lambda step: -step[1]):
-            cells[place:place] = [str(90 + i) for i in range(more)] if n >= start else []
+        for start, index, more in sorted(steps, key=lambda step: -step[1]):
+            cells[index:index] = [str(90 + i) for i in range(more)] if n >= start else []
         text += "\n" + ",".join(cells[:3] if short and n == short else cells)
     return text + "\n"
 
 
-@pytest.mark.parametrize("place", range(len(TITLES) + 1))
+@pytest.mark.parametrize("index", range(len(TITLES) + 1))
 @pytest.mark.parametrize("start", [3, 40])
 def test_columns_that_are_inserted_later_leave_the_others_right_or_blank(
-    start: int, place: int, tmp_path: Path
+    start: int, index: int, tmp_path: Path
 ) -> None:
     """A cell is never taken for that of another column. All that are far from the insertion are read."""
-    table = read_columns(_file(tmp_path, _grown(90, (start, place, 2))), SI, others=True, loose=True, grown=grown_rows)
+    table = read_columns(_file(tmp_path, _grown(90, (start, index, 2))), SI, others=True, loose=True, grown=grown_rows)
     wanted = [_cells(n) for n in range(90)]
     for column, name in ((0, "time"), (1, "roll"), (3, "depth"), (4, "volts")):
         read = [(value, float(row[column])) for value, row in zip(table.values[name], wanted, strict=True)]
         assert all(value == true or (isnan(value) and n >= start) for n, (value, true) in enumerate(read))
-        if abs(column + 0.5 - place) > 2.0:
+        if abs(column + 0.5 - index) > 2.0:
             assert all(value == true for value, true in read)
     told = table.assumed["grown rows"]
     assert (told["line"], told["cells"], told["columns"]) == (str(start + 2), "8", "6")

@@ -126,8 +126,8 @@ def test_tables_are_searched_in_the_folder_and_then_among_the_shipped_ones(folde
 
 
 def test_the_name_of_a_place_leads_back_to_it(folder: Path) -> None:
-    for place, name in ((folder / "tables" / "a.csv", "tables/a.csv"), (MODELS / "videoray", "videoray")):
-        assert name_of(place, folder) == name
-        assert inside_or_shipped(folder, name) == place
+    for path, name in ((folder / "tables" / "a.csv", "tables/a.csv"), (MODELS / "videoray", "videoray")):
+        assert name_of(path, folder) == name
+        assert inside_or_shipped(folder, name) == path
     with pytest.raises(ValueError, match=r"secret is not inside the folder of this file$"):
         name_of(folder.parent / "secret", folder)

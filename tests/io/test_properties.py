@@ -63,6 +63,6 @@ def test_a_table_is_the_same_in_any_dialect(tables: int, tmp_path: Path) -> None
         assert [*table.lines] == [n for n in range(start, start + len(lines)) if n != start + blank], text
         assert ("code page" in table.assumed) == (encoding == "cp1252")
         assert table.assumed.get("lines before header", {}).get("count", 0) == told, text
-        place = f"line {table.lines[0]}, column '.*' = "
-        with pytest.raises(DataFileError, match=f"{place}.*must be at least 2000"):
+        where = f"line {table.lines[0]}, column '.*' = "
+        with pytest.raises(DataFileError, match=f"{where}.*must be at least 2000"):
             read_columns(path, columns | {"angle": Column({"°": 1.0}, minimum=2000.0)})

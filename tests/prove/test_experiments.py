@@ -45,8 +45,8 @@ def read(
 
 
 def times(of: list[Experiment]) -> tuple[float, float, float, float]:
-    (one,) = of
-    return one.start, one.stop, one.step, one.tolerance
+    (experiment,) = of
+    return experiment.start, experiment.stop, experiment.step, experiment.tolerance
 
 
 def test_an_experiment_without_times_takes_a_second_in_500_steps(tmp_path: Path) -> None:
@@ -70,10 +70,10 @@ def test_a_million_steps_are_run_and_one_more_is_not(tmp_path: Path) -> None:
 
 
 def test_parameters_and_references_are_read(tmp_path: Path) -> None:
-    (one,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
-    assert (one.name, one.parameters, one.stimuli) == ("a", {"k": "2"}, None)
-    assert one.references is not None
-    assert {name: [*values] for name, values in one.references.items()} == {"time": [0.0, 1.0], "y": [0.0, 1.0]}
+    (experiment,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
+    assert (experiment.name, experiment.parameters, experiment.stimuli) == ("a", {"k": "2"}, None)
+    assert experiment.references is not None
+    assert {name: [*values] for name, values in experiment.references.items()} == {"time": [0.0, 1.0], "y": [0.0, 1.0]}
 
 
 @pytest.mark.parametrize(

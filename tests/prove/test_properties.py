@@ -42,8 +42,8 @@ def is_refused(content: bytes, path: Path) -> bool:
     return False
 
 
-def flipped(content: bytes, place: int, bit: int) -> bytes:
-    return content[:place] + bytes([content[place] ^ 1 << bit]) + content[place + 1 :]
+def flipped(content: bytes, offset: int, bit: int) -> bytes:
+    return content[:offset] + bytes([content[offset] ^ 1 << bit]) + content[offset + 1 :]
 
 
 # ---- FMUs of ours ----------------------------------------------------------------------------------------------------
@@ -59,10 +59,10 @@ def test_no_bit_of_an_archive_can_be_changed(stride: int, small: bytes, tmp_path
     assert not is_refused(small, path)
     begin, end = small.index(b"<?xml"), small.index(b"ResourceMetaData>\n") + 16
     assert small[begin:end].count(b"rov-fmu.archive") == 1
-    for place in range(0, len(small), stride):
-        if not begin <= place < end or place % 50 == 0:
-            for bit in range(8) if stride == 1 else [place // stride % 8]:
-                assert is_refused(flipped(small, place, bit), path), (place, bit)
+    for offset in range(0, len(small), stride):
+        if not begin <= offset < end or offset % 50 == 0:
+            for bit in range(8) if stride == 1 else [offset // stride % 8]:
+                assert is_refused(flipped(small, offset, bit), path), (offset, bit)
 
 
 @often("count", 30, 500, 2000)
@@ -70,8 +70,8 @@ def test_no_bit_of_the_shipped_fmu_can_be_changed(count: int, videoray_fmu: Path
     content, draws = videoray_fmu.read_bytes(), random.Random(count)
     assert not is_refused(content, tmp_path / "videoray.fmu")
     for _ in range(count):
-        place, bit = draws.randrange(len(content)), draws.randrange(8)
-        assert is_refused(flipped(content, place, bit), tmp_path / "videoray.fmu"), (place, bit)
+        offset, bit = draws.randrange(len(content)), draws.randrange(8)
+        assert is_refused(flipped(content, offset, bit), tmp_path / "videoray.fmu"), (offset, bit)
 
 
 def _pieces(content: bytes, draws: random.Random) -> Iterator[bytes]:
@@ -88,8 +88,8 @@ def _pieces(content: bytes, draws: random.Random) -> Iterator[bytes]:
 def test_nothing_can_be_inserted_before_within_or_after(count: int, videoray_fmu: Path, tmp_path: Path) -> None:
     content, draws = videoray_fmu.read_bytes(), random.Random(count)
     for n, piece in zip(range(count), _pieces(content, draws), strict=False):
-        place = (0, len(content), draws.randrange(len(content)))[n % 3]
-        assert is_refused(content[:place] + piece + content[place:], tmp_path / "videoray.fmu"), (n, place)
+        offset = (0, len(content), draws.randrange(len(content)))[n % 3]
+        assert is_refused(content[:offset] + piece + content[offset:], tmp_path / "videoray.fmu"), (n, offset)
 
 
 def test_an_empty_block_in_the_compressed_bytes_is_found(small: bytes, tmp_path: Path) -> None:
@@ -106,8 +106,8 @@ def test_an_empty_block_in_the_compressed_bytes_is_found(small: bytes, tmp_path:
     struct.pack_into("<L", changed, 18, len(longer))
     struct.pack_into("<L", changed, directory + 20, len(longer))
     for entry in others:
-        place = changed.index(entry.filename.encode(), directory) - 4
-        struct.pack_into("<L", changed, place, entry.header_offset + more)
+        offset = changed.index(entry.filename.encode(), directory) - 4
+        struct.pack_into("<L", changed, offset, entry.header_offset + more)
     struct.pack_into("<L", changed, len(changed) - 6, directory)
     unpack_fmu(BytesIO(bytes(changed)), Path("a.fmu"), tmp_path / "as in any FMU")
     (tmp_path / "small.fmu").write_bytes(changed)
@@ -117,8 +117,8 @@ def test_an_empty_block_in_the_compressed_bytes_is_found(small: bytes, tmp_path:
 
 def test_a_date_or_an_attribute_of_a_file_is_found_and_named(small: bytes, tmp_path: Path) -> None:
     path, directory = tmp_path / "small.fmu", small.index(b"PK\1\2")
-    for place in (directory + 4, directory + 5, directory + 36, directory + 38, len(small) - 18):
-        path.write_bytes(flipped(small, place, 0))
+    for offset in (directory + 4, directory + 5, directory + 36, directory + 38, len(small) - 18):
+        path.write_bytes(flipped(small, offset, 0))
         with pytest.raises(ProofError, match=r"small\.fmu: the archive was altered after the FMU was built, although"):
             check_evidence(path)
 
@@ -128,8 +128,8 @@ def test_an_fmu_of_an_earlier_version_is_to_be_built_again(tmp_path: Path) -> No
     document = meta_data(load_vehicle(SHIPPED["videoray"]), _FILES, b"")
     old = re.sub(rb'(?s) *<stc:Classification type="rov-fmu.archive">.*?</stc:Classification>\n', b"", document)
     assert len(old) < len(document)
-    place = old.index(b'">', old.index(META_DATA.encode())) + 2
-    old = old[:place] + own_hash(old).encode() + old[place + 64 :]
+    offset = old.index(b'">', old.index(META_DATA.encode())) + 2
+    old = old[:offset] + own_hash(old).encode() + old[offset + 64 :]
     (tmp_path / "old.fmu").write_bytes(archive(_FILES, lambda _: old))
     with pytest.raises(ProofError, match="no hash, because an earlier rov-fmu built it: build it again"):
         check_evidence(tmp_path / "old.fmu")
@@ -222,8 +222,8 @@ def _with_fields(before: bytes, of_directory: bytes) -> bytes:
 
 def _without_signatures(content: bytes) -> bytes:
     """Leave the optional signatures of the sizes behind the content out of a streamed archive with one file."""
-    place, directory = content.index(b"PK\7\10"), content.index(b"PK\1\2") - 4
-    changed = bytearray(content[:place] + content[place + 4 :])
+    offset, directory = content.index(b"PK\7\10"), content.index(b"PK\1\2") - 4
+    changed = bytearray(content[:offset] + content[offset + 4 :])
     struct.pack_into("<L", changed, len(changed) - 6, directory)
     return bytes(changed)
 
@@ -248,9 +248,9 @@ def test_an_honest_archive_is_unpacked_and_refused_if_a_piece_is_inserted(kind: 
     unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
     assert (tmp_path / "modelDescription.xml").read_bytes() == b"<a/>" * 9
     for n, piece in zip(range(40), _pieces(content, draws), strict=False):
-        place = (0, len(content), draws.randrange(len(content)))[n % 3]
+        offset = (0, len(content), draws.randrange(len(content)))[n % 3]
         with pytest.raises(FileError, match=r"^a\.fmu: "):
-            unpack_fmu(BytesIO(content[:place] + piece + content[place:]), Path("a.fmu"), tmp_path)
+            unpack_fmu(BytesIO(content[:offset] + piece + content[offset:]), Path("a.fmu"), tmp_path)
 
 
 def _entry(name: str, content: bytes) -> bytes:
@@ -260,10 +260,10 @@ def _entry(name: str, content: bytes) -> bytes:
 
 def _moved(content: bytes, more: int) -> bytes:
     """Return an archive whose directory says that all files lie further behind."""
-    changed, place = bytearray(content), 0
-    while (place := changed.find(b"PK\1\2", place)) >= 0:
-        struct.pack_into("<L", changed, place + 42, struct.unpack_from("<L", changed, place + 42)[0] + more)
-        place += 4
+    changed, offset = bytearray(content), 0
+    while (offset := changed.find(b"PK\1\2", offset)) >= 0:
+        struct.pack_into("<L", changed, offset + 42, struct.unpack_from("<L", changed, offset + 42)[0] + more)
+        offset += 4
     struct.pack_into("<L", changed, len(changed) - 6, struct.unpack_from("<L", changed, len(changed) - 6)[0] + more)
     return bytes(changed)
 
@@ -274,8 +274,8 @@ def _hidden_behind_a_stream(content: bytes) -> bytes:
     size = struct.unpack_from("<L", content, 18)[0] + len(hidden)
     changed = bytearray(_moved(content[:end] + hidden + content[end:], 0))
     struct.pack_into("<L", changed, len(changed) - 6, end + len(hidden))
-    for place in (18, end + len(hidden) + 20):
-        struct.pack_into("<L", changed, place, size)
+    for offset in (18, end + len(hidden) + 20):
+        struct.pack_into("<L", changed, offset, size)
     return bytes(changed)
 
 

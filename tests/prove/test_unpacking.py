@@ -14,6 +14,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, shown
+from rov_fmu.io.reading import open_file
 from rov_fmu.prove.unpacking import refusal, unpack_fmu
 
 _LINK = (stat.S_IFLNK | 0o777) << 16
@@ -138,8 +139,8 @@ def test_an_archive_that_claims_to_be_huge_is_refused_before_it_is_unpacked(tmp_
 
 def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp_path: Path) -> None:
     content = bytearray(_archive(_zeros(20)).getvalue())
-    for sign, place in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
-        struct.pack_into("<I", content, content.rindex(sign) + place, 1000)
+    for sign, offset in ((b"PK\x01\x02", 24), (b"PK\x03\x04", 22)):
+        struct.pack_into("<I", content, content.rindex(sign) + offset, 1000)
     with pytest.raises(FileError, match=r"^a\.fmu: member 'resources/zeros.bin': its header and its content must"):
         unpack_fmu(BytesIO(content), Path("a.fmu"), tmp_path)
     assert sum(file.stat().st_size for file in tmp_path.rglob("*") if file.is_file()) <= 1000
@@ -147,5 +148,5 @@ def test_an_archive_that_declares_too_small_a_size_is_not_unpacked_beyond_it(tmp
 
 def test_a_file_that_is_no_archive_is_one_line(tmp_path: Path) -> None:
     for path, reason in ((tmp_path / "none.fmu", "there is no such file"), (Path(__file__), "is not an FMU, or is")):
-        with pytest.raises(FileError, match=f"^{path}: {reason}"):
-            unpack_fmu(path, path, tmp_path)
+        with pytest.raises(FileError, match=f"^{path}: {reason}"), open_file(path) as file:
+            unpack_fmu(file, path, tmp_path)

@@ -81,8 +81,8 @@ def visit(browser: "Browser") -> Iterator[Callable[..., Visit]]:
         return visits[-1]
 
     yield new
-    for one in visits:
-        one.page.close()
+    for visit in visits:
+        visit.page.close()
 
 
 # ---- Pages on which vehicles fly -------------------------------------------------------------------------------------

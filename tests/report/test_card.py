@@ -50,9 +50,9 @@ def test_page_and_text_file_have_the_card_and_little_of_the_page_is_unfolded(
     page = files["documentation/index.html"].decode()
     shown = unfolded(page)
     assert {*card(vehicle)} <= {h.text_content() for h in html.fromstring(page).iter("h3")}
-    for one in (one for paragraphs in card(vehicle).values() for one in paragraphs):
-        assert f"- {' '.join(one.split())}" in text
-        assert " ".join(sentence(one).split()) in shown
+    for paragraph in (one for paragraphs in card(vehicle).values() for one in paragraphs):
+        assert f"- {' '.join(paragraph.split())}" in text
+        assert " ".join(sentence(paragraph).split()) in shown
     words = len(shown.split())
     assert 300 < words <= MOST_WORDS
     assert len(text_of(page).split()) > 2.0 * words

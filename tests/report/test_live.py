@@ -123,9 +123,9 @@ STILL = "live.vehicle.commands.every(name => live.flight.pilot.model.get(name) =
 def test_it_is_flown_by_keys_alone(fly: Fly) -> None:
     page = fly("heavy")
     assert page.evaluate("document.activeElement.id") == "live-stage"
-    for key, place in (("KeyW", "x"), ("KeyD", "psi")):
+    for key, state in (("KeyW", "x"), ("KeyD", "psi")):
         page.keyboard.down(key)
-        until(page, f"live.flight.pilot.model.get('{place}') > 0.1")
+        until(page, f"live.flight.pilot.model.get('{state}') > 0.1")
         page.keyboard.up(key)
     until(page, STILL)
     page.keyboard.press("Space")
@@ -438,18 +438,18 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
     known = columns_of_log(layout, axis)
     command = next(name for name, one in known.items() if one.commands)
     logs = []
-    for name, one in known.items():
-        beside = f"{command} [%]" if not one.commands else "depth [m]"
+    for name, column in known.items():
+        beside = f"{command} [%]" if not column.commands else "depth [m]"
         units = [
-            *one.column.units,
-            *(f"{unit} 2000" for unit in one.column.conversions if unit not in PULSES),
+            *column.column.units,
+            *(f"{unit} 2000" for unit in column.column.conversions if unit not in PULSES),
             "us",
             "us 0 2000",
         ]
-        for title in (name, *one.column.also):
+        for title in (name, *column.column.also):
             for unit in units:
-                header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if one.commands else ",voltage [V]")
-                rows = [f"{n},{n},{1000 + n}{'' if one.commands else ',12'}" for n in range(30)]
+                header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if column.commands else ",voltage [V]")
+                rows = [f"{n},{n},{1000 + n}{'' if column.commands else ',12'}" for n in range(30)]
                 logs.append("\n".join([header, *rows]))
     path = tmp_path / ("log_heave.csv" if axis else "dive.csv")
     flown = fly(kind).evaluate(

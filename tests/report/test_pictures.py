@@ -98,12 +98,12 @@ def test_a_plot_tells_its_script_where_its_panel_is_in_the_coordinates_of_its_li
     assert len([mark for mark, _ in marks if "line" in mark]) == 1
     left, top, right, bottom = upper["box"]
     (x0, x1), (y0, y1) = upper["x"], upper["y"]
-    places = [
+    points = [
         (left + (x - x0) / (x1 - x0) * (right - left), bottom + (y - y0) / (y1 - y0) * (top - bottom))
         for x, y in ((0.0, 1.0), (2.0, 5.0))
     ]
     assert [float(part) for part in re.findall(r"[\d.]+", line[0].get("d"))] == pytest.approx(
-        [*places[0], *places[1]], abs=0.05
+        [*points[0], *points[1]], abs=0.05
     )
 
 

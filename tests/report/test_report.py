@@ -153,8 +153,8 @@ def test_thrusters_that_also_drive_another_axis_are_told_only_where_they_do() ->
     weaker, weak = (replace(example(), vehicle=extended(symmetric, **values)) for values in astern)
     assert not driven_aside(weaker)
     assert [line.partition(":")[0] for line in driven_aside(weak)] == ["yaw"]
-    one = symmetric.layout.thrusters_along(YAW)[0].name
-    lame = replace(example(), vehicle=symmetric.with_(**{f"health_{one}": 0.7}))
+    thruster = symmetric.layout.thrusters_along(YAW)[0].name
+    lame = replace(example(), vehicle=symmetric.with_(**{f"health_{thruster}": 0.7}))
     assert [line.partition(":")[0] for line in driven_aside(lame)] == ["surge", "yaw"]
     for path in SHIPPED.values():
         vehicle = load_vehicle(path)

@@ -41,8 +41,8 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
     It has one thread, because each thread starts a process for the FMU in every study.
     """
     folder = tmp_path_factory.mktemp("cluster")
-    places = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
-    with LocalCluster(n_workers=1, threads_per_worker=1, **places) as started:
+    settings = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
+    with LocalCluster(n_workers=1, threads_per_worker=1, **settings) as started:
         yield started
 
 

@@ -96,8 +96,8 @@ KINDS: dict[str, Callable[[Path, Vehicle, Random], None]] = {"recordings": recor
 def true_motion(k: Vehicle) -> dict[str, Array]:
     """Return u and x at the times, and the stopping distance."""
     motion = run(k, SURGE, ((0.5, OFF), (0.0, OFF + 0.2)), 10.0)
-    places = [round(10.0 * time) for time in TIMES]
-    u, x = motion.velocity[places], motion.position[places]
+    rows = [round(10.0 * time) for time in TIMES]
+    u, x = motion.velocity[rows], motion.position[rows]
     return {"u": u, "x": x, "stopping_distance": x[-1:] - x[TIMES.index(OFF)]}
 
 

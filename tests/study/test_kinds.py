@@ -55,9 +55,9 @@ def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, schedul
     return study(_plan(folder, videoray_fmu), folder / "results", scheduler=scheduler)
 
 
-def _close(one: Results, other: Results) -> None:
-    pd.testing.assert_frame_equal(one.runs, other.runs, rtol=1e-11, atol=1e-13)
-    pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), rtol=1e-11, atol=1e-13)
+def _close(results: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(results.runs, other.runs, rtol=1e-11, atol=1e-13)
+    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), rtol=1e-11, atol=1e-13)
 
 
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:

@@ -71,9 +71,9 @@ def _expected(runs: pd.DataFrame, t: Any) -> Any:
     return to * (1.0 - np.exp(-t / 0.5)) + 0.5 * (1.0 - np.exp(-max(t - 1.0, 0.0) / 0.5))
 
 
-def _same(one: Results, other: Results) -> None:
-    pd.testing.assert_frame_equal(one.runs, other.runs, check_exact=True)
-    pd.testing.assert_frame_equal(one.trajectories(), other.trajectories(), check_exact=True)
+def _same(results: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(results.runs, other.runs, check_exact=True)
+    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), check_exact=True)
 
 
 @pytest.fixture

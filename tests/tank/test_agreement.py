@@ -155,13 +155,13 @@ def test_columns_of_one_axis_are_corrected(
 ) -> None:
     """In a log of surge alone, a current may be between them."""
     position, velocity = (values[:, 0] for values in sensed("noisy", 2))
-    places, speeds = channel(quantities[0], TIME, position), channel(quantities[1], TIME, velocity - offset)
-    found = checked(Log("a.csv", None, (places, speeds), axis))
-    one = used(found, quantities[1])
+    positions, speeds = channel(quantities[0], TIME, position), channel(quantities[1], TIME, velocity - offset)
+    found = checked(Log("a.csv", None, (positions, speeds), axis))
+    speed = used(found, quantities[1])
     expected = [float(words.split(maxsplit=1)[0])] if words else []
-    assert [float(text) for text in one.corrected.split()[:1]] == pytest.approx(expected, abs=0.11)
-    assert one.corrected.split()[1:] == words.split()[1:]
-    assert one.values == pytest.approx(velocity if words else velocity - offset, abs=0.003)
+    assert [float(text) for text in speed.corrected.split()[:1]] == pytest.approx(expected, abs=0.11)
+    assert speed.corrected.split()[1:] == words.split()[1:]
+    assert speed.values == pytest.approx(velocity if words else velocity - offset, abs=0.003)
     assert [f.words["velocity"] for f in found.findings if f.kind == "velocity corrected"] == [quantities[1]] * bool(
         words
     )

@@ -49,9 +49,9 @@ def test_variables_of_matlab(tmp_path: Path) -> None:
     assert seen.columns["log.t"] == "time [s]"
     assert seen.columns["log.pwm(1)"] == "u_1 [us]"
     (tmp_path / "any").unlink()
-    (one,) = load_tests(folder(tmp_path, columns)).folder.logs
-    assert measured(one, "depth") == pytest.approx(motion.DEPTH)
-    assert commanded(one, "6") == pytest.approx(motion.THRUSTERS["6"])
+    (log,) = load_tests(folder(tmp_path, columns)).folder.logs
+    assert measured(log, "depth") == pytest.approx(motion.DEPTH)
+    assert commanded(log, "6") == pytest.approx(motion.THRUSTERS["6"])
 
 
 MATLAB = {

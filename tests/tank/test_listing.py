@@ -65,8 +65,8 @@ def test_a_log_is_recognised_whatever_its_suffix(tmp_path: Path) -> None:
         (tmp_path / suffix).mkdir()
         paths.append(write(tmp_path / suffix, DIVE).rename(own / f"0000001{n}{'.log' * (n % 2)}"))
     assert list_files(own) == Listing(own, sorted(paths))
-    (one,) = inspect_logs([paths[0]]).logs
-    assert len(one.commands) == 6
+    (inspection,) = inspect_logs([paths[0]]).logs
+    assert len(inspection.commands) == 6
 
 
 @pytest.mark.parametrize("suffix", ["tsv", "txt", "data"])

@@ -50,12 +50,12 @@ def test_one_dive_is_read_under_any_name(name: str, tmp_path: Path) -> None:
     read = read_log(path, BLUEROV2)
     motion.check(read.log, lacking=LACKING.get(WRITERS[name], ()))
     assert [finding.kind for finding in read.findings] == TOLD.get(name, ["source of commands", "unknown direction"])
-    (one,) = inspect(path, [BLUEROV2])
-    written = {f"thruster {name}": (values, 1e-6) for name, values in motion.THRUSTERS.items()} | motion.expected()
-    assert [row.name for row in one.commands] == [*written][:6]
-    assert [row.unit for row in one.commands] == ["1"] * 6
-    for row in (*one.commands, *one.channels):
-        values, within = written[row.name]
+    (inspection,) = inspect(path, [BLUEROV2])
+    logged = {f"thruster {name}": (values, 1e-6) for name, values in motion.THRUSTERS.items()} | motion.expected()
+    assert [row.name for row in inspection.commands] == [*logged][:6]
+    assert [row.unit for row in inspection.commands] == ["1"] * 6
+    for row in (*inspection.commands, *inspection.channels):
+        values, within = logged[row.name]
         if row.name != "heading":  # which wraps
             assert (row.low, row.high) == pytest.approx((values.min(), values.max()), abs=within), row.name
         assert (row.samples, row.gaps) == (100, [])

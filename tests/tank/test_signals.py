@@ -46,8 +46,8 @@ def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart(values: li
 
 
 def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:
-    one = commands(np.array([3.0]), {"a": np.array([0.5])})
-    assert (one.interval, one.end) == (0.0, 3.0)
+    told = commands(np.array([3.0]), {"a": np.array([0.5])})
+    assert (told.interval, told.end) == (0.0, 3.0)
     several = commands(np.array([3.0, 4.0, 6.0, 10.0]), {"a": np.array([0.1, -0.4, 0.2, 0.2]), "b": np.zeros(4)})
     assert (several.end, several.largest) == (12.0, {"a": 0.4, "b": 0.0})
     assert several.at(np.array([2.9, 3.0, 5.9]))[:, 0].tolist() == [0.0, 0.1, -0.4]
@@ -61,17 +61,17 @@ def test_commands_at_any_times_are_held_while_measurements_go_on_even_if_some_re
     for n in random.choice(np.arange(1, 40), repeats, replace=False):
         values[n] = values[n - 1]
     measured = np.arange(0.0, rows[-1] + 5.0, 0.1)
-    one = commands(rows, {"a": values})
-    held = one.held_while(measured)
+    told = commands(rows, {"a": values})
+    held = told.held_while(measured)
     assert {*measured[measured >= rows[0]]} <= {*held.rows}
-    assert held.at(measured).tolist() == one.at(measured).tolist()
+    assert held.at(measured).tolist() == told.at(measured).tolist()
 
 
 def test_regular_commands_with_a_gap_stay_as_they_are() -> None:
     """They may have changed between their rows, and during the gap."""
     rows = np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(15.0, 25.0, 0.5)])
-    one = commands(rows, {"a": np.repeat(np.linspace(-0.5, 0.5, 10), 4)})
-    assert one.held_while(np.arange(0.0, 25.0, 0.1)) is one
+    told = commands(rows, {"a": np.repeat(np.linspace(-0.5, 0.5, 10), 4)})
+    assert told.held_while(np.arange(0.0, 25.0, 0.1)) is told
 
 
 def test_rows_begin_when_each_series_has_a_value() -> None:

@@ -8,7 +8,7 @@ import pandas as pd
 import pytest
 
 from verification.identification import __main__ as command
-from verification.identification.data import Split, load
+from verification.identification.data import Split, split_of
 from verification.identification.datasets import EXJOBB
 from verification.identification.datasets.simulated import CALM, ROUGH, TINY, Simulated
 from verification.identification.methods.identified import Identified
@@ -25,7 +25,7 @@ HERE = [
 
 @pytest.fixture(scope="module")
 def split(tmp_path_factory: pytest.TempPathFactory) -> Split:
-    return load(TINY, None, tmp_path_factory.mktemp("tiny"))
+    return split_of(TINY, None, tmp_path_factory.mktemp("tiny"))
 
 
 @pytest.fixture(scope="module", params=HERE)
@@ -95,7 +95,7 @@ def test_the_command_writes_the_scores(
     ids=lambda one: one.name,
 )
 def test_our_bands_cover_on_the_simulated_vehicle(known: Simulated, tmp_path: Path) -> None:
-    outcome = run(Identified(), load(known, None, tmp_path))
+    outcome = run(Identified(), split_of(known, None, tmp_path))
     assert scores(outcome).inside_95.mean() >= 0.85
     several = numbers(outcome)
     assert len(several) == 20

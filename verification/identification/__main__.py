@@ -17,7 +17,7 @@ from rich.console import Console
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
-from verification.identification.data import DataSet, Recorded, load
+from verification.identification.data import DataSet, Recorded, split_of
 from verification.identification.datasets import EXJOBB, TAUV
 from verification.identification.datasets.simulated import CALM, ROUGH
 from verification.identification.protocol import Method, run
@@ -62,7 +62,7 @@ def _command(data: Path | None, only: tuple[str, ...], output: Path) -> None:
             if (only and one.name not in only) or (isinstance(one, Recorded) and not data):
                 log.print(f"{one.name}: not run" + ("" if only else ", because --data is not given"))
                 continue
-            split = load(one, data, Path(folder))
+            split = split_of(one, data, Path(folder))
             for name in METHODS:
                 outcome = run(make(name), split)
                 log.print(f"{one.name}: {outcome.method.name}, {outcome.seconds:.1f} s")

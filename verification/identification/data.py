@@ -195,16 +195,16 @@ class Split:
         return vehicle.force(axis, command)
 
 
-def load(one: DataSet, data: Path | None, into: Path) -> Split:
+def split_of(data_set: DataSet, data: Path | None, into: Path) -> Split:
     """Read a data set by way of a folder for each part. Raises DataFileError and VehicleFileError."""
-    folders = {part: into / one.name.replace(" ", "_") / part for part in PARTS}
+    folders = {part: into / data_set.name.replace(" ", "_") / part for part in PARTS}
     for part, folder in folders.items():
         folder.mkdir(parents=True)
-        one.write(part, data, folder)
+        data_set.write(part, data, folder)
     tests = load_tests(folders["training"])
     known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
-    begins = {log.log.file: log.record.told[0] + one.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
+    begins = {log.log.file: log.record.told[0] + data_set.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
     off = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values()))
     training, test = (
         [_recording(known, log) for log in some] for some in (logs, Model(known, unseen, rows).applied(off).logs)
@@ -213,7 +213,7 @@ def load(one: DataSet, data: Path | None, into: Path) -> Split:
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)
     edits = {True: sum(count.values()), False: names}
-    return Split(one.name, tests, known, rows, training, test, one.truth, edits)
+    return Split(data_set.name, tests, known, rows, training, test, data_set.truth, edits)
 
 
 def _recording(known: Prior, log: SampledLog) -> Recording:

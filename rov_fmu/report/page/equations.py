@@ -177,7 +177,7 @@ def _times_sign(c: Expression, factors: Sequence[Expression]) -> list[Expression
     size = abs(c)
     if size not in factors:
         return [call("sgn", c), *factors]
-    last = max(place for place, factor in enumerate(factors) if factor == size)
+    last = max(index for index, factor in enumerate(factors) if factor == size)
     return [*factors[:last], c, *factors[last + 1 :]]
 
 

@@ -79,7 +79,7 @@ class Live:
     tested: float
     """The largest command for which the model was identified."""
     places: Mapping[str, str]
-    """The place of the thruster, by the command that drives only this thruster."""
+    """Where the thruster is ("left rear"), by the command that drives only this thruster."""
     start: Mapping[str, float]
     """The start value of each variable."""
     loads: Sequence[tuple[str, float, str]]
@@ -186,15 +186,15 @@ def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
     for kind in (INPUTS, THRUSTERS):
         own = {name: one for name, one in (fins | columns).items() if one.commands == kind}
         gains = [
-            {name: 1.0} if name in layout.commands else layout.gains[one.entry.name]
-            for name, one in own.items()
-            if one.entry
+            {name: 1.0} if name in layout.commands else layout.gains[column.entry.name]
+            for name, column in own.items()
+            if column.entry
         ]
         matrix = np.array([[row.get(command, 0.0) for command in layout.commands] for row in gains])
         shares = np.linalg.pinv(matrix, rcond=1e-9).T if gains else ()
-        for (name, one), row, share in zip(own.items(), gains, shares, strict=True):
+        for (name, column), row, share in zip(own.items(), gains, shares, strict=True):
             by_command = dict(zip(layout.commands, map(float, share), strict=True))
-            yield {"name": name, "also": one.column.also, "kind": kind, "gains": row, "shares": by_command}
+            yield {"name": name, "also": column.column.also, "kind": kind, "gains": row, "shares": by_command}
 
 
 def _keys(layout: Layout) -> list[tuple[Axis, str]]:
@@ -233,10 +233,10 @@ def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     axes = layout.bare_axes
     effects = [
         [
-            sum(vehicle.effect(t, one) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
+            sum(vehicle.effect(t, other) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
             for name in layout.commands
         ]
-        for one in axes
+        for other in axes
     ]
     shares = np.linalg.pinv(np.array(effects), rcond=1e-9)[:, axes.index(axis)]
     most = np.abs(shares).max(initial=0.0)
@@ -277,9 +277,9 @@ def _places(vehicle: Vehicle) -> dict[str, str]:
 
 def _labels(vehicle: Vehicle) -> dict[str, str]:
     """Return where each thruster is ("left rear"), by its name. Labels of thrusters at the same place have the name."""
-    places = {thruster.name: _label(vehicle, thruster) for thruster in vehicle.layout.thrusters}
-    same = Counter(places.values())
-    return {name: label if same[label] == 1 else f"{name} {label}".rstrip() for name, label in places.items()}
+    labels = {thruster.name: _label(vehicle, thruster) for thruster in vehicle.layout.thrusters}
+    same = Counter(labels.values())
+    return {name: label if same[label] == 1 else f"{name} {label}".rstrip() for name, label in labels.items()}
 
 
 def _label(vehicle: Vehicle, thruster: Thruster) -> str:
@@ -320,10 +320,11 @@ def _loads(vehicle: Vehicle, start: Mapping[str, float]) -> Iterator[tuple[str, 
 def _ballast(vehicle: Vehicle) -> Iterator[Slider]:
     """Yield the sliders of the mass, the weight, the buoyancy, their centres, and the scales of tables of thrust."""
     for name in vehicle.layout.ballast:
-        one = vehicle.layout.coefficients[name]
-        value, (low, high) = vehicle[name], (0.8, 1.25) if one.unit == "N" else (0.5, 2.0)
-        ends = (value - _FARTHEST, value + _FARTHEST) if one.unit == "m" else (low * value, high * value)
-        yield name, name, *ends, value, "" if one.unit == "1" else pretty_unit(one.unit), one.description
+        declaration = vehicle.layout.coefficients[name]
+        value, unit = vehicle[name], declaration.unit
+        low, high = (0.8, 1.25) if unit == "N" else (0.5, 2.0)
+        ends = (value - _FARTHEST, value + _FARTHEST) if unit == "m" else (low * value, high * value)
+        yield name, name, *ends, value, "" if unit == "1" else pretty_unit(unit), declaration.description
 
 
 def _health(vehicle: Vehicle) -> Iterator[Slider]:

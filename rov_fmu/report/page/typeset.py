@@ -107,10 +107,10 @@ def _powers(factors: Iterable[Expression]) -> Iterator[Expression]:
 def _products(x: Expression) -> list[_Product]:
     """Return the products of which a formula is the sum, with each common first factor before a bracket."""
     alike: dict[object, list[_Product]] = {}
-    for place, one in enumerate(_terms(x)):
-        head = one.above[0] if len(one.above) > 1 else None
-        key = f"{head.value:.12g}" if isinstance(head, Number) else head or place
-        alike.setdefault(key, []).append(one)
+    for index, term in enumerate(_terms(x)):
+        head = term.above[0] if len(term.above) > 1 else None
+        key = f"{head.value:.12g}" if isinstance(head, Number) else head or index
+        alike.setdefault(key, []).append(term)
     products = []
     for first, *others in alike.values():
         rest = total(_Product(one.sign * first.sign, one.above[1:], one.below).formula() for one in (first, *others))

@@ -133,12 +133,12 @@ def _arranged(vehicle: Vehicle, view: str, inch: float) -> Scene:
 
     def name(words: str, width: float, color: str, at: Place, distance: float, *directions: Place) -> None:
         half = width * inch / 2.0, _HEIGHT * inch / 2.0
-        places = []
+        points = []
         for times, (dx, dy) in product((1.0, 2.5), directions):
             gap = distance + times * _GAP * inch
             x, y = (part / (hypot(dx, dy) or 1.0) for part in (dx, dy))
-            places.append((at[0] + x * gap + _side(x) * half[0], at[1] + y * gap + _side(y) * half[1]))
-        best = min(places, key=lambda place: [_overlaps((place, half), some) for some in (boxes, circles, lines)])
+            points.append((at[0] + x * gap + _side(x) * half[0], at[1] + y * gap + _side(y) * half[1]))
+        best = min(points, key=lambda point: [_overlaps((point, half), some) for some in (boxes, circles, lines)])
         labels.append((words, best, color))
         boxes.append((best, half))
 
@@ -177,9 +177,9 @@ def _along(start: Place, end: Place) -> Iterator[_Box]:
         yield (x, y), (0.0, 0.0)
 
 
-def _overlaps(one: _Box, others: Iterable[_Box]) -> int:
+def _overlaps(box: _Box, others: Iterable[_Box]) -> int:
     """Return how many boxes, each with its centre and half its size, overlap one of them."""
-    return sum(all(abs(one[0][n] - box[0][n]) < one[1][n] + box[1][n] for n in (0, 1)) for box in others)
+    return sum(all(abs(box[0][n] - other[0][n]) < box[1][n] + other[1][n] for n in (0, 1)) for other in others)
 
 
 def has_scale(vehicle: Vehicle) -> bool:

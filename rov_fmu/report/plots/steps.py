@@ -140,8 +140,8 @@ def draw_steps(ax: Axes, axis: Axis, steps: Sequence[Step], models: Sequence[tup
 def _label(ax: Axes, ends: Sequence[tuple[float, str, str]]) -> None:
     """Label each line at its end, given its last value, its label and its colour. Labels do not cover each other."""
     low, high = ax.get_ylim()
-    place, apart = low - high, _APART * (high - low)
+    height, apart = low - high, _APART * (high - low)
     for value, label, color in sorted(ends):
-        place = max(value, place + apart)
+        height = max(value, height + apart)
         right = 1.015 * ax.get_xlim()[1]
-        ax.text(right, place, label, color=color, va="center", fontsize=8.5)
+        ax.text(right, height, label, color=color, va="center", fontsize=8.5)

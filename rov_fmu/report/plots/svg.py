@@ -224,8 +224,8 @@ def _mark(figure: Figure) -> None:
     height = 72.0 * figure.get_figheight()
     for ax in figure.axes:
         box, title = ax.bbox, ax.get_title(loc="left")
-        place = [round(part, 2) for part in (box.x0, height - box.y1, box.x1, height - box.y0)]
-        panel = {"box": place, "x": ax.get_xlim(), "y": ax.get_ylim(), "title": title or ax.get_ylabel()}
+        corners = [round(part, 2) for part in (box.x0, height - box.y1, box.x1, height - box.y0)]
+        panel = {"box": corners, "x": ax.get_xlim(), "y": ax.get_ylim(), "title": title or ax.get_ylabel()}
         ax.set_gid(json.dumps(panel | {"along": ax.get_xlabel() or figure.axes[-1].get_xlabel()}))
         ax.xaxis.set_gid('{"ticks": "x"}')
         named = [(line.get_label(), [line]) for line in ax.lines] + [(bars.get_label(), bars) for bars in ax.containers]

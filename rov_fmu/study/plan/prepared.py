@@ -168,11 +168,11 @@ def _check_rows(
     for name, signal in from_file.items():
         taken = [(None, "is given in [inputs] too")] if name in plan.inputs else []
         for n, reason in taken or _misfits(name, signal, plan, has):
-            place = f"column {shown(name)}"
+            where = f"column {shown(name)}"
             if n is not None:
                 time, value = signal.points[n]
-                place = f"line {lines[n]}, {place} = {value:g} at {time:g} s"
-            yield f"{place}: {reason}"
+                where = f"line {lines[n]}, {where} = {value:g} at {time:g} s"
+            yield f"{where}: {reason}"
 
 
 def _misfits(name: str, signal: Signal, plan: Plan, has: Mapping[str, Variable]) -> Iterator[tuple[int | None, str]]:

@@ -30,11 +30,11 @@ class Design:
         self.runs = _runs(plan, len(self.groups))
         """The number of runs."""
         width, seed = len(self.names), plan.seed
-        places = [[self.names.index(name) for name in group] for group in self.groups]
+        indices = [[self.names.index(name) for name in group] for group in self.groups]
         draws: dict[str, Callable[[], _Draw]] = {
             "grid": lambda: _grid([len(varied.choices or ()) for varied in plan.vary.values()]),
             "sobol": lambda: _sobol(width, seed),
-            "saltelli": lambda: _saltelli(places, seed),
+            "saltelli": lambda: _saltelli(indices, seed),
             "latin-hypercube": lambda: _latin_hypercube(width, seed, self.runs),
             "random": lambda: _random(width, seed),
         }
@@ -106,9 +106,9 @@ def _grid(counts: Sequence[int]) -> _Draw:
 
     def draw(first: int, end: int) -> Array:
         drawn = np.empty((end - first, len(counts)))
-        _, *places = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
-        for column, place in enumerate(places):
-            drawn[:, column] = (place + 0.5) / counts[column]
+        _, *indices = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
+        for column, index in enumerate(indices):
+            drawn[:, column] = (index + 0.5) / counts[column]
         return drawn
 
     return draw
@@ -144,9 +144,9 @@ def _saltelli(groups: Sequence[Sequence[int]], seed: int) -> _Draw:
         start = first // block
         both = pairs(start, (end - 1) // block + 1)[rows // block - start]
         drawn = both[:, :width].copy()
-        places = rows % block
+        indices = rows % block
         for n, group in enumerate(groups):
-            taken = (places == n + 1) | (places == block - 1)
+            taken = (indices == n + 1) | (indices == block - 1)
             for column in group:
                 drawn[taken, column] = both[taken, width + column]
         return drawn

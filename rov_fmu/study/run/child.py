@@ -9,8 +9,8 @@ import fmpy
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError, Limits
-from rov_fmu.prove.description import DISK, MEMORY
+from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
+from rov_fmu.prove.description import budget
 from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.run.simulator import Job, LoadError, Simulator
@@ -69,7 +69,7 @@ class Child:
         return False
 
     def _call(self, method: str, *arguments: Any, time: float) -> Any:
-        limits = Limits(time=time, memory=MEMORY, disk=DISK)
+        limits = budget(time)
         if not self._process:
             try:
                 # In the folder of the worker, which the study removes even where Dask kills the worker.

@@ -76,7 +76,7 @@ class Simulator:
         self._start = self._groups({**job.plan.set, **dict.fromkeys(job.varied, 0.0)}, 1)
         self._inputs = self._groups(job.inputs, job.plan.steps)
         self._reads = self._groups(dict.fromkeys(job.recorded, 0.0), len(self._times))
-        self._places = {name: (group, n) for group in self._start for n, name in enumerate(group.names)}
+        self._columns = {name: (group, n) for group in self._start for n, name in enumerate(group.names)}
         self._changes = self._changing()
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
@@ -114,7 +114,7 @@ class Simulator:
     def _run(self, values: Sequence[float]) -> None:
         component, start = self._fmu.component, self._times[0]
         for name, value in zip(self._job.varied, values, strict=True):
-            group, column = self._places[name]
+            group, column = self._columns[name]
             group.table[0, column] = value
         for group in self._start:
             references, count, address, _ = group.call

@@ -120,9 +120,9 @@ def _trajectories(job: Job, first: int, found: Sequence[Run]) -> bytes:
     times = job.plan.times[np.array(job.plan.kept_points, int)]
     ended = [n for n, run in enumerate(found) if run.status != FAILED]
     table = {RUN: np.repeat(np.array(ended, int) + first, len(times)), TIME: np.tile(times, len(ended))}
-    for place, name in enumerate(job.plan.kept):
+    for index, name in enumerate(job.plan.kept):
         none = np.empty(0, job.model.variables[name].dtype(job.model.version))
-        table[name] = np.concatenate([none, *(found[n].kept[place] for n in ended)])
+        table[name] = np.concatenate([none, *(found[n].kept[index] for n in ended)])
     return _parquet(pa.table(table))
 
 

@@ -196,9 +196,9 @@ def _columns(inspections: Iterable[Inspection], tables: TableHeaders) -> tuple[d
     """Return what headers seem to mean, and the descriptions of the others."""
     columns = {title: meant for title, meant in tables.columns.items() if meant}
     others = dict.fromkeys(tables.columns, "")
-    for one in inspections:
-        columns |= one.columns
-        others |= one.unread
+    for inspection in inspections:
+        columns |= inspection.columns
+        others |= inspection.unread
     if any(meant.startswith("-depth") for meant in columns.values()):  # z points up, in all files
         turned = {axis.external for axis in AXES.values() if axis.place}
         columns = {title: f"-{meant}" if meant.split()[0] in turned else meant for title, meant in columns.items()}

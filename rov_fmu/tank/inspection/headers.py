@@ -398,8 +398,8 @@ def _force(title: str) -> Axis | None:
     match = re.search(rf"\b({FORCE}|{TORQUE})\b.* ([xyz])$", _words(title))
     if not match:
         return None
-    place, is_rotation = "xyz".index(match[2]), match[1] == TORQUE
-    return next(axis for axis in AXES.values() if (axis.place, axis.is_rotation) == (place, is_rotation))
+    index, is_rotation = "xyz".index(match[2]), match[1] == TORQUE
+    return next(axis for axis in AXES.values() if (axis.place, axis.is_rotation) == (index, is_rotation))
 
 
 def _unit_of_command(title: str, numbers: Array) -> str:

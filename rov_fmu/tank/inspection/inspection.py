@@ -234,15 +234,15 @@ def _numbers(path: Path, titles: Sequence[str], open_stream: OpenStream) -> tupl
     A header that several columns share gets no numbers, because it is ambiguous.
     """
     counts = Counter(titles)
-    places = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
-    columns = {place: Column({"1": 1.0}, True, True) for place in map(str, range(len(titles)))}
-    renamed = {title: f"{place} [1]" for title, place in places.items()}
+    columns_of = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
+    columns = {name: Column({"1": 1.0}, True, True) for name in map(str, range(len(titles)))}
+    renamed = {title: f"{name} [1]" for title, name in columns_of.items()}
     table = read_columns(
         path, columns, others=True, loose=True, renamed=renamed, grown=grown_rows, open_stream=open_stream
     )
     numbers, ranges = dict.fromkeys(titles, np.empty(0)), dict.fromkeys(titles, "")
-    for title, place in places.items():
-        values = np.frombuffer(table.values[place])
+    for title, name in columns_of.items():
+        values = np.frombuffer(table.values[name])
         numbers[title] = found = values[np.isfinite(values)]
-        ranges[title] = "text" if len(table.unread[place]) > len(found) else range_in_words(found)
+        ranges[title] = "text" if len(table.unread[name]) > len(found) else range_in_words(found)
     return numbers, ranges

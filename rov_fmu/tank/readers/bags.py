@@ -228,19 +228,19 @@ def _frames(message: Any, kind: str) -> tuple[str, str]:
     return ("", frame) if re.search("Imu|Twist|Wrench", kind) else (frame, child)
 
 
-def _numbers(place: str, value: Any) -> Iterator[tuple[str, float]]:
+def _numbers(field: str, value: Any) -> Iterator[tuple[str, float]]:
     """Yield the numbers of a message with their paths, except those of the header and of the layout of an array."""
     if isinstance(value, bool | int | float | np.number):
-        yield place, float(value)
+        yield field, float(value)
     elif isinstance(value, np.ndarray | Sequence):
-        is_covariance = place.endswith("covariance") and len(value) == _COVARIANCE**2
+        is_covariance = field.endswith("covariance") and len(value) == _COVARIANCE**2
         if is_covariance or (len(value) <= _LONGEST and not isinstance(value, str | bytes)):
             for n in range(0, len(value), _COVARIANCE + 1 if is_covariance else 1):
-                yield from _numbers(f"{place}[{n}]", value[n])
+                yield from _numbers(f"{field}[{n}]", value[n])
     else:
         for name, inner in _fields(value):
             if name not in ("header", "layout"):
-                yield from _numbers(f"{place}.{name}" if place else name, inner)
+                yield from _numbers(f"{field}.{name}" if field else name, inner)
 
 
 def _fields(value: Any) -> Iterator[tuple[str, Any]]:

@@ -138,5 +138,5 @@ def described(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProx
     for topic in topics:
         name, kind = topic.source.topic, topic.source.kind
         found[name] = f"{kind}, {messages.get(name, len(topic.time))} messages"
-        found |= {place: range_in_words(values) for place, values in topic.full_fields() if np.isfinite(values).any()}
+        found |= {field: range_in_words(values) for field, values in topic.full_fields() if np.isfinite(values).any()}
     return found

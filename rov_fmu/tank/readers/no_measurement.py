@@ -80,15 +80,15 @@ FLAG = Column({"1": 1.0}, optional=True, blanks=True, parse=truth)
 """The column of a flag of validity."""
 
 
-def flag_of(name: str, valid: Mapping[str, Sequence[str]], place: str = "") -> dict[str, bool]:
+def flag_of(name: str, valid: Mapping[str, Sequence[str]], field: str = "") -> dict[str, bool]:
     """Return the quantities of which a column or field is a flag, with the value of the flag where they are valid.
 
-    `place` is the place in a message, whose topic does not tell what the flag is about. `valid` is the table [valid] of
+    `field` is the field of a message, whose topic does not tell what the flag is about. `valid` is the table [valid] of
     rov.toml, where a minus before the name of a quantity means that a true flag marks what is invalid.
     """
     if name in valid:
         return {quantity.removeprefix("-"): not quantity.startswith("-") for quantity in valid[name]}
-    words = words_of(re.split(r"[\[(]", place or name)[0])
+    words = words_of(re.split(r"[\[(]", field or name)[0])
     if not words & _VALID or words & _OF_PARTS:
         return {}
     others = words - _VALID - {"is", "flag", "data", "measurement"}
@@ -142,22 +142,22 @@ def measured_only(
     kept = []
     for topic in topics:
         fields = dict(topic.fields)
-        for places, gone, what in _denied(topic):
-            for place in places:
-                fields[place] = without(fields[place], gone.copy(), "invalid", what, topic.full_name(place))
-        for place, (quantities, convert) in _measured(topic, entries).items():
-            column = topic.full_name(place)
+        for denied, gone, what in _denied(topic):
+            for field in denied:
+                fields[field] = without(fields[field], gone.copy(), "invalid", what, topic.full_name(field))
+        for field, (quantities, convert) in _measured(topic, entries).items():
+            column = topic.full_name(field)
             for flag in flags:
-                fields[place] = without(fields[place], flag.denies(topic, quantities), "invalid", flag.name, column)
+                fields[field] = without(fields[field], flag.denies(topic, quantities), "invalid", flag.name, column)
             quantity = QUANTITIES[quantities[0]]
             factor, unit = in_degrees(quantity.unit)
-            in_si = convert(fields[place])
+            in_si = convert(fields[field])
             least = f"{factor * quantity.least:g} {unit}"
-            fields[place] = without(fields[place], in_si < quantity.least, "below any", least, column)
+            fields[field] = without(fields[field], in_si < quantity.least, "below any", least, column)
             in_si = np.where(in_si < quantity.least, np.nan, in_si)
             found = dict.fromkeys(marks(topic.time, in_si, quantity), "mark")
             for mark, kind in (found or dict.fromkeys(only_mark(in_si, quantity), "only mark")).items():
-                fields[place] = without(fields[place], in_si == mark, kind, f"{factor * mark:.6g} {unit}", column)
+                fields[field] = without(fields[field], in_si == mark, kind, f"{factor * mark:.6g} {unit}", column)
         kept.append(replace(topic, fields=fields))
     findings = [
         about(file, kind, what=what, columns=listed(counts), count=sum(counts.values()))
@@ -169,12 +169,12 @@ def measured_only(
 def _denied(topic: Topic) -> Iterator[tuple[Collection[str], Flags, str]]:
     """Yield fields of a topic, where the same messages say that they are no measurements, and what says it."""
     for validity in VALIDITIES:
-        if re.fullmatch(validity.kind, topic.source.kind) and validity.place in topic.fields:
-            places = [place for place in topic.fields if re.fullmatch(validity.about, place)]
-            yield places, validity.denies(topic.fields[validity.place]), topic.full_name(validity.place)
+        if re.fullmatch(validity.kind, topic.source.kind) and validity.field in topic.fields:
+            fields = [field for field in topic.fields if re.fullmatch(validity.about, field)]
+            yield fields, validity.denies(topic.fields[validity.field]), topic.full_name(validity.field)
     for message in MESSAGES:
         if message.gives == QUATERNION and topic.has(message):
-            norm = np.linalg.norm([topic.fields[place] for place in message.fields], axis=0)
+            norm = np.linalg.norm([topic.fields[field] for field in message.fields], axis=0)
             yield message.fields, np.abs(norm - 1.0) > _OFF_NORM, "the norm of the quaternion"
 
 
@@ -188,19 +188,19 @@ def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, _Meaning]
         if message.gives != QUATERNION and topic.has(message):
             what = VECTORS.get(message.gives, (message.gives,)), partial(np.multiply, message.factor)
             meanings |= dict.fromkeys(message.fields, what)
-    for place in topic.fields:
-        if (entry := entries.get(topic.full_name(place))) and (quantity := entry.quantity):
+    for field in topic.fields:
+        if (entry := entries.get(topic.full_name(field))) and (quantity := entry.quantity):
             convert = entry.convert
-            meanings[place] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
+            meanings[field] = (quantity.name,), np.vectorize(convert, [float]) if convert else np.asarray
     return meanings
 
 
 def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Iterator[_Flag]:
     """Yield the flags in topics. One whose name tells what it is about is of the same message or row."""
     for topic in topics:
-        for place, values in topic.fields.items():
-            name, known = topic.full_name(place), np.isfinite(values)
-            quantities = flag_of(name, valid, place)
+        for field, values in topic.fields.items():
+            name, known = topic.full_name(field), np.isfinite(values)
+            quantities = flag_of(name, valid, field)
             if quantities and known.any():
                 own = None if name in valid else topic
                 yield _Flag(name, own, quantities, topic.time[known], values[known] > 0.0)
@@ -234,7 +234,7 @@ def only_mark(values: Array, quantity: Quantity) -> list[float]:
 
 
 def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:
-    """Yield the places of the outermost levels, of some in ascending order, that are far from all others.
+    """Yield the indices of the outermost levels, of some in ascending order, that are far from all others.
 
     The range of the others is that without the outermost ones on both sides, because there may be marks on both.
     """

@@ -66,20 +66,20 @@ class _DamagedError(Exception):
 
 def _end_of(file: IO[bytes]) -> int:
     """Return where the bytes of a file end that are not zeros, which a disk may have kept free for it."""
-    place = file.seek(0, 2)
-    while place > 0:
-        begin = max(place - _SLICE, 0)
+    end = file.seek(0, 2)
+    while end > 0:
+        begin = max(end - _SLICE, 0)
         file.seek(begin)
-        if content := file.read(place - begin).rstrip(b"\0"):
+        if content := file.read(end - begin).rstrip(b"\0"):
             return begin + len(content)
-        place = begin
+        end = begin
     return 0
 
 
 def _walk(
     file: IO[bytes], begin: int, records: Callable[[], Iterator[Raw]], starts: list[int], damage: Damage
 ) -> Iterator[Raw]:
-    """Yield the messages of the records from a place on. After a damaged one, go on at the next of the pieces whose
+    """Yield the messages of the records from an offset on. After a damaged one, go on at the next of the pieces whose
     starts an index tells."""
     known = sorted(starts)
     file.seek(begin)
@@ -154,7 +154,7 @@ class _Mcap:
         self.streams[channel.id] = Stream(channel.topic, kind, channel.message_encoding, language, definition)
 
     def messages(self, file: IO[bytes], end: int, *, is_chunk: bool = False, is_trusted: bool = True) -> Iterator[Raw]:
-        """Yield the messages in the records from the place of the file on. Raises _DamagedError.
+        """Yield the messages in the records from the offset of the file on. Raises _DamagedError.
 
         `is_trusted` is False in a damaged chunk, of which only the schemas and channels are used.
         """
@@ -243,7 +243,7 @@ class _Bag:
         return _fields(header), self._length(file)
 
     def read_index(self, file: IO[bytes], end: int) -> list[int]:
-        """Return where the chunks begin, by the index from the place of the file on, and add its connections. Raises
+        """Return where the chunks begin, by the index from the offset of the file on, and add its connections. Raises
         _DamagedError."""
         found = []
         while file.tell() < end:
@@ -264,7 +264,7 @@ class _Bag:
         self.streams[fields.get(b"conn", b"")] = Stream(topic, kind, "ros1", "ros1msg", definition)
 
     def messages(self, file: IO[bytes], end: int) -> Iterator[Raw]:
-        """Yield the messages in the records from the place of the file on. Raises _DamagedError."""
+        """Yield the messages in the records from the offset of the file on. Raises _DamagedError."""
         while (begin := file.tell()) < end:
             fields, length = self.record(file, end)
             kind, left = fields.get(b"op", b"\0")[0], end - file.tell()
@@ -308,14 +308,14 @@ class _Bag:
 
 def _fields(header: bytes) -> dict[bytes, bytes]:
     """Return the fields of a header in a bag of ROS 1. Raises _DamagedError."""
-    found, place = {}, 0
-    while place < len(header):
-        length = int.from_bytes(header[place : place + 4], "little")
-        name, is_field, value = header[place + 4 : place + 4 + length].partition(b"=")
+    found, offset = {}, 0
+    while offset < len(header):
+        length = int.from_bytes(header[offset : offset + 4], "little")
+        name, is_field, value = header[offset + 4 : offset + 4 + length].partition(b"=")
         if not is_field:
             raise _DamagedError
         found[name] = value
-        place += 4 + length
+        offset += 4 + length
     return found
 
 

@@ -279,7 +279,7 @@ def _add_pieces(content: Content, table: Columns, columns: Mapping[str, Array], 
 
 
 def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[int], NDArray[np.intp]]:
-    """Return the places in `rows` at which the clock restarts, and the rows that only are out of order.
+    """Return the indices in `rows` at which the clock restarts, and the rows that only are out of order.
 
     Both show in the times at which a column has numbers. Tables of several sensors may stand one after the other in a
     file: each begins with an earlier time than that at which the one before it ended.
@@ -288,9 +288,9 @@ def _order(columns: Mapping[str, Array], rows: NDArray[np.intp]) -> tuple[list[i
     there = {name: np.isfinite(values[rows]) for name, values in columns.items() if name != "time"}
     for known in {mask.tobytes(): mask for mask in there.values()}.values():
         own = rows[known]
-        places = restart_rows(time[own])
-        is_restarted |= bool(places)
-        late += [part[time[part] < np.maximum.accumulate(time[part])] for part in np.split(own, places) if len(part)]
+        restarts = restart_rows(time[own])
+        is_restarted |= bool(restarts)
+        late += [part[time[part] < np.maximum.accumulate(time[part])] for part in np.split(own, restarts) if len(part)]
     return restart_rows(time[rows]) if is_restarted else [], np.unique(np.concatenate(late))
 
 
@@ -319,14 +319,14 @@ def _pulses(table: Columns, commanding: Sequence[str]) -> dict[str, Array]:
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
     """Add each header that would name a measurement if it had a unit."""
     wanted = {
-        title.casefold(): one
-        for name, one in known.items()
-        if name not in table.values and one.entry and one.entry.quantity
-        for title in (name, *one.column.also)
+        title.casefold(): column
+        for name, column in known.items()
+        if name not in table.values and column.entry and column.entry.quantity
+        for title in (name, *column.column.also)
     }
     for title in table.header:
-        if title not in table.headers.values() and (one := wanted.get(title.strip().casefold())):
-            better = shown(f"{title.strip()} [{next(iter(one.column.units))}]")
+        if title not in table.headers.values() and (column := wanted.get(title.strip().casefold())):
+            better = shown(f"{title.strip()} [{next(iter(column.column.units))}]")
             content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
 
 
@@ -380,24 +380,24 @@ def open_matlab(path: Path) -> OpenStream:
 _TIME_NAMES = ("time", "t", "timestamp", "tout")
 
 
-def _vectors(place: str, value: Any) -> Iterator[tuple[str, Array]]:
+def _vectors(field: str, value: Any) -> Iterator[tuple[str, Array]]:
     """Yield the vectors of numbers in the variables of a .mat file, with their names."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "fiub":
         if value.ndim == 1 and len(value) > 1:
-            yield place, value.astype(float)
+            yield field, value.astype(float)
         elif value.ndim == 2 and value.size:
             columns = value.T if value.shape[0] >= value.shape[1] else value
-            yield from ((f"{place}({n})", column.astype(float)) for n, column in enumerate(columns, start=1))
+            yield from ((f"{field}({n})", column.astype(float)) for n, column in enumerate(columns, start=1))
     elif isinstance(value, dict):
         for name, inner in value.items():
             if not name.startswith("__"):
-                yield from _vectors(f"{place}.{name}" if place else name, inner)
+                yield from _vectors(f"{field}.{name}" if field else name, inner)
 
 
 # ---- Columns that a logger inserted ----------------------------------------------------------------------------------
 
 _COMPARED_ROWS = 50
-"""The number of rows before and after an insertion of columns that tell its place."""
+"""The number of rows before and after an insertion of columns that tell where it is."""
 _FEWEST, _MOST_ODD, _MOST_MISFITS = 3, 0.05, 0.25
 """The least number of rows before and after an insertion, the largest share of rows after it with yet another number of
 cells, and the largest share of columns that do not go on as before."""
@@ -423,19 +423,19 @@ class _Part:
 
 
 def _where_inserted(before: _Part, after: _Part) -> tuple[int, int]:
-    """Return the first and the last place at which the cells may have been inserted that make the rows longer.
+    """Return the first and the last index at which the cells may have been inserted that make the rows longer.
 
-    A place is judged by the number of columns that would not go on as before. One of them is no proof, because a sensor
-    may begin or end just then.
+    An index is judged by the number of columns that would not go on as before. One of them is no proof, because a
+    sensor may begin or end just then.
     """
     more = after.width - before.width
     old, new = [*zip(*before.last, strict=True)], [*zip(*after.first, strict=True)]
     stay = [_differ(column, new[n]) for n, column in enumerate(old)]
     move = [_differ(column, new[n + more]) for n, column in enumerate(old)]
-    misfits = [sum(stay[:place]) + sum(move[place:]) for place in range(before.width + 1)]
+    misfits = [sum(stay[:index]) + sum(move[index:]) for index in range(before.width + 1)]
     if min(misfits) > _MOST_MISFITS * before.width:
         return 0, before.width
-    likely = [place for place, count in enumerate(misfits) if count <= min(misfits) + 1]
+    likely = [index for index, count in enumerate(misfits) if count <= min(misfits) + 1]
     return likely[0], likely[-1]
 
 
@@ -480,15 +480,15 @@ def grown_rows(rows: Lines) -> Grown | None:
         or odd > _MOST_ODD * sum(part.count for part in parts[1:])
     ):
         return None
-    places: list[int | None] = [*range(width)]
+    indices: list[int | None] = [*range(width)]
     by_width = {}
     for before, after in pairwise(parts):
         low, high = _where_inserted(before, after)
         moved = [*range(low), *[None] * (high - low), *range(high + after.width - before.width, after.width)]
-        places = [None if place is None else moved[place] for place in places]
-        by_width[after.width] = places
-    first = sum(place == n for n, place in enumerate(places))
-    last = sum(place == n for n, place in enumerate(places, start=parts[-1].width - width))
+        indices = [None if index is None else moved[index] for index in indices]
+        by_width[after.width] = indices
+    first = sum(index == n for n, index in enumerate(indices))
+    last = sum(index == n for n, index in enumerate(indices, start=parts[-1].width - width))
     counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
     words = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
     return Grown(by_width, odd, words) if first + last else None

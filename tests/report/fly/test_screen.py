@@ -75,11 +75,11 @@ def test_picture_and_charts_are_on_one_screen_and_nothing_overlaps_or_is_cut(
     assert over["bottom"] <= height, "sticks and buttons are under the thumbs"
     assert len({(round(box["width"]), round(box["height"])) for box in charts}) == 1
     assert (problems(page), drawn_problems(page)) == ([], [])
-    places = []
+    boxes = []
     for words in ("", "short"):
         page.evaluate("words => live.say(words)", words)
-        places.append([page.locator(f"#live-{part}").evaluate(BOX) for part in ("stage", "charts", "controls")])
-    assert places[0] == places[1]
+        boxes.append([page.locator(f"#live-{part}").evaluate(BOX) for part in ("stage", "charts", "controls")])
+    assert boxes[0] == boxes[1]
     page.evaluate(UNFOLD)
     assert page.evaluate("document.documentElement.scrollWidth") <= width
     assert axe.run(page).response["violations"] == []

@@ -118,17 +118,17 @@ def test_what_the_torques_leave_open_is_said_and_can_be_set(frame: str, chance: 
     parts = [a_thruster("abcdefgh"[n], motor, 1.0, chance) for n, motor in enumerate(motors)]
     for n in vertical:
         parts[n] = thruster(parts[n].name, "t200", (0.0, 0.0, 1.0), (chance.uniform(-1.0, 1.0), 0.0, 0.0))
-    one, other = (n + 1 for n in vertical)
-    names = f"u_{parts[one - 1].name} and u_{parts[other - 1].name}"
-    said = f"--frame {frame}: which of the servos {one} and {other} drives {names} does not follow from the torques"
+    servo, other = (n + 1 for n in vertical)
+    names = f"u_{parts[servo - 1].name} and u_{parts[other - 1].name}"
+    said = f"--frame {frame}: which of the servos {servo} and {other} drives {names} does not follow from the torques"
     layout = with_thrusters(chance.sample(parts, len(parts)))
     for chosen in (None, frame):
         with pytest.raises(InputError, match=said):
             servos_of(layout, chosen, {})
     a, b = (parts[n].name for n in vertical)
     for first, second in ((a, b), (b, a)):
-        found = servos_of(layout, frame, {one: first})
-        assert (found[f"u_{first}"], found[f"u_{second}"]) == ((one, 1.0), (other, 1.0))
+        found = servos_of(layout, frame, {servo: first})
+        assert (found[f"u_{first}"], found[f"u_{second}"]) == ((servo, 1.0), (other, 1.0))
     numbered = [thruster(f"{n + 1}", "t200", p.direction.value, p.place) for n, p in enumerate(parts)]
     by_name = servos_of(with_thrusters(chance.sample(numbered, len(numbered))), None, {})
     assert {name: number for name, (number, _) in by_name.items()} == {f"u_{n + 1}": n + 1 for n in range(len(motors))}

@@ -47,8 +47,8 @@ def servos(*outputs: Rows, name: str = SERVOS, system: str = "1") -> Topic:
 
 def servo_log(name: str, first: int, *outputs: Rows) -> Topic:
     """Return messages that come a little later the higher the number of their first output is."""
-    one = topic(name, name, {f"C{n}": rows for n, rows in enumerate(outputs, start=first)})
-    return replace(one, time=one.time + 1e-3 * first)
+    own = topic(name, name, {f"C{n}": rows for n, rows in enumerate(outputs, start=first)})
+    return replace(own, time=own.time + 1e-3 * first)
 
 
 def commanded(topics: Sequence[Topic], names: str = "a", told: Numbers | None = None, **keys: object) -> Commanded:
@@ -163,10 +163,10 @@ def test_rov_toml_names_the_vehicle_and_the_outputs() -> None:
 
 def test_several_vehicles_are_told() -> None:
     """Another one has commands, or tells its place by a topic of the same name."""
-    places = [topic(f"/{name}/odom", "nav_msgs/msg/Odometry", {"x": [1]}, name[0]) for name in ("b", "a", "c/z")]
+    odometry = [topic(f"/{name}/odom", "nav_msgs/msg/Odometry", {"x": [1]}, name[0]) for name in ("b", "a", "c/z")]
     for topics, words in (
         (FLEET, "rov_a and rov_b. rov_a"),
-        ([*places, array("/a/cmd", [0, 1], vehicle="a")], "a and b. a"),
+        ([*odometry, array("/a/cmd", [0, 1], vehicle="a")], "a and b. a"),
     ):
         said = sentences(commanded(topics).findings)[0]
         assert said.startswith(f"log: the log has the vehicles {words} is used; `vehicle` in [logs] of rov.toml names")

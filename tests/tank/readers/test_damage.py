@@ -81,9 +81,9 @@ CUT = "ends amid its messages, as after a loss of power. The "
 def _depths(log: Read) -> int:
     """Return the number of depths that were read, which must all be those of the dive."""
     values = measured(log.log, "depth")
-    places = np.abs(DEPTH - values[:, None]).argmin(axis=1)
-    assert (np.diff(places) > 0).all()
-    assert values == pytest.approx(DEPTH[places], abs=1e-5)
+    indices = np.abs(DEPTH - values[:, None]).argmin(axis=1)
+    assert (np.diff(indices) > 0).all()
+    assert values == pytest.approx(DEPTH[indices], abs=1e-5)
     return len(values)
 
 
