@@ -262,6 +262,11 @@ def with_rotors(rov: Vehicle) -> Vehicle:
     return replace(rov, layout=replace(rov.layout, curves=tuple(replace(c, lag="speed") for c in rov.layout.curves)))
 
 
+def passed(rov: _Vehicle) -> _Vehicle:
+    """Return a vehicle that a changing current passes."""
+    return replace(rov, layout=replace(rov.layout, current_passes=True))
+
+
 def extended(rov: Vehicle, **values: float) -> Vehicle:
     """Return a vehicle with other or additional coefficients."""
     return rov.with_(rov.layout.extended(values), **values)

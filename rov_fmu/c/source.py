@@ -81,7 +81,9 @@ class EquationSource:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
         local = {name: formula for name, formula in starts.items() if name not in states}
-        first = {name: starts.get(name, ZERO) for name in states}
+        # a change of the current turns with the orientation, so that the velocities come after it
+        order = sorted(states, key=lambda name: bool(self.layout.before) and name in self.layout.velocities)
+        first = {name: starts.get(name, ZERO) for name in order}
         return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
 
     def in_c(self, formula: Expression) -> str:

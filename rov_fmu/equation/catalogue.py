@@ -178,6 +178,11 @@ def delayed_name(command: str) -> str:
     return f"delayed_{command}"
 
 
+def before_name(current: str) -> str:
+    """Return the name of a component of the current during the step before."""
+    return f"{current}_before"
+
+
 @cache
 def coefficient_name(key: str, of: str) -> str:
     """Return the name in the FMU of a coefficient of a curve or of an axis."""
@@ -407,6 +412,11 @@ def delayed_declaration(name: str, command: Declaration) -> Declaration:
     """Return the declaration of a command that acts after the dead time."""
     words = f"Command {name} that acts after the dead time"
     return Declaration(command.unit, words, start=command.start, is_share=command.is_share)
+
+
+def before_declaration(current: Declaration) -> Declaration:
+    """Return the declaration of a component of the current during the step before."""
+    return replace(current, description=f"{current.description}, during the step before")
 
 
 def voltage_declaration(low: float, high: float, usual: float) -> Declaration:

@@ -43,6 +43,8 @@ from .catalogue import (
     Axis,
     Declaration,
     axis_words,
+    before_declaration,
+    before_name,
     command_declaration,
     cross_declaration,
     cross_name,
@@ -115,6 +117,9 @@ class Layout:
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
     voltage_source: str = field(default="", compare=False)
     """The source of `voltage`."""
+    current_passes: bool = False
+    """True when the vehicle keeps its velocity over ground where the current changes, in place of that through the
+    water."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
@@ -337,6 +342,19 @@ class Layout:
         return {later: delayed_declaration(name, self.commands[name]) for name, later in self.acting.items()}
 
     @cached_property
+    def before(self) -> dict[str, str]:
+        """The variable with the current during the step before, by the name of each component of the current, if a
+        current that changes passes the vehicle."""
+        names = (name for name in CURRENT | CURRENT_DOWN if name in self.inputs)
+        return {name: before_name(name) for name in names} if self.current_passes else {}
+
+    @cached_property
+    def memory(self) -> dict[str, Declaration]:
+        """What is kept from step to step beside the states: the current before, and the commands that act."""
+        kept = {later: before_declaration(self.inputs[name]) for name, later in self.before.items()}
+        return kept | self.delayed
+
+    @cached_property
     def inputs(self) -> dict[str, Declaration]:
         """The inputs: commands, loads from outside, current, voltage."""
         inputs = dict(self.commands)
@@ -435,7 +453,7 @@ class Layout:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
         rates, last = map(rate_name, self.state), self.health.values()
         parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
-        return (*self.inputs, *self.state, *rates, *self.calculated, *self.delayed, *parameters, *last)
+        return (*self.inputs, *self.state, *rates, *self.calculated, *self.memory, *parameters, *last)
 
     @cached_property
     def places(self) -> dict[str, int]:

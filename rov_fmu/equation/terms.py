@@ -38,7 +38,7 @@ from .attitude import (
     rotation_terms,
 )
 from .catalogue import HEAVE, SURGE, SWAY, YAW, cross_name
-from .expression import ONE, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
+from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
 from .forces import COUPLING, Effect, Force, advance, forces_of, thrusts
 from .layout import Layout
 from .mass import MassMatrix
@@ -78,7 +78,8 @@ class Equation:
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, Expression]
     """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
-    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
+    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions. A velocity
+    through the water changes at the start where the current passes the vehicle."""
     lags: tuple[Lag, ...]
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas, and for
@@ -178,7 +179,7 @@ class Equation:
 
         It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
         """
-        return {name: formula for name, formula in self.starts.items() if formula != Name(name)}
+        return {name: formula for name, formula in self.starts.items() if name not in formula.names}
 
     @cached_property
     def program(self) -> dict[str, Expression]:
@@ -235,7 +236,7 @@ def equation_of(layout: Layout) -> Equation:
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if TURN[0] in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
-    starts |= rotation
+    starts |= rotation | _after_current(layout, rows)
     return Equation(
         table.parameters,
         table.directed,
@@ -454,6 +455,27 @@ def _parameters(layout: Layout, mass: MassMatrix, lags: Iterable[Lag]) -> Formul
             own = [(sign, Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring]
             formulas.define(total(sign * moment for sign, moment in own), "righting", axis)
     return formulas
+
+
+def _after_current(layout: Layout, rows: Rows) -> dict[str, Expression]:
+    """Return formulas for the velocities through the water after a change of the current that passes the vehicle.
+
+    The velocity over ground stays, so that nu changes by -R^T times the change of the current.
+    """
+    change = [Name(name) - Name(before) for name, before in layout.before.items()]
+    turned: dict[str, list[Expression]]
+    if layout.has_attitude:
+        turned = {v: [Name(entry(i, n)) for i in (1, 2, 3)] for n, v in enumerate("uvw", 1)}
+    elif TURN[0] in rows:
+        cosine, sine = Name(TURN[0]), Name(TURN[1])
+        turned = {"u": [cosine, sine], "v": [-sine, cosine]}
+    else:
+        turned = {"u": [ONE], "v": [ZERO, ONE]}
+    return {
+        v: Name(v) - total(x * part for x, part in zip(parts, change, strict=False))
+        for v, parts in turned.items()
+        if change and v in layout.velocities
+    }
 
 
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:

@@ -428,6 +428,10 @@ class Basis(NamedTuple):
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 
+Passing = Literal["carries", "passes"]
+"""What a current that changes does with the vehicle."""
+
+
 class Tables(Strict):
     """The tables that describe the body, the thrusters, the axes and the inputs of a vehicle.
 
@@ -446,6 +450,9 @@ class Tables(Strict):
     """The control surfaces."""
     battery: Battery | None = None
     commands: Commands | None = None
+    current: Passing = "carries"
+    """What a current that changes does with the vehicle: `"carries"`, so that it keeps its velocity through the water,
+    or `"passes"`, so that it keeps its velocity over ground. The FMU is then for Co-Simulation alone."""
     axes: Axes | None = None
     cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Added mass, damping and lift that couple axes."""
@@ -474,6 +481,7 @@ class Tables(Strict):
             voltage=voltage.value if voltage else None,
             voltage_source=voltage.source if voltage else "",
             pulse=commands.pulse if commands else None,
+            current_passes=self.current == "passes",
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:

@@ -8,10 +8,10 @@ import pytest
 
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT
-from tests.vehicles import EVERYTHING, SIX_AXES
+from tests.vehicles import EVERYTHING, SIX_AXES, passed
 
 TEXT = REFIT.read_text(encoding="utf-8")
 
@@ -52,3 +52,13 @@ def test_a_file_that_could_not_be_read_is_not_written(vehicle: Vehicle, tmp_path
     assert re.fullmatch(rf"{re.escape(str(path))}: body\.m_rov\.value = -1\.0: .*", str(caught.value))
     assert path.read_text(encoding="utf-8") == "before"
     assert [p.name for p in tmp_path.iterdir()] == ["kept.toml"]
+
+
+def test_what_a_current_does_is_written_and_read(vehicle: Vehicle) -> None:
+    path = VIDEORAY.with_name("passed.toml")
+    text = vehicle_text(passed(vehicle), VIDEORAY.parent)
+    assert '\nformat = 2\ncurrent = "passes"\n' in f"\n{text}"
+    again = read_vehicle(path, text.encode())
+    assert again.layout == passed(vehicle).layout
+    with pytest.raises(VehicleFileError, match=r"current = 'past': must be 'carries' or 'passes'"):
+        read_vehicle(path, text.replace('"passes"', '"past"').encode())

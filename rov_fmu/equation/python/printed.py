@@ -49,6 +49,7 @@ def equation_text(layout: Layout) -> str:
     alike = ("uvwpqr", ("x", "y", "z", "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
+    numbers |= {f"start_{v}": x for v, x in equation.starts.items() if v in layout.velocities and x != Name(v)}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
     return f"""\
 STATES = {tuple(states)!r}
