@@ -53,9 +53,8 @@ def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
     named = {"vehicle": "FileHead", "estimated": "Estimated"}
-    named |= {
-        name.lower(): name for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands")
-    }
+    own = ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Battery", "Commands", "Surface")
+    named |= {name.lower(): name for name in own}
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}

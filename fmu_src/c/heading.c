@@ -9,6 +9,11 @@
 /* The direction in the body frame: ahead, to starboard, down. It lies in no plane in which a vehicle is likely to turn. */
 static const double BESIDE_NOSE[3] = {1.0, 1e-6, 0.618e-6};
 
+#ifdef HAS_SURFACE
+enum { N_VELOCITIES = N_MONITORED - 2 };
+#else
+enum { N_VELOCITIES = N_MONITORED };
+#endif
 enum { MOST_PARTS = 4096 }; /* of a piece, between which the heading is computed */
 
 static void model_attitude(const real y[N_SERIES], real state[N_STATES]);
@@ -78,7 +83,7 @@ static void rotation_in_piece(const void *motion, real t, real y[N_SERIES])
 static void attitude_after_piece(const series *s, real length, real state[N_STATES], real *heading)
 {
     real turn = 0.0, swing = 0.0;
-    for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
+    for (int i = FIRST_ROTATION; i < N_VELOCITIES; i++) {
         real size = 0.0; /* an upper bound of the angular velocity */
         for (int n = s->order; n >= 0; n--) {
             size = size * length + fabs(s->c[n][i]);

@@ -243,6 +243,13 @@ RESTORING = {
     },
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
+SURFACE = {
+    "height": Declaration("m", "Height H above the surface over which buoyancy and thrust fade out", 1e-3, 100.0),
+}
+GRAVITY = 9.80665
+"""The standard acceleration of gravity, m/s2."""
+OUT_OF_WATER = "z_out"
+"""The state z + H of the table of terms, which is negative while a vehicle is out of the water."""
 CROSS = {
     "m_a": Declaration("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
     "b_d": Declaration("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),

@@ -35,6 +35,7 @@ from .catalogue import (
     POSITION,
     RESTORING,
     ROLL,
+    SURFACE,
     SURGE,
     SWAY,
     THRUSTER,
@@ -117,6 +118,8 @@ class Layout:
     """The pulse widths of full reverse, no thrust and full thrust, us, if the commands are pulse widths."""
     voltage_source: str = field(default="", compare=False)
     """The source of `voltage`."""
+    surface: bool = False
+    """True when buoyancy and thrust fade out above the surface, over the height H."""
     current_passes: bool = False
     """True when the vehicle keeps its velocity over ground where the current changes, in place of that through the
     water."""
@@ -202,6 +205,11 @@ class Layout:
         return self.has(ROLL, PITCH)
 
     @cached_property
+    def has_only_water(self) -> bool:
+        """True when the vehicle may leave the water, and moves on there as under water."""
+        return "z" in self.pose and not self.surface
+
+    @cached_property
     def continued(self) -> tuple[str, ...]:
         """Variables that are carried from step to step although they are no states. With roll or pitch this is psi: a
         quaternion does not know how many turns the vehicle has made."""
@@ -275,6 +283,7 @@ class Layout:
                 for t in self.thrusters
             ),
             (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
+            _declared(("surface",), SURFACE, SURFACE if self.surface else ()),
         ]
         return tuple(chain(*tables))
 
@@ -451,7 +460,7 @@ class Layout:
     @cached_property
     def variables(self) -> tuple[str, ...]:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
-        rates, last = map(rate_name, self.state), self.health.values()
+        rates, last = map(rate_name, self.state), [*self.health.values(), *(SURFACE if self.surface else ())]
         parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
         return (*self.inputs, *self.state, *rates, *self.calculated, *self.memory, *parameters, *last)
 

@@ -53,6 +53,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.equation = importlib.import_module(f"{self.modelName}_model.equation")
         self.voltage_ranges = declaration["voltage_ranges"]
+        self.has_only_water = declaration["has_only_water"]
         self.values = _Vehicle({v["name"]: v["start"] or 0.0 for v in self.declared})
         self.values.equation = self.equation
         self._set_attitude()
@@ -163,6 +164,9 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
         self.values |= {**after, **self.line.delayed, **self.line.current}
+        if self.has_only_water and self.values["z"] < -1e-9:
+            words = "the vehicle has left the water, and this model has no surface: it goes on as under water"
+            self._warn_once("water", words)
         self.time = end
         return True
 

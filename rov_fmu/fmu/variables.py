@@ -163,6 +163,7 @@ def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, in
         fmi=fmi,
         interfaces=interfaces,
         ranges=vehicle.layout.voltage_ranges,
+        has_only_water=vehicle.layout.has_only_water,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

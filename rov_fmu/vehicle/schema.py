@@ -28,6 +28,7 @@ from rov_fmu.equation.catalogue import (
     LAGS,
     REPLACED_BY_TABLE,
     RESTORING,
+    SURFACE,
     THRUSTER,
     Axis,
     Declaration,
@@ -377,6 +378,12 @@ class Battery(Strict):
     """The value of the FMU's input `voltage` that holds unless it is set."""
 
 
+class Surface(_coefficients("Surface", SURFACE)):  # type: ignore[misc]
+    """The surface, above which buoyancy and thrust fade out: the height H of the part that leaves the water."""
+
+    model_config = DOCUMENTED
+
+
 # ---- The file --------------------------------------------------------------------------------------------------------
 
 
@@ -450,6 +457,7 @@ class Tables(Strict):
     """The control surfaces."""
     battery: Battery | None = None
     commands: Commands | None = None
+    surface: Surface | None = None
     current: Passing = "carries"
     """What a current that changes does with the vehicle: `"carries"`, so that it keeps its velocity through the water,
     or `"passes"`, so that it keeps its velocity over ground. The FMU is then for Co-Simulation alone."""
@@ -481,6 +489,7 @@ class Tables(Strict):
             voltage=voltage.value if voltage else None,
             voltage_source=voltage.source if voltage else "",
             pulse=commands.pulse if commands else None,
+            surface=self.surface is not None,
             current_passes=self.current == "passes",
         )
 
@@ -540,7 +549,7 @@ def read_tables(
     model: type[_Model],
     context: Mapping[str, object],
     needed: Iterable[str] = NEEDED,
-    complete: Container[str] = ("arm", "fin", "axes"),
+    complete: Container[str] = ("arm", "fin", "axes", "surface"),
 ) -> tuple[_Model, list[ErrorDetails], set[str]]:
     """Return what could be read of a file, the problems with the rest, and the top-level tables with a problem.
 
@@ -587,7 +596,7 @@ def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -
         elif data[name] in ({}, []) and name in DRIVING:
             reason = "must have at least 1 item, not 0"
             yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
-    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",))]
+    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",)), (SURFACE, ("surface",))]
     places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
     places += [(AXIS, ("axes", name)) for name in AXES]
     for declarations, place in places:

@@ -63,6 +63,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "body": {"coupling": True} if layout.coupled else {},
         "arm": {},
         "commands": {"pulse": layout.pulse} if layout.pulse else {},
+        "surface": {},
         "battery": {} if layout.voltage is None else {"voltage": voltage},
         "curves": {curve.name: _curve(curve) for curve in layout.curves},
         "thruster": [
