@@ -9,11 +9,6 @@
 /* The direction in the body frame: ahead, to starboard, down. It lies in no plane in which a vehicle is likely to turn. */
 static const double BESIDE_NOSE[3] = {1.0, 1e-6, 0.618e-6};
 
-#ifdef HAS_SURFACE
-enum { N_VELOCITIES = N_MONITORED - 2 };
-#else
-enum { N_VELOCITIES = N_MONITORED };
-#endif
 enum { MOST_PARTS = 4096 }; /* of a piece, between which the heading is computed */
 
 static void model_attitude(const real y[N_SERIES], real state[N_STATES]);

@@ -104,6 +104,14 @@ INLINE void series_squares(real c[ORDER + 1][N_SERIES], int a, int count, int m,
         }                                                \
     }
 
+#ifdef HAS_SURFACE /* the last monitored states are no velocities */
+enum { N_VELOCITIES = N_MONITORED - 2 };
+#define IS_DEPTH(i) ((i) == Y_z || (i) == Y_z_out)
+#else
+enum { N_VELOCITIES = N_MONITORED };
+#define IS_DEPTH(i) false
+#endif
+
 #if HAS_ATTITUDE
 #include "heading.c"
 #else
@@ -123,12 +131,6 @@ static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-1
                                       1.8e-14, 1.2e-14, 8.2e-15, 6.0e-15, 4.5e-15, 3.6e-15, 2.9e-15, 2.3e-15};
 static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
                                       9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
-
-#ifdef HAS_SURFACE
-#define IS_DEPTH(i) ((i) == Y_z || (i) == Y_z_out)
-#else
-#define IS_DEPTH(i) false
-#endif
 
 /* Return true when the series may be used up to t = 1. The depth and the states from N_USED on are integrals of the others and
  * converge with them. */

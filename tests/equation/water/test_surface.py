@@ -12,6 +12,7 @@ from scipy.integrate import solve_ivp
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.words import LEFT_WATER
+from rov_fmu.identify.likelihood.filter import Filter
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
@@ -155,6 +156,12 @@ def test_it_is_written_and_read_and_what_it_cannot_have_is_one_line() -> None:
     with pytest.raises(VehicleFileError, match=r"curves\.t200\.lag = 'speed': must be 'force' with a surface"):
         read_vehicle(path, (text.replace("[curves.t200]\n", '[curves.t200]\nlag = "speed"\n') + height).encode())
     assert not VIDEORAY.layout.surface
+
+
+@pytest.mark.long
+def test_a_base_with_a_surface_can_be_identified() -> None:
+    """The filter has forces along the axes, and none along the depth, which is monitored as they are."""
+    assert Filter(LEVEL).force == Filter(BLUEROV2).force
 
 
 def test_a_vehicle_without_a_surface_is_told_to_leave_the_water(capsys: pytest.CaptureFixture[str]) -> None:
