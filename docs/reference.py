@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import click
+from matplotlib.figure import Figure
 
 from docs import compared
 from rov_fmu.cli import _commands
@@ -23,6 +24,7 @@ from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page import equations
 from rov_fmu.report.page.pictures import diagram
+from rov_fmu.report.plots.svg import name_axes, svg_file
 from rov_fmu.report.templates import number
 from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
 from rov_fmu.tank import catalogue
@@ -51,10 +53,8 @@ def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
     named = {"vehicle": "FileHead", "estimated": "Estimated"}
-    named |= {
-        name.lower(): name
-        for name in ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Point", "Battery", "Commands")
-    }
+    own = ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Point", "Battery", "Commands", "Surface")
+    named |= {name.lower(): name for name in own}
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
@@ -196,8 +196,24 @@ def elements(drawing: str) -> list[tuple[str, str]]:
 
 
 def drawings() -> dict[Path, str]:
-    """The drawings of the vehicles, those of the FMU's diagram, by their paths."""
-    return {Path(__file__).with_name("drawings") / f"{name}.svg": diagram(one) for name, one in DRAWN.items()}
+    """The drawings of the vehicles, those of the FMU's diagram, and of a current that changes, by their paths."""
+    drawn = {name: diagram(one) for name, one in DRAWN.items()}
+    drawn["current"] = svg_file(_current, (6.0, 2.6), salt="current")
+    return {Path(__file__).with_name("drawings") / f"{name}.svg": drawing for name, drawing in drawn.items()}
+
+
+def _current(figure: Figure) -> None:
+    """Draw the place north of a Heavy at rest, from when the current becomes 0.5 m/s, under three conventions."""
+    rov, ax = DRAWN["bluerov2_heavy"], figure.add_subplot()
+    kept = rov["m_rov"] / (rov["m_rov"] + rov["m_a_u"])
+    for words, share in (("carried: ν_r stays", 0.0), ("M_RB ν + M_A ν_r stays", kept), ("passes: ν stays", 1.0)):
+        state, north = rov.layout.at_rest | {"u": -0.5 * share}, [0.0]
+        for _ in range(10):
+            state = rov.step(rov.layout.usual_inputs | {"V_N": 0.5}, state, 0.5)
+            north.append(state["x"])
+        ax.plot([5.0 + 0.5 * n for n in range(11)], north, label=f"{words}, {north[-1]:.4f} m")
+    ax.legend()
+    name_axes(ax, "north", "m", "time [s]")
 
 
 def _gallery() -> str:

@@ -82,7 +82,7 @@ def build(
     - `backend`: `native`, or `pythonfmu` for the FMU in pure Python, which is the same for all platforms.
     - `fmi`: the version of FMI, 2 or 3. `pythonfmu` and `osp` need 2.
     - `interface`: `cs` for Co-Simulation, `me` for Model Exchange, or `both`, which is the default; the FMU in pure
-      Python has only `cs`.
+      Python has only `cs`, and so has that of a vehicle with `current = "passes"`.
     - `osp`: True to also write <identifier>_OspModelDescription.xml to the folder of the FMU.
     - `sign`: the file of a private key of OpenSSH, with which ssh-keygen signs the FMU in <output>.sig.
     - `force`: True to replace files that this program did not write, or that have changed since.
@@ -98,7 +98,7 @@ def build(
     """
     _check_options(vehicle, backend, fmi, interface, osp=osp)
     native = backend == "native"
-    interface = interface or ("both" if native else "cs")
+    interface = interface or ("both" if native and not vehicle.layout.before else "cs")
     version = {2: "", 3: ".fmi3"}[fmi]
     output = Path(output or f"{vehicle.identifier}{'' if native else '-python'}{version}.fmu")
     beside = []
@@ -172,6 +172,9 @@ def _check_options(vehicle: object, backend: str, fmi: int, interface: str | Non
         raise OptionError(f"there is no interface {shown(interface)}, only {', '.join(INTERFACES)}")
     if backend != "native" and interface not in (None, "cs"):
         raise OptionError(f"--interface {interface}: PythonFMU makes Co-Simulation (cs) alone")
+    if vehicle.layout.before and interface not in (None, "cs"):
+        reason = "it changes velocities, which an importer of Model Exchange owns: Co-Simulation (cs)"
+        raise OptionError(f'--interface {interface}: current = "passes": {reason} alone')
     if osp and interface == "me":
         raise OptionError("--interface me: libcosim and the OSP tools, which --osp is for, run Co-Simulation alone")
     if fmi == 3 and osp:

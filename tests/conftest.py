@@ -27,7 +27,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, with_rotors
+from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, passed, with_rotors
 
 # Containers often forbid bytecode. Each worker then rewrites all tests, and each command compiles its modules, anew.
 sys.dont_write_bytecode = False
@@ -197,7 +197,8 @@ def unzipped(vehicle: Vehicle, folder: Path, fmi: int = 2) -> Path:
     """
     from rov_fmu.fmu.content import native_content
 
-    platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi)
+    interface = "cs" if vehicle.layout.current_passes else "both"
+    platform, content = host_platform(fmi), native_content(vehicle, fmi=fmi, interface=interface)
     assert platform
     (library,) = compile_all([platform], out_of_line(content.sources), content.identifier, fmi=fmi).values()
     host = fmpy.platform if fmi == 2 else fmpy.platform_tuple
@@ -224,6 +225,7 @@ everything_dir, everything3_dir = (
 )
 thrust_dir, thrust3_dir = (_folder_of(f"thrust{fmi}", lambda: load_vehicle(THRUST_EFFECTS), fmi) for fmi in (2, 3))
 rotors_dir, rotors3_dir = (_folder_of(f"rotors{fmi}", lambda: a_vehicle(with_rotors(SIX)), fmi) for fmi in (2, 3))
+passed_dir, passed3_dir = (_folder_of(f"passed{fmi}", lambda: a_vehicle(passed(HEAVY)), fmi) for fmi in (2, 3))
 six_dir, outside3_dir = _folder_of("six", lambda: a_vehicle(SIX), 2), _folder_of("outside", lambda: OUTSIDE, 3)
 
 

@@ -101,6 +101,21 @@ class Message(NamedTuple):
     instance: str
 
 
+class Log(list[Message]):
+    """The messages of an instance. Those that it leaves the water are apart: most tests begin at the surface."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.of_water: list[Message] = []
+
+    def append(self, message: Message) -> None:
+        """Add a message."""
+        if "the vehicle has left the water" in message.text:
+            self.of_water.append(message)
+        else:
+            super().append(message)
+
+
 class Fmu(ABC):
     """An unzipped FMU with its description and its shared library for this machine."""
 
@@ -203,7 +218,7 @@ class Instance(ABC, Generic[AnyFmu]):
     def __init__(self, fmu: AnyFmu, kind: int) -> None:
         self.fmu = fmu
         self.kind = kind
-        self.log: list[Message] = []
+        self.log = Log()
         self.component: int | None = None
 
     def __enter__(self: "Self") -> "Self":

@@ -272,6 +272,22 @@ def with_rotors(rov: Vehicle) -> Vehicle:
     return replace(rov, layout=replace(rov.layout, curves=tuple(replace(c, lag="speed") for c in rov.layout.curves)))
 
 
+def passed(rov: _Vehicle) -> _Vehicle:
+    """Return a vehicle that a changing current passes."""
+    return replace(rov, layout=replace(rov.layout, current_passes=True))
+
+
+def surfaced(rov: _Vehicle, height: float = 0.25) -> _Vehicle:
+    """Return a vehicle whose buoyancy and thrust fade out above the surface."""
+    return replace(rov, layout=replace(rov.layout, surface=True), coefficients={**rov.coefficients, "height": height})
+
+
+def without_surface(rov: _Vehicle) -> _Vehicle:
+    """Return a vehicle that buoyancy and thrust move above the surface, too."""
+    kept = {name: value for name, value in rov.coefficients.items() if name != "height"}
+    return replace(rov, layout=replace(rov.layout, surface=False), coefficients=kept)
+
+
 def extended(rov: Vehicle, **values: float) -> Vehicle:
     """Return a vehicle with other or additional coefficients."""
     return rov.with_(rov.layout.extended(values), **values)

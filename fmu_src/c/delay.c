@@ -119,6 +119,7 @@ static int delayed_step(const double at[], const model_numbers *n, const delay_l
         }
         passed = until;
         memcpy(now + FIRST_STATE, next, N_STATES * sizeof now[0]);
+        current_keep(now);
     }
     return pieces;
 }
@@ -126,6 +127,7 @@ static int delayed_step(const double at[], const model_numbers *n, const delay_l
 /* Send the commands of a step that has been taken, and let those act that have arrived at its end. */
 static void delay_commit(double at[], delay_line *line, double t, double h)
 {
+    current_keep(at);
     (void)delay_send(line, at); /* delayed_step has checked that there is room */
     delay_pass(line, h);
     delay_receive(line, at, t + h);

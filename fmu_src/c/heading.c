@@ -78,7 +78,7 @@ static void rotation_in_piece(const void *motion, real t, real y[N_SERIES])
 static void attitude_after_piece(const series *s, real length, real state[N_STATES], real *heading)
 {
     real turn = 0.0, swing = 0.0;
-    for (int i = FIRST_ROTATION; i < N_MONITORED; i++) {
+    for (int i = FIRST_ROTATION; i < N_VELOCITIES; i++) {
         real size = 0.0; /* an upper bound of the angular velocity */
         for (int n = s->order; n >= 0; n--) {
             size = size * length + fabs(s->c[n][i]);

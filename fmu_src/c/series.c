@@ -14,6 +14,11 @@
 #else
 #define INLINE static inline
 #endif
+#if defined __GNUC__
+#define SELDOM static __attribute__((noinline))
+#else
+#define SELDOM static
+#endif
 #if HAS_ATTITUDE && defined __GNUC__ /* the unrolled loops of so many terms take minutes to compile and are not faster */
 #define SERIES_UNROLLED static __attribute__((noinline))
 #elif HAS_ATTITUDE
@@ -84,9 +89,11 @@ INLINE void series_squares(real c[ORDER + 1][N_SERIES], int a, int count, int m,
 
 /* The functions of equation.h: SERIES_BLOCK computes coefficient m + 1 of one block of states, SERIES_TERMS of all states. GROW
  * calls a block, or sets its coefficients to 0 where the block does not move. */
-#define SERIES_BLOCK(name)                                                                                      \
-    INLINE void name(const model_numbers *n, const model_held *q, unsigned blocks, const real pace[N_SERIES], \
-                     real c[ORDER + 1][N_SERIES], int m)
+#define SERIES_BLOCK(name) INLINE SERIES_PART(name)
+#define SERIES_ABOVE(name) SELDOM SERIES_PART(name) /* the same above the surface, where few vehicles are */
+#define SERIES_PART(name)                                                                                \
+    void name(const model_numbers *n, const model_held *q, unsigned blocks, const real pace[N_SERIES], \
+              real c[ORDER + 1][N_SERIES], int m)
 #define SERIES_TERMS SERIES_UNROLLED void series_terms(const model_numbers *n, const model_held *q, series *s, int m)
 #define GROW(bit, block, first, size)                    \
     if (s->blocks >> (bit) & 1U) {                       \
@@ -96,6 +103,14 @@ INLINE void series_squares(real c[ORDER + 1][N_SERIES], int a, int count, int m,
             s->c[m + 1][i] = 0.0;                        \
         }                                                \
     }
+
+#ifdef HAS_SURFACE /* the last monitored states are no velocities */
+enum { N_VELOCITIES = N_MONITORED - 2 };
+#define IS_DEPTH(i) ((i) == Y_z || (i) == Y_z_out)
+#else
+enum { N_VELOCITIES = N_MONITORED };
+#define IS_DEPTH(i) false
+#endif
 
 #if HAS_ATTITUDE
 #include "heading.c"
@@ -117,13 +132,16 @@ static const double SMALL_BEFORE[] = {1.8e-10, 1.5e-11, 2.4e-12, 6.4e-13, 2.3e-1
 static const double SMALL_LAST[] = {9.9e-14, 2.8e-14, 1.2e-14, 6.0e-15, 3.6e-15, 2.3e-15, 1.7e-15, 1.3e-15,
                                       9.9e-16, 8.0e-16, 6.7e-16, 5.8e-16, 5.0e-16, 4.4e-16, 4.0e-16, 3.6e-16};
 
-/* Return true when the series may be used up to t = 1. The states from N_USED on are integrals of the others and converge with
- * them. */
+/* Return true when the series may be used up to t = 1. The depth and the states from N_USED on are integrals of the others and
+ * converge with them. */
 INLINE mask series_converges(const series *s)
 {
     const double before = SMALL_BEFORE[s->order - 4];
     mask done = YES;
     for (int i = 0; i < N_USED; i++) {
+        if (IS_DEPTH(i)) {
+            continue;
+        }
         const real size = s->size[i], a = fabs(s->c[s->order - 1][i]), b = fabs(s->c[s->order][i]);
         done &= a + 0.01 * b <= before * size + DBL_MIN; /* b may be infinite */
         /* b * b / a estimates the next coefficient; 8 b keeps a small `a` from making it large */

@@ -488,6 +488,16 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
     return pieces;
 }
 
+/* Keep the current of a step for the next one, if a change of the current passes the vehicle (model_start). */
+static inline void current_keep(double at[])
+{
+#ifdef CURRENT_PASSES
+    memcpy(at + FIRST_BEFORE, at + FIRST_CURRENT, N_CURRENT * sizeof at[0]);
+#else
+    (void)at;
+#endif
+}
+
 #if HAS_DEAD_TIME
 #include "delay.c"
 #else
@@ -503,9 +513,10 @@ static inline int delayed_step(const double at[], const model_numbers *n, const 
     return motion_step(at, n, h, next, heading);
 }
 
-static inline void delay_commit(const double at[], const delay_line *line, double t, double h)
+static inline void delay_commit(double at[], const delay_line *line, double t, double h)
 {
-    (void)at, (void)line, (void)t, (void)h;
+    current_keep(at);
+    (void)line, (void)t, (void)h;
 }
 #endif
 #endif

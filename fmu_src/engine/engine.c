@@ -38,10 +38,27 @@ void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
         v->at[i] = number(&given[i], vehicle, 0);
     }
 #endif
+#ifdef CURRENT_PASSES
+    for (int i = FIRST_BEFORE; i < FIRST_BEFORE + N_CURRENT; i++) {
+        v->at[i] = number(&given[i], vehicle, 0);
+    }
+#endif
     if (HAS_ATTITUDE && model_has_direction(state)) {
         memcpy(v->at + FIRST_STATE, state, sizeof state);
         v->heading = model_heading(v->at, v->heading);
     }
+}
+
+/* Before the first step, the current before is the present one, unless it was given. */
+void single_begin_current(single *v)
+{
+#ifdef CURRENT_PASSES
+    if (isnan(v->at[FIRST_BEFORE])) {
+        current_keep(v->at);
+    }
+#else
+    (void)v;
+#endif
 }
 
 /* Return true when changes of the commands wait for the dead time, so that the next step may have several parts. */
@@ -61,6 +78,7 @@ bool single_step(single *v, double t, double h)
 {
     whole *const all = (whole *)v;
     double next[N_STATES];
+    single_begin_current(v);
     const int pieces = delayed_step(v->at, &all->numbers, &all->line, t, h, next, &v->heading);
     if (pieces <= 0 || !all_finite(next, N_STATES)) {
         return false;
@@ -106,6 +124,7 @@ void simulate(SIMULATION)
             for (int i = 0; i < N_INPUTS; i++) {
                 v->at[i] = number(&given[i], vehicle, n);
             }
+            single_begin_current(v);
             if (calculates) {
                 single_calculate(v);
             }

@@ -59,6 +59,7 @@ EXPORT void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t ve
 EXPORT bool single_step(single *v, double t, double h);
 EXPORT void single_calculate(single *v);
 bool single_waits(const single *v);
+void single_begin_current(single *v);
 double single_length(const double c[], const double scale[], int order, double *reach, int *reversed);
 
 /* Return one of several vehicles whose memory lies side by side. */

@@ -37,7 +37,7 @@ EACH_LANE(asin, (real x), LANE(x, i))
 #endif
 
 enum {
-    N_AXES = N_MONITORED,
+    N_AXES = N_VELOCITIES,
     N_DRIFTS = 3,
     MOST_SENSORS = 16,
     LAGGED = N_STATES, /* the places of the states after those of the vehicle: first what each sensor with a lag measures */

@@ -40,6 +40,7 @@ static void enter_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_
     } else {
         single_begin(own->single, given, vehicle);
     }
+    single_begin_current(own->single);
     for (int k = 0; k < N_VARIABLES; k++) {
         LANE(b->at[k], i) = own->single->at[k];
     }
@@ -53,6 +54,11 @@ static single *follow_lane(block *b, int i)
     for (int k = 0; k < FIRST_CALCULATED; k++) {
         one->at[k] = LANE(b->at[k], i);
     }
+#ifdef CURRENT_PASSES
+    for (int k = FIRST_BEFORE; k < FIRST_BEFORE + N_CURRENT; k++) {
+        one->at[k] = LANE(b->at[k], i);
+    }
+#endif
     one->heading = LANE(b->heading, i);
     return one;
 }
@@ -108,6 +114,11 @@ static mask end_steps(block *b, mask ends)
     for (int k = 0; k < N_STATES; k++) {
         b->at[FIRST_STATE + k] = ends ? next[k] : b->at[FIRST_STATE + k];
     }
+#ifdef CURRENT_PASSES
+    for (int k = 0; k < N_CURRENT; k++) {
+        b->at[FIRST_BEFORE + k] = ends ? b->at[FIRST_CURRENT + k] : b->at[FIRST_BEFORE + k];
+    }
+#endif
     b->heading = ends ? b->m.heading : b->heading;
     return ends;
 }

@@ -80,12 +80,13 @@ class Craft {
     return true;
   }
 
-  /** Keeps the vehicle in the water, between the surface and a depth. @param {number} bed */
+  /** Keeps the vehicle above a depth, and below the surface if its model has none. @param {number} bed */
   confine(bed) {
     const { model } = this;
     const z = model.get("z");
-    if (z >= 0 && z <= bed) return;
-    const edge = z < 0 ? 0 : bed;
+    const top = model.has("height") ? Number.NEGATIVE_INFINITY : 0;
+    if (z >= top && z <= bed) return;
+    const edge = z < top ? top : bed;
     const sinks = model.get("der(z)");
     model.set("z", edge);
     if (sinks * (z - edge) > 0)

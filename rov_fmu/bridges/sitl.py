@@ -18,7 +18,8 @@ import numpy as np
 
 from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.c.stepper import Stepper
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import GRAVITY, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
+from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.io.columns import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
@@ -26,8 +27,6 @@ from rov_fmu.io.output import Output, is_same, write_whole
 from rov_fmu.tank.readers.ardusub_frames import Servos, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
-GRAVITY = 9.80665
-"""The acceleration of gravity in ArduPilot, m/s2."""
 _LEAST_RATE = 20
 """The lowest frame rate, Hz. ArduPilot does not accept steps of 0.1 s or more."""
 _LONGEST_RANGE = 100.0
@@ -202,6 +201,8 @@ class Flight:
             self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
+        self.is_above = False
+        """True when the vehicle is above the surface, which its model does not have."""
         self.outputs = Outputs(setup.servos, motors_of(layout))
         self._held = {**layout.usual_inputs, **setup.start}
         self._draws = [
@@ -232,6 +233,7 @@ class Flight:
             at = dict(zip(self._names, self._stepper.step(commands, h), strict=True))
         except OverflowError as error:
             raise InputError(f"VEHICLE: {error}") from error
+        self.is_above = layout.has_only_water and at["z"] < -AFLOAT
         self.outputs.add(h, packet.pulses)
         values, motion = self._measured(at)
         if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
@@ -362,6 +364,8 @@ class Connection:
             self.flight = self._begin()
         self.traffic.frames += 1
         self._answer = self.flight.step(packet)
+        if self.flight.is_above:
+            self._say_once(LEFT_WATER, f"{self.flight.time:.1f}")
         self._doubt()
         return self._answer
 

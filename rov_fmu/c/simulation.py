@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from math import nan
 from types import MappingProxyType
 from typing import Any
 
@@ -59,6 +60,7 @@ def tables_of(
     tables["at"] = numbers.ctypes.data + numbers.itemsize * np.arange(len(numbers))
     arrays = [numbers]
     neutral = {name: declaration.start for name, declaration in layout.delayed.items()}
+    neutral |= dict.fromkeys(layout.before.values(), nan)  # the present one
     coefficients = {name: vehicle[name] for name in layout.coefficients}
     for name, value in {**neutral, **layout.usual_inputs, **coefficients, **values}.items():
         array = np.require(value, np.float64, ["C", "A"])
@@ -99,7 +101,8 @@ def simulate(
     `record` names the variables to record, by default the states. The results do not depend on the number of workers.
 
     Of a vehicle with a dead time, the delayed commands may be given, too: those that act at the first time. Otherwise
-    no command acts yet.
+    no command acts yet. So may the current before the first time, `V_N_before` ..., of a vehicle that it passes; it is
+    otherwise the one at that time.
 
     The attitude of a vehicle with roll or pitch begins at the Euler angles phi_0, theta_0 and psi_0, which are 0 by
     default, or at the quaternion among the states.

@@ -21,9 +21,10 @@ from rov_fmu.equation.expression import (
     total,
     written,
 )
+from rov_fmu.equation.forces import AT_SURFACE
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.python.step import formula_name
-from rov_fmu.equation.terms import Equation, equation_of, rate_formula
+from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
 
 _Run = tuple[str, str, int]
 """The products of a state with neighbouring ones: that state, the first neighbour, and their number. For squares, the
@@ -96,8 +97,14 @@ class EquationSource:
         """Return statements that set the states of the table at the start of a step."""
         starts, states = self.equation.starts, self.equation.states
         local = {name: formula for name, formula in starts.items() if name not in states}
-        first = {name: starts.get(name, ZERO) for name in states}
+        # a change of the current turns with the orientation, so that the velocities come after it
+        order = sorted(states, key=lambda name: bool(self.layout.before) and name in self.layout.velocities)
+        first = {name: starts.get(name, ZERO) for name in order}
         return _statements({**local, **first}, {name: f"y[Y_{name}]" for name in states}, self._in_c)
+
+    def at_start(self, name: str) -> str:
+        """Write a monitored state in terms of the vehicle's variables."""
+        return self.in_c(self.equation.shifted.get(name, Name(name)))
 
     def in_c(self, formula: Expression) -> str:
         """Write a formula in C."""
@@ -135,12 +142,21 @@ class EquationSource:
 
     def rate(self, name: str) -> str:
         """Write the rate of a state in terms of the states y of the table."""
-        return self.by_states(rate_formula(self.equation.rows[name]))
+        return self.by_states(rate_formula(self.terms(name)))
 
-    def size(self, name: str) -> str:
+    def size(self, name: str, above: bool = False) -> str:
         """Write the sum of the sizes of the terms in the rate of a state."""
-        sizes = (f"fabs({self.by_states(rate_formula([term]))})" for term in self.equation.rows[name])
+        sizes = (f"fabs({self.by_states(rate_formula([term]))})" for term in self.terms(name, above))
         return " + ".join(sizes) or "0.0"
+
+    def terms(self, name: str, above: bool = False) -> list[Term]:
+        """Return the terms in the rate of a state: those that there always are, or those above the surface alone."""
+        return [term for term in self.equation.rows[name] if (term.effect is AT_SURFACE) == above]
+
+    def above(self, names: Iterable[str] = ()) -> dict[str, str]:
+        """Return the states, of some or of all, whose rates have terms above the surface, with these as formulas."""
+        own = {name: self.terms(name, above=True) for name in names or self.equation.states}
+        return {name: self.by_states(rate_formula(terms)) for name, terms in own.items() if terms}
 
     def by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
@@ -161,7 +177,8 @@ class EquationSource:
         depth: dict[str, int] = {}
         used = self.equation.used
         for group in self.equation.components:
-            level = 1 + max((depth[name] for name in self._inputs(group)), default=0)
+            below = {factor for name in group for term in self.terms(name) for factor in term.factors}  # the surface
+            level = 1 + max((depth[name] for name in below - set(group)), default=0)
             last = 1 + len(self.equation.components)
             depth |= dict.fromkeys(group, level if used & set(group) else last)
         blocks = []
@@ -175,10 +192,10 @@ class EquationSource:
         """The index of the block of each state."""
         return {name: i for i, block in enumerate(self.blocks) for name in block}
 
-    def products(self, block: Sequence[str]) -> tuple[list[_Run], dict[tuple[str, ...], str]]:
+    def products(self, block: Sequence[str], above: bool = False) -> tuple[list[_Run], dict[tuple[str, ...], str]]:
         """Return the products of a block in runs, and the C expression of each product."""
         states = self.equation.states
-        pairs = {term.factors for name in block for term in self.equation.rows[name] if len(term.factors) == 2}
+        pairs = {term.factors for name in block for term in self.terms(name, above) if len(term.factors) == 2}
         wanted = {("", a) if a == b else (a, b) for a, b in pairs}
         runs: list[_Run] = []
         places: dict[tuple[str, ...], str] = {}
@@ -206,10 +223,10 @@ class EquationSource:
         best = max(sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))), key=length)
         return *best, length(best)
 
-    def next_term(self, name: str, places: Mapping[tuple[str, ...], str]) -> str:
+    def next_term(self, name: str, places: Mapping[tuple[str, ...], str], above: bool = False) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
         parts = []
-        for term in self.equation.rows[name]:
+        for term in self.terms(name, above):
             if term.factors:  # a constant occurs in coefficient 0 only
                 state = f"c[m][Y_{term.factors[0]}]" if len(term.factors) == 1 else places[term.factors]
                 parts.append(replace(term, factors=(state,)).formula)
@@ -261,7 +278,7 @@ class EquationSource:
 
     def _results(self, formulas: Mapping[str, Expression]) -> list[str]:
         """Return statements that assign results. Before them come the parts of the orientation that they contain."""
-        return _assigned(self.equation.orientation, formulas, self._in_c)
+        return _assigned({**self.equation.orientation, **self.equation.shifted}, formulas, self._in_c)
 
     def beginning(self) -> list[str]:
         """Return statements that compute the attitude at the start from its parameters."""

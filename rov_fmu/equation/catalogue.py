@@ -178,6 +178,11 @@ def delayed_name(command: str) -> str:
     return f"delayed_{command}"
 
 
+def before_name(current: str) -> str:
+    """Return the name of a component of the current during the step before."""
+    return f"{current}_before"
+
+
 @cache
 def coefficient_name(key: str, of: str) -> str:
     """Return the name in the FMU of a coefficient of a curve or of an axis."""
@@ -238,6 +243,13 @@ RESTORING = {
     },
 }
 """The weight and the buoyancy of a vehicle, with their centres."""
+SURFACE = {
+    "height": Declaration("m", "Height H above the surface over which buoyancy and thrust fade out", 1e-3, 100.0),
+}
+GRAVITY = 9.80665
+"""The standard acceleration of gravity, m/s2."""
+OUT_OF_WATER = "z_out"
+"""The state z + H of the table of terms, which is negative while a vehicle is out of the water."""
 CROSS = {
     "m_a": Declaration("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
     "b_d": Declaration("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
@@ -412,6 +424,11 @@ def delayed_declaration(name: str, command: Declaration) -> Declaration:
     """Return the declaration of a command that acts after the dead time."""
     words = f"Command {name} that acts after the dead time"
     return Declaration(command.unit, words, start=command.start, is_share=command.is_share)
+
+
+def before_declaration(current: Declaration) -> Declaration:
+    """Return the declaration of a component of the current during the step before."""
+    return replace(current, description=f"{current.description}, during the step before")
 
 
 def voltage_declaration(low: float, high: float, usual: float) -> Declaration:

@@ -72,7 +72,7 @@ def _formulas(layout: Layout) -> dict[str, Expression]:
 def _kinds(layout: Layout, formulas: Mapping[str, Expression]) -> dict[str, int]:
     """Return for each name its kind as a factor, which is an index of KINDS."""
     kinds = dict.fromkeys((*layout.inputs, *layout.state), KINDS.index("dependent"))
-    kinds |= dict.fromkeys(layout.delayed, KINDS.index("fixed"))  # they change only in events
+    kinds |= dict.fromkeys(layout.memory, KINDS.index("fixed"))  # it changes only in events
     for name, declaration in layout.coefficients.items():
         kinds[name] = KINDS.index("tunable" if declaration.tunable else "fixed")
     for name, formula in formulas.items():

@@ -11,7 +11,18 @@ from functools import cached_property
 from itertools import chain
 
 from .attitude import ROTATION, TURN, entry
-from .catalogue import AXES, HEADING, HEAVE, POINT, POSITION, REVERSE, YAW, Axis, cross_name
+from .catalogue import (
+    AXES,
+    HEADING,
+    HEAVE,
+    OUT_OF_WATER,
+    POINT,
+    POSITION,
+    REVERSE,
+    YAW,
+    Axis,
+    cross_name,
+)
 from .expression import ONE, ZERO, Expression, Name, Names, Operation, directed, product, total
 from .layout import Layout
 from .parts import FAINT, Curve, Thruster, effect_along
@@ -44,11 +55,12 @@ DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
 ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
 STEERING = Effect("steering", "the fins")
 POINTS = Effect("points", "the forces at points")
+AT_SURFACE = Effect("surface", "the surface, above which buoyancy and thrust fade out")
 EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
 
-STATES = frozenset([*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION])
+STATES = frozenset([*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION, OUT_OF_WATER])
 """The states of the table of terms that a force may contain."""
 
 
@@ -125,6 +137,8 @@ def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
     yield from _loads(layout, names)
     yield from chain(_drag(layout), _restoring(layout, names), advance(layout, names), _steering(layout, names))
     yield from _at_points(layout)
+    if layout.surface:
+        yield from _surface(layout, names)
 
 
 def effects_of(layout: Layout) -> list[Effect]:
@@ -152,16 +166,20 @@ def _loads(layout: Layout, names: Names) -> Iterator[Force]:
     """Yield what is constant while the inputs are held: thrust, external and constant load, and the net weight."""
     for vehicle_axis in layout.axes:
         axis, v = vehicle_axis.axis, vehicle_axis.axis.velocity
-        thrust = thrusts(layout, axis, names)
-        if axis is YAW:  # each of these torques is an output
-            thrust = [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
-        if thrust:
+        if thrust := _total_thrust(layout, axis, names):
             yield Force(THRUST, v, Name(axis.coefficient("alpha")) * total(thrust))  # tau
         yield Force(LOAD, v, Name(axis.external))  # tau_ext
         if "F_0" in vehicle_axis.keys:
             yield Force(LOAD, v, Name(vehicle_axis.coefficient("F_0")))
         if axis is HEAVE and layout.restoring and not layout.has_attitude:
             yield Force(WEIGHT, v, names("net_weight"))  # W - B
+
+
+def _total_thrust(layout: Layout, axis: Axis, names: Names) -> list[Expression]:
+    """Return the parts of the thrust along an axis."""
+    if axis is YAW:  # each of these torques is an output
+        return [Name(f"tau_{curve.name}") for curve in layout.turning_curves]
+    return thrusts(layout, axis, names)
 
 
 def thrusts(
@@ -244,6 +262,45 @@ def advance(
             if parts:
                 lost = Name(axis.coefficient("alpha")) * total(parts)
                 yield Force(ADVANCE, axis.velocity, -(lost * Name(other.velocity)))  # T_|n|v |n| v_a
+
+
+def faded(force: Expression, names: Names) -> list[Expression]:
+    """Return what changes of a buoyancy or a thrust above the surface.
+
+    The share that is left is 1 below, 1 + z/H up to the height H, and 0 above it. Each part is 0 where its state is not
+    negative, so that the force below is exactly that without a surface.
+    """
+    parts = ((sign, Name(state)) for sign, state in ((1, "z"), (-1, OUT_OF_WATER)))
+    return [sign * product(force, names("per_height"), directed(x, 0.0, 1.0), x) for sign, x in parts]
+
+
+def _surface(layout: Layout, names: Names) -> Iterator[Force]:
+    """Yield what is lost of the buoyancy and the thrust above the surface."""
+    lifting: list[tuple[str, Expression]] = []
+    for axis in layout.bare_axes:
+        if thrust := _total_thrust(layout, axis, names):
+            lifting.append((axis.velocity, Name(axis.coefficient("alpha")) * total(thrust)))
+    lifting += [(force.axis, force.formula) for force in advance(layout, names)]
+    lifting += [(v, force) for v, force in _buoyancy(layout, names) if v in layout.by_velocity]
+    yield from (Force(AT_SURFACE, v, part) for v, force in lifting for part in faded(force, names))
+
+
+def _buoyancy(layout: Layout, names: Names) -> Iterator[tuple[str, Expression]]:
+    """Yield the force -B k and the moment -B r_B x k of the buoyancy, by the velocities of their axes.
+
+    Without W and B in the file, the weight is m g, and the buoyancy is what balances it but for the load F_0 in heave.
+    """
+    B = Name("B") if "B" in layout.restoring else names("buoyancy")
+    if not layout.has_attitude:
+        yield HEAVE.velocity, -B
+        return
+    x, y, z = (Name(entry(3, n)) for n in (1, 2, 3))
+    yield from ((v, -(B * along)) for v, along in zip("uvw", (x, y, z), strict=True))
+    arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
+    for v, pairs in arms.items():
+        for sign, (coordinate, direction) in zip((-1, 1), pairs, strict=True):
+            if f"{coordinate}_B" in layout.restoring:
+                yield v, sign * (B * Name(f"{coordinate}_B") * direction)
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:

@@ -36,6 +36,7 @@ from .catalogue import (
     POSITION,
     RESTORING,
     ROLL,
+    SURFACE,
     SURGE,
     SWAY,
     THRUSTER,
@@ -44,6 +45,8 @@ from .catalogue import (
     Axis,
     Declaration,
     axis_words,
+    before_declaration,
+    before_name,
     command_declaration,
     cross_declaration,
     cross_name,
@@ -120,6 +123,11 @@ class Layout:
     """The source of `voltage`."""
     points: tuple[Point, ...] = ()
     """The points at which forces act."""
+    surface: bool = False
+    """True when buoyancy and thrust fade out above the surface, over the height H."""
+    current_passes: bool = False
+    """True when the vehicle keeps its velocity over ground where the current changes, in place of that through the
+    water."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
@@ -202,6 +210,11 @@ class Layout:
         return self.has(ROLL, PITCH)
 
     @cached_property
+    def has_only_water(self) -> bool:
+        """True when the vehicle may leave the water, and moves on there as under water."""
+        return "z" in self.pose and not self.surface
+
+    @cached_property
     def continued(self) -> tuple[str, ...]:
         """Variables that are carried from step to step although they are no states. With roll or pitch this is psi: a
         quaternion does not know how many turns the vehicle has made."""
@@ -276,6 +289,7 @@ class Layout:
             ),
             (Coefficient(cross_name(*row), ("cross", cross_name(*row)), cross_declaration(*row)) for row in self.cross),
             *(_declared(("point", p.name), POINT, p.keys, p.coefficient, point_words(p)) for p in self.points),
+            _declared(("surface",), SURFACE, SURFACE if self.surface else ()),
         ]
         return tuple(chain(*tables))
 
@@ -341,6 +355,19 @@ class Layout:
     def delayed(self) -> dict[str, Declaration]:
         """The commands that act after the dead time, if the vehicle has one."""
         return {later: delayed_declaration(name, self.commands[name]) for name, later in self.acting.items()}
+
+    @cached_property
+    def before(self) -> dict[str, str]:
+        """The variable with the current during the step before, by the name of each component of the current, if a
+        current that changes passes the vehicle."""
+        names = (name for name in CURRENT | CURRENT_DOWN if name in self.inputs)
+        return {name: before_name(name) for name in names} if self.current_passes else {}
+
+    @cached_property
+    def memory(self) -> dict[str, Declaration]:
+        """What is kept from step to step beside the states: the current before, and the commands that act."""
+        kept = {later: before_declaration(self.inputs[name]) for name, later in self.before.items()}
+        return kept | self.delayed
 
     @cached_property
     def inputs(self) -> dict[str, Declaration]:
@@ -460,9 +487,9 @@ class Layout:
     @cached_property
     def variables(self) -> tuple[str, ...]:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
-        rates, last = map(rate_name, self.state), self.health.values()
+        rates, last = map(rate_name, self.state), [*self.health.values(), *(SURFACE if self.surface else ())]
         parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
-        return (*self.inputs, *self.state, *rates, *self.calculated, *self.delayed, *parameters, *last)
+        return (*self.inputs, *self.state, *rates, *self.calculated, *self.memory, *parameters, *last)
 
     @cached_property
     def places(self) -> dict[str, int]:

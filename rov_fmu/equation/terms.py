@@ -38,9 +38,20 @@ from .attitude import (
     rotation_formulas,
     rotation_terms,
 )
-from .catalogue import HEAVE, POINT, POSITION, SURGE, SWAY, YAW, cross_name, rate_name
-from .expression import ONE, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
-from .forces import COUPLING, POINTS, Effect, Force, advance, forces_of, rotation, thrusts
+from .catalogue import (
+    GRAVITY,
+    HEAVE,
+    OUT_OF_WATER,
+    POINT,
+    POSITION,
+    SURGE,
+    SWAY,
+    YAW,
+    cross_name,
+    rate_name,
+)
+from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
+from .forces import AT_SURFACE, COUPLING, POINTS, Effect, Force, advance, faded, forces_of, rotation, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
@@ -80,7 +91,8 @@ class Equation:
     """The terms in the rate of every state of the table."""
     starts: Mapping[str, Expression]
     """How a step begins: each state of the table from the vehicle's states, and `square_length`, which some of these
-    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions."""
+    formulas use. Positions begin at 0, because the step returns their change; so do the arrived fractions. A velocity
+    through the water changes at the start where the current passes the vehicle."""
     lags: tuple[Lag, ...]
     outputs: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for calculated variables that follow from the states, the orientation and the other formulas, and for
@@ -186,7 +198,12 @@ class Equation:
 
         It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
         """
-        return {name: formula for name, formula in self.starts.items() if formula != Name(name)}
+        return {name: formula for name, formula in self.starts.items() if name not in formula.names | {OUT_OF_WATER}}
+
+    @cached_property
+    def shifted(self) -> dict[str, Expression]:
+        """The formula of the state that follows from the depth of a vehicle with a surface."""
+        return {OUT_OF_WATER: self.starts[OUT_OF_WATER]} if OUT_OF_WATER in self.starts else {}
 
     @cached_property
     def program(self) -> dict[str, Expression]:
@@ -195,7 +212,7 @@ class Equation:
         by_lag = frozenset().union(*lags)
         by_lag = by_lag.union(*(self.forces[name].names for name in by_lag & self.forces.keys()))
         forces = {name: formula for name, formula in self.forces.items() if name not in by_lag}
-        return {**self.parameters, **self.directed, **self.orientation, **self.thrust, **forces}
+        return {**self.parameters, **self.shifted, **self.directed, **self.orientation, **self.thrust, **forces}
 
     @cached_property
     def rates(self) -> dict[str, Expression]:
@@ -231,19 +248,24 @@ def equation_of(layout: Layout) -> Equation:
     rotation, quaternion, angles = (
         (rotation_formulas(), quaternion_formulas(), angle_formulas()) if layout.has_attitude else ({}, {}, {})
     )
-    table = _Table(layout, Names([*layout.places, *rotation, *quaternion]))
+    table = _Table(layout, Names([*layout.places, *rotation, *quaternion, OUT_OF_WATER]))
     rows: Rows = {v: table.motion(v) for v in layout.velocities}
+    pose = table.pose()
+    if layout.surface:  # the forces contain the depth, and change where it is 0 and where it is -H
+        rows |= {"z": pose["z"], OUT_OF_WATER: pose.pop("z")}
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
     for lag in table.lags:
         rows[lag.arrived] = Term(lag.rate), Term(-lag.rate, (lag.arrived,))
-    rows |= attitude | table.pose()
+    rows |= attitude | pose
     used = {factor for terms in rows.values() for term in terms for factor in term.factors}.union(layout.velocities)
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if TURN[0] in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
-    starts |= rotation
+    starts |= rotation | _after_current(layout, rows)
+    if layout.surface:
+        starts[OUT_OF_WATER] = Name("z") + Name("height")
     return Equation(
         table.parameters,
         table.directed,
@@ -347,6 +369,11 @@ class _Table:
                         changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
                 if changes:
                     yield Term(self._named(total(changes), kind, v, curve.name), (arrived,) * power)
+                for part in faded(total(changes), self.names) if changes and self.layout.surface else ():
+                    force = Force(AT_SURFACE, v, part)
+                    (state,) = force.factors
+                    name = self._named(force.along(reverse=True), kind, v, curve.name, state)
+                    yield Term(self._beyond(Name(state)) * name, (arrived, state), AT_SURFACE)
             rising = advance(self.layout, self.names, curve, of_rotor("loss_rise")) if curve.has_rotors else ()
             along = [(force.factors[0], force.along(inverse[force.axis])) for force in rising if force.axis in inverse]
             for other, parts in grouped(along).items():
@@ -367,16 +394,24 @@ class _Table:
         velocity, *others = map(Name, directions)
         if others:
             raise ValueError("a force with the direction of another velocity needs an effect of its own")
-        if self._is_constant(ahead):
+        if self._is_constant(ahead) and self._is_constant(astern):
             coefficient: Expression = self.names(*own)
             self.directed[self.names(*own).identifier] = Operation("directed", (velocity, ahead, astern))
         elif all(force.along() == -force.along(reverse=True) for force in forces):
             direction = self.names("direction", velocity.identifier)
             self.directed[direction.identifier] = Operation("directed", (velocity, ONE, -ONE))
             coefficient = direction * self._named(ahead, *own)
+        elif ahead == ZERO:
+            coefficient = self._beyond(velocity) * self._named(astern, *own)
         else:
             raise ValueError("a force whose size depends on a direction may contain coefficients alone")
         return Term(coefficient, first.factors, first.effect)
+
+    def _beyond(self, state: Name) -> Name:
+        """Return a coefficient that is 1 while a state is negative, and 0 otherwise."""
+        side = self.names("beyond", state.identifier)
+        self.directed[side.identifier] = Operation("directed", (state, ZERO, ONE))
+        return side
 
     def pose(self) -> dict[str, tuple[Term, ...]]:
         """Return the rows of the pose, which follows from the velocities and a steady current.
@@ -461,7 +496,34 @@ def _parameters(layout: Layout, mass: MassMatrix, lags: Iterable[Lag]) -> Formul
             moments = (1, "W", f"{axis}_G"), (-1, "B", f"{axis}_B")
             own = [(sign, Name(force) * Name(centre)) for sign, force, centre in moments if centre in layout.restoring]
             formulas.define(total(sign * moment for sign, moment in own), "righting", axis)
+    if layout.surface:
+        formulas.define(1.0 / Name("height"), "per_height")
+        if not layout.restoring:
+            heave = layout.by_name[HEAVE.name]
+            load = [-Name(heave.coefficient("F_0"))] if "F_0" in heave.keys else []
+            formulas.define(total([GRAVITY * Name("m_rov"), *load]), "buoyancy")
     return formulas
+
+
+def _after_current(layout: Layout, rows: Rows) -> dict[str, Expression]:
+    """Return formulas for the velocities through the water after a change of the current that passes the vehicle.
+
+    The velocity over ground stays, so that nu changes by -R^T times the change of the current.
+    """
+    change = [Name(name) - Name(before) for name, before in layout.before.items()]
+    turned: dict[str, list[Expression]]
+    if layout.has_attitude:
+        turned = {v: [Name(entry(i, n)) for i in (1, 2, 3)] for n, v in enumerate("uvw", 1)}
+    elif TURN[0] in rows:
+        cosine, sine = Name(TURN[0]), Name(TURN[1])
+        turned = {"u": [cosine, sine], "v": [-sine, cosine]}
+    else:
+        turned = {"u": [ONE], "v": [ZERO, ONE]}
+    return {
+        v: Name(v) - total(x * part for x, part in zip(parts, change, strict=False))
+        for v, parts in turned.items()
+        if change and v in layout.velocities
+    }
 
 
 def _attitude(layout: Layout) -> dict[str, tuple[Term, ...]]:

@@ -5,6 +5,11 @@ from rov_fmu.io.messages import listed
 from .catalogue import HEAVE, LAGS, SURGE, SWAY, Declaration, cited, rate_name
 from .parts import FAINT, Actuator, Curve, Fin, Point, Thruster
 
+AFLOAT = 1e-9
+"""A height above the surface that is no rounding error, m."""
+LEFT_WATER = "the vehicle has left the water at {} s, and goes on as under water, because its file has no [surface]"
+"""What commands say about a vehicle with `Layout.has_only_water`, with the time."""
+
 
 def curve_words(curve: Curve) -> dict[str, str]:
     """Return the texts of a curve for the fields of CURVE."""

@@ -133,7 +133,8 @@ def _left_out(layout: Layout) -> Iterator[str]:
     yield from _left_out_of_forces(layout)
     at = "at a point" if layout.points else "as a load"
     yield f"A tether: it acts only if its force is connected {at}."
-    yield f"Surface, bottom, walls and waves.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
+    surface = "The drag of what is out of the water, bottom" if layout.surface else "Surface, bottom"
+    yield f"{surface}, walls and waves.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
     level = "" if layout.has_attitude else ", horizontal"
     yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
 

@@ -27,6 +27,8 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
         "identifier": vehicle.identifier,
         "log_categories": LOG_CATEGORIES,
         "commands": layout.acting,
+        "before": layout.before,
+        "has_only_water": layout.has_only_water,
         "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }

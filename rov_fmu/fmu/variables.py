@@ -2,7 +2,7 @@
 
 modelDescription.xml, the table VARIABLES in interface.h, the documentation and the registration with PythonFMU are
 derived from `variables`. The order is that of `Layout.variables`: inputs, states, derivatives, calculated variables,
-commands that act after the dead time, coefficients, attitude at the start. The value reference of a variable is its
+what is kept between steps, coefficients, attitude at the start. The value reference of a variable is its
 place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
@@ -133,7 +133,7 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         add(rate, derivatives[name], causality, "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
         add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
-    for name, declaration in layout.delayed.items():
+    for name, declaration in layout.memory.items():
         add(name, declaration, "local", "discrete", initial="calculated")
     for name, declaration in (layout.coefficients | layout.initial).items():
         variability = "tunable" if declaration.tunable else "fixed"
@@ -164,6 +164,7 @@ def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, in
         fmi=fmi,
         interfaces=interfaces,
         ranges=vehicle.layout.voltage_ranges,
+        has_only_water=vehicle.layout.has_only_water,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

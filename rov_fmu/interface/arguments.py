@@ -111,7 +111,7 @@ def checked_start(given: Mapping[str, Any], layout: Layout, *, many: bool) -> di
         if (at_start := name_at_start(name, layout)) in renamed:
             raise InputError(f"start[{name!r}]: {at_start} is given, too, which is the same")
         renamed[at_start] = given[name]
-    states = checked_values("start", renamed, layout.state | layout.initial | layout.delayed, many=many)
+    states = checked_values("start", renamed, layout.state | layout.initial | layout.memory, many=many)
     if quaternion := [states[name] for name in QUATERNION if name in states]:
         if angles := states.keys() & layout.initial.keys() - {"psi_0"}:
             raise InputError(

@@ -282,11 +282,11 @@ class VehicleModel(Vehicle):
         return super().response(kinds[axis] if isinstance(axis, str) else axis, command)
 
     def _all_inputs(self, inputs: Mapping[str, float]) -> dict[str, float]:
-        """Return the values of all inputs. Commands that act after the dead time pass as they are."""
+        """Return the values of all inputs. What is kept between steps, such as commands that act, stays as it is."""
         layout = self.layout
-        delayed = {name: value for name, value in inputs.items() if name in layout.delayed}
-        given = {name: value for name, value in inputs.items() if name not in delayed}
-        return {**held_inputs(layout, given), **delayed}
+        kept = {name: value for name, value in inputs.items() if name in layout.memory}
+        given = {name: value for name, value in inputs.items() if name not in kept}
+        return {**held_inputs(layout, given), **kept}
 
     def _all_states(self, state: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all states, and the heading of a vehicle with an attitude if it is given."""
@@ -352,7 +352,7 @@ class VehicleModel(Vehicle):
         vehicles = number_of_vehicles(values)
         try:
             attitude = QUATERNION if layout.has_attitude else ()
-            going = (*layout.state, *layout.continued, *layout.delayed)
+            going = (*layout.state, *layout.continued, *layout.memory)
             others = (*attitude, *layout.continued) if many else (*going, *layout.commands)
             recording = [*recorded, *(name for name in others if name not in recorded)]
             trajectories = simulate(

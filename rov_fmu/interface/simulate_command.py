@@ -9,11 +9,12 @@ from tempfile import mkdtemp
 from typing import Any
 
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.interface.arguments import STEP, TIME, name_at_start, result_times
 from rov_fmu.interface.model import VehicleModel, load
 from rov_fmu.interface.result import Result
 from rov_fmu.io.file_kinds import is_mcap
-from rov_fmu.io.messages import FileError, InputError, one_line, only, shown, wrapped
+from rov_fmu.io.messages import FileError, InputError, one_line, only, print_message, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
 
@@ -53,6 +54,8 @@ def simulate_vehicle(path: Path, options: Options) -> None:
     inputs = [path, *vehicle.files, *([options.commands] if options.commands else [])]
     check_outputs(output, None if opens else plot, inputs, force=options.force)
     result = run(vehicle, options)
+    if vehicle.layout.has_only_water and "z" in result and (above := result["z"] < -AFLOAT).any():
+        print_message(f"rov-fmu: {LEFT_WATER.format(f'{result.time[above.argmax()]:g}')}")
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
     written = write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
     if opens and picture:

@@ -348,10 +348,10 @@ def _load_base(file: RovTables) -> tuple[Vehicle | None, list[str]]:
 def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[str]:
     """Yield a line for every mistake in the hardware tables."""
     present = [name for name in _HARDWARE_TABLES if name in data]
-    for name, curve in file.curves.items():
-        if curve.electric_current:
-            reason = "identification does not use it. Add it to the identified vehicle file instead"
-            yield key_line(f"curves.{name}.electric_current", reason)
+    unused = [f"curves.{name}.electric_current" for name, curve in file.curves.items() if curve.electric_current]
+    unused += [name for name in ("surface", "current") if name in data]
+    reason = "identification does not use it. Add it to the identified vehicle file instead"
+    yield from (key_line(place, reason) for place in unused)
     if "base" in data:
         for name in present:
             own = {*data[name]} - {"coupling"} if name == "body" and isinstance(data[name], dict) else {name}

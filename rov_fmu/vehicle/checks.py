@@ -63,6 +63,7 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
         yield from check_inputs(layout)
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
+    yield from _check_surface(layout)
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
         yield from check_distinct_names(layout)
         yield from _check_named_coefficients(parts, layout, lost)
@@ -84,6 +85,15 @@ def check_distinct_names(layout: Layout) -> Iterator[str]:
         if (first := places.setdefault(name, place)) != place:
             yield key_line(place, f"has the name {name} in the FMU, which {first} has too: rename one of them")
             return
+
+
+def _check_surface(layout: Layout) -> Iterator[str]:
+    """Check that a vehicle with a surface moves up and down, and that its thrust is quadratic there."""
+    if layout.surface and not layout.has(HEAVE):
+        yield key_line("surface", "the vehicle does not move up and down: give axes.heave, or leave this table out")
+    for curve in (curve for curve in layout.curves if layout.surface and curve.has_rotors):
+        reason = "must be 'force' with a surface, where thrust by the speed of a rotor is no quadratic"
+        yield key_line(f"curves.{curve.name}.lag", reason, curve.lag)
 
 
 def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:

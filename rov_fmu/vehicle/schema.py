@@ -29,6 +29,7 @@ from rov_fmu.equation.catalogue import (
     POINT,
     REPLACED_BY_TABLE,
     RESTORING,
+    SURFACE,
     THRUSTER,
     Axis,
     Declaration,
@@ -402,6 +403,12 @@ class Battery(Strict):
     """The value of the FMU's input `voltage` that holds unless it is set."""
 
 
+class Surface(_coefficients("Surface", SURFACE)):  # type: ignore[misc]
+    """The surface, above which buoyancy and thrust fade out: the height H of the part that leaves the water."""
+
+    model_config = DOCUMENTED
+
+
 # ---- The file --------------------------------------------------------------------------------------------------------
 
 
@@ -453,6 +460,10 @@ class Basis(NamedTuple):
 _Gain = Annotated[Finite, Field(ge=-100.0, le=100.0)]
 
 
+Passing = Literal["carries", "passes"]
+"""What a current that changes does with the vehicle."""
+
+
 class Tables(Strict):
     """The tables that describe the body, the thrusters, the axes and the inputs of a vehicle.
 
@@ -473,6 +484,10 @@ class Tables(Strict):
     """The points at which forces act."""
     battery: Battery | None = None
     commands: Commands | None = None
+    surface: Surface | None = None
+    current: Passing = "carries"
+    """What a current that changes does with the vehicle: `"carries"`, so that it keeps its velocity through the water,
+    or `"passes"`, so that it keeps its velocity over ground. The FMU is then for Co-Simulation alone."""
     axes: Axes | None = None
     cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Added mass, damping and lift that couple axes."""
@@ -502,6 +517,8 @@ class Tables(Strict):
             voltage_source=voltage.source if voltage else "",
             pulse=commands.pulse if commands else None,
             points=tuple(point.for_model() for point in self.point),
+            surface=self.surface is not None,
+            current_passes=self.current == "passes",
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:
@@ -561,7 +578,7 @@ def read_tables(
     model: type[_Model],
     context: Mapping[str, object],
     needed: Iterable[str] = NEEDED,
-    complete: Container[str] = ("arm", "fin", "axes"),
+    complete: Container[str] = ("arm", "fin", "axes", "surface"),
 ) -> tuple[_Model, list[ErrorDetails], set[str]]:
     """Return what could be read of a file, the problems with the rest, and the top-level tables with a problem.
 
@@ -608,7 +625,7 @@ def _missing_keys(data: Toml, needed: Iterable[str], complete: Container[str]) -
         elif data[name] in ({}, []) and name in DRIVING:
             reason = "must have at least 1 item, not 0"
             yield {"type": "too_short", "loc": (name,), "msg": reason, "input": data[name]}
-    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",))]
+    places: list[tuple[Mapping[str, Declaration], tuple[int | str, ...]]] = [(ARM, ("arm",)), (SURFACE, ("surface",))]
     places += [(FIN, ("fin", n)) for n in range(len(data.get("fin", ())))]
     places += [(AXIS, ("axes", name)) for name in AXES]
     for declarations, place in places:

@@ -312,8 +312,9 @@ class Vehicle:
         return self._formulas.thrust({**self.coefficients, **inputs, **self._acting(inputs)})
 
     def _acting(self, inputs: Values) -> dict[str, float]:
-        """Return the commands that act after the dead time: those that are given, or else the present ones."""
-        return {later: inputs.get(later, inputs[name]) for name, later in self.layout.acting.items()}
+        """Return the commands that act after the dead time and the current before: those given, or the present ones."""
+        kept = self.layout.acting | self.layout.before
+        return {later: inputs.get(later, inputs[name]) for name, later in kept.items()}
 
     def _values(self, inputs: Values, state: Values) -> dict[str, float]:
         """Return the coefficients, the inputs and the states by name. Other names in the mappings are left out."""
@@ -383,7 +384,7 @@ class Vehicle:
 
     def delay_line(self) -> DelayLine:
         """Return the commands that act before the first one, and nothing that waits for the dead time."""
-        return DelayLine(self.layout.usual_inputs, self.layout.acting)
+        return DelayLine(self.layout.usual_inputs, self.layout.acting, self.layout.before)
 
     # ---- One axis alone ----
 

@@ -38,6 +38,8 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
         comment = f"Made from {vehicle.measured_from}: [provenance] tells how, and `interval` is 95 % confidence."
         document.add(tomlkit.comment(comment)).add(tomlkit.nl())
     document["format"] = FORMAT
+    if vehicle.layout.current_passes:
+        document["current"] = "passes"
     for name, table in _tables(vehicle).items():
         if table:
             document[name] = _item(table, folder, _DEPTHS.get(name, 1))
@@ -62,6 +64,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
         "body": {"coupling": True} if layout.coupled else {},
         "arm": {},
         "commands": {"pulse": layout.pulse} if layout.pulse else {},
+        "surface": {},
         "battery": {} if layout.voltage is None else {"voltage": voltage},
         "curves": {curve.name: _curve(curve) for curve in layout.curves},
         "thruster": [

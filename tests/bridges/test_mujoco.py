@@ -32,7 +32,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, frictionless, tied
+from tests.vehicles import VEHICLES, frictionless, passed, tied
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 
@@ -179,6 +179,26 @@ def test_it_moves_as_the_fmu_with_errors_of_second_order(name: str) -> None:
     coarse, fine = error(name, 0.005, 2.0), error(name, 0.0025, 2.0)
     assert coarse < 1e-3
     assert coarse / fine == pytest.approx(4.0, rel=0.3)
+
+
+def test_a_current_that_changes_passes_it_as_the_fmu_of_such_a_vehicle() -> None:
+    """The axes are those that both have, and the motion is within 1 mm. One that is carried is 0.2 m away."""
+    vehicle, package = loaded("bluerov2_heavy")
+    times, start = np.arange(0.0, 4.01, 1.0), {"u": 0.2, "psi": 0.5}
+    current = {name: np.where(times < 1.0, 0.0, speed) for name, speed in CURRENT.items()}
+    rov = package.load()
+    rov.model.opt.timestep = 0.002
+    rov.model.geom_contype[:] = 0
+    turned(rov, (np.cos(0.25), 0.0, 0.0, -np.sin(0.25)))
+    rov.data.qpos[:3], rov.data.qvel[:2] = 0.0, (0.2 * np.cos(0.5), -0.2 * np.sin(0.5))
+    for n in range(4):
+        rov.inputs.update({name: float(row[n]) for name, row in current.items()})
+        for _ in range(500):
+            rov.step()
+    for one, is_there in ((passed(vehicle), True), (vehicle, False)):
+        run = one.simulate(times, current, start=start)
+        place = FLIP * [run[axis][-1] for axis in "xyz"]
+        assert (np.abs(rov.data.qpos[:3] - place).max() < 1e-3) == is_there
 
 
 @may_turn_over

@@ -309,7 +309,7 @@ def test_servos_that_do_not_fit_the_vehicle_are_named_once(
     for frames, start in ((120, START), (20, START), (120, 0.0), (20, 0.0)):
         hints: list[str] = []
         rov = SIMPLE if vehicle == "simplerov_4" else load_vehicle(SHIPPED[vehicle])
-        connection = Connection(setup_of(rov), hints.append)
+        connection = Connection(setup_of(rov, z=9.0), hints.append)
         for count in range(frames + round(50 * start)):
             pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
             sent = started(count / 50.0 + START - start, pulses)
@@ -337,7 +337,7 @@ def test_servos_that_do_not_fit_the_vehicle_are_named_once(
 )
 def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[int]]], said: list[str]) -> None:
     hints: list[str] = []
-    connection = Connection(setup_of(load_vehicle(SHIPPED["bluerov2"])), hints.append)
+    connection = Connection(setup_of(load_vehicle(SHIPPED["bluerov2"]), z=9.0), hints.append)
     sent = [pulses for seconds, pulses in [(START, []), *flight] for _ in range(round(50 * seconds))]
     for count, pulses in enumerate(sent):
         connection.answer(packet(50, count, started(count / 50.0, pulses)), HERE)

@@ -29,6 +29,7 @@ from tests.vehicles import (
     SIX_AXES,
     THRUST_EFFECTS,
     VIDEORAY,
+    passed,
     random_body,
     random_case,
     random_inputs,
@@ -53,14 +54,19 @@ def late(rov: Vehicle) -> Vehicle:
     return Vehicle(layout, {name: {**rov.coefficients, "T_d": 0.1}[name] for name in layout.coefficients})
 
 
-KNOWN = {"VideoRay": VIDEORAY, "lag": HEAVY, "six axes": SIX, "everything": load_vehicle(EVERYTHING)}
+KNOWN = {
+    "VideoRay": VIDEORAY,
+    "lag, current passes": passed(HEAVY),
+    "six axes": SIX,
+    "everything": load_vehicle(EVERYTHING),
+}
 KNOWN |= {"dead time, lag, tables": load_vehicle(THRUST_EFFECTS), "attitude": load_vehicle(SIX_AXES), "fins": FINNED}
 KNOWN |= {
     "tied": tied(SIX, tether=(-0.3, 0.1, -0.2)),
     "rotors": with_rotors(SIX),
     "slow rotors": with_rotors(SIX).with_(T_t200=2.5),
 }
-LONG = {"attitude, lag, dead time": late(SIX), "dead time alone": late(KNOWN["attitude"])}
+LONG = {"attitude, lag, dead time, current passes": late(passed(SIX)), "dead time alone": late(KNOWN["attitude"])}
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n)]
 
 
@@ -70,7 +76,7 @@ class Run:
     def __init__(self, rng: random.Random, rov: Vehicle, lengths: list[float] | None = None) -> None:
         """`lengths` are those of the times between two changes of the inputs, s, unless they are drawn, too."""
         self.rov, self.layout = rov, rov.layout
-        self.moving = [*self.layout.state, *self.layout.continued, *self.layout.delayed]
+        self.moving = [*self.layout.state, *self.layout.continued, *self.layout.memory]
         self.record = [*self.moving, *self.layout.calculated]  # which follow the new inputs at once
         lengths = lengths or [
             rng.choice((0.013, 0.04, 0.1, 0.27)) * rng.choice((1.0, rng.random())) for _ in range(CHANGES)

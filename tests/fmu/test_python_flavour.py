@@ -29,7 +29,7 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.conftest import Made, unzipped, without_page
 from tests.fmi import OK
 from tests.fmu.calls.test_arguments import STOPS
-from tests.vehicles import SIX, THRUST_EFFECTS, a_vehicle, pulsed, random_inputs
+from tests.vehicles import HEAVY, SIX, THRUST_EFFECTS, a_vehicle, passed, pulsed, random_inputs
 from verification.references.c_programs import Ended, compile_c, run_program
 from verification.references.fmpy_slave import fmpy_slave, keep_loaded
 
@@ -222,6 +222,21 @@ def test_inputs_that_saturate_and_steps_that_cannot_be_taken_are_told(
     slave.put(X_ext=1.7e308)
     assert slave.step(slave.rov.time, 0.1) == (False, overflow)
     assert slave.get("u", "r", "delayed_u_r", "F_bow") == after
+
+
+def test_the_current_before_is_part_of_the_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The current at the end of the initialization is no change. A current that passes leaves the way over ground."""
+    slave = Slave(replace(a_vehicle(passed(HEAVY)), identifier="passed"), tmp_path, monkeypatch)
+    slave.put(V_N=0.2, u=0.1)
+    slave.rov.exit_initialization_mode()
+    assert slave.step(0.0, 1e-9)[0]
+    assert slave.get("u", "V_N_before") == pytest.approx([0.1, 0.2], abs=1e-8)
+    before = slave.rov._get_fmu_state()
+    for _ in range(2):
+        assert slave.put(V_N=0.5) == []
+        assert slave.step(slave.rov.time, 1e-9)[0]
+        assert slave.get("u", "V_N_before") == pytest.approx([-0.2, 0.5], abs=1e-8)
+        slave.rov._set_fmu_state(json.loads(json.dumps(before)))
 
 
 def test_what_is_set_again_is_harmless_and_the_angles_replace_the_quaternion(

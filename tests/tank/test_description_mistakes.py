@@ -79,6 +79,16 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         "/rov.toml: curves.t200.electric_current: identification does not use it. Add it to the identified vehicle",
     ),
     (
+        f'{HEAD}[surface]\nheight = {{ value = 0.2, unit = "m", source = "a drawing" }}\n',
+        HEAVE_ALONE,
+        "/rov.toml: surface: identification does not use it. Add it to the identified vehicle file instead",
+    ),
+    (
+        f'current = "passes"\n{HEAD}',
+        HEAVE_ALONE,
+        "/rov.toml: current: identification does not use it. Add it to the identified vehicle file instead",
+    ),
+    (
         f"{HEAD}[body]\n{MASS}",
         {},
         "/steady_heave.csv: its commands are of thrusters, and rov.toml has none: write",

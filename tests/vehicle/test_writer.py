@@ -8,10 +8,10 @@ import pytest
 
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text, write_tuned, write_vehicle
 from tests.commands import REFIT
-from tests.vehicles import EVERYTHING, SIX_AXES, VEHICLES, a_vehicle, bases, tied
+from tests.vehicles import EVERYTHING, SIX_AXES, VEHICLES, a_vehicle, bases, passed, tied
 
 TEXT = REFIT.read_text(encoding="utf-8")
 
@@ -64,3 +64,13 @@ def test_a_point_is_written_with_its_place_and_tuned_in_it(tmp_path: Path) -> No
     moved = load_vehicle(tmp_path / "moved.toml")
     assert {name: x for name, x in moved.coefficients.items() if x != rov[name]} == {"r_y_hook": 0.25}
     assert {name for name, source in moved.sources.items() if source == "a test"} == {f"r_{x}_hook" for x in "xyz"}
+
+
+def test_what_a_current_does_is_written_and_read(vehicle: Vehicle) -> None:
+    path = VIDEORAY.with_name("passed.toml")
+    text = vehicle_text(passed(vehicle), VIDEORAY.parent)
+    assert '\nformat = 2\ncurrent = "passes"\n' in f"\n{text}"
+    again = read_vehicle(path, text.encode())
+    assert again.layout == passed(vehicle).layout
+    with pytest.raises(VehicleFileError, match=r"current = 'past': must be 'carries' or 'passes'"):
+        read_vehicle(path, text.replace('"passes"', '"past"').encode())

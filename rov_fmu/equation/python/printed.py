@@ -47,9 +47,12 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    alike = ("uvwpqr", ("x", "y", "z", "psi"), ROTATION, quaternion)
+    alike = ("uvwpqr", ("x", "y", *(() if layout.surface else "z"), "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
+    shifted = (f'    v.setdefault("{name}", {written(x, PYTHON, _value)})\n' for name, x in equation.shifted.items())
+    numbers = {name: x for name, x in numbers.items() if name not in equation.shifted}
+    numbers |= {f"start_{v}": x for v, x in equation.starts.items() if v in layout.velocities and x != Name(v)}
     rates = {f"der_{name}": rate for name, rate in equation.rates.items()}
     return f"""\
 STATES = {tuple(states)!r}
@@ -63,7 +66,7 @@ PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of
 def numbers(values):
     \"\"\"Return all numbers that follow from the coefficients, inputs and states, together with these.\"\"\"
     v = dict(values)
-{_assignments(numbers)}
+{"".join(shifted)}{_assignments(numbers)}
     return v
 
 
@@ -149,7 +152,8 @@ def accelerations_of(layout: Layout) -> Accelerations:
     terms, _ = _terms_of_known(equation, layout)
     rates = {v: rate_formula(own) for v, own in terms.items()}
     formulas = {**equation.program, **equation.forces}
-    numbers = {name: x for name, x in formulas.items() if name not in equation.orientation}
+    unknown = {*equation.states, *equation.orientation} - {*_KNOWN}
+    numbers = {name: x for name, x in formulas.items() if name not in unknown and unknown.isdisjoint(x.names)}
     mass = mass_matrix(layout, equation.names)
     masses: dict[tuple[str, str], Expression] = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
     for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):

@@ -63,7 +63,7 @@ class Motion:
         self.direction = dict.fromkeys(model.MONITORED, 1.0)
         self.find_numbers()
         starts = {**model.numbers(self.values), **values, **dict.fromkeys(model.OFFSETS, 0.0)}
-        self.y: State = [starts[name] for name in model.STATES]
+        self.y: State = [starts.get(f"start_{name}", starts[name]) for name in model.STATES]
         self.size = [0.0] * len(self.y)
         """The largest size of each state so far."""
         self.heading = self.turned(self.y, values.get("psi", 0.0))
@@ -253,17 +253,23 @@ class Change(NamedTuple):
 
 
 class DelayLine:
-    """The commands that act on a vehicle, and the changes that wait for the dead time.
+    """The commands that act on a vehicle, and the changes that wait for the dead time; and the current before.
 
     Before its first command, every thruster is still. For a vehicle without a dead time, nothing waits.
     """
 
-    def __init__(self, starts: Mapping[str, float], acting: Mapping[str, str]) -> None:
+    def __init__(
+        self, starts: Mapping[str, float], acting: Mapping[str, str], before: Mapping[str, str] | None = None
+    ) -> None:
         """Begin with the commands at the start. `acting` are the names of the commands that act after the dead time.
 
-        There are none without a dead time.
+        There are none without a dead time. `before` are the names of the components of the current during the step
+        before, if a current that changes passes the vehicle.
         """
         self.names = acting
+        self.names_before = before or {}
+        self.current: dict[str, float] = {}
+        """The current during the step before, by those names; empty before the first step."""
         self.acting = {name: starts[name] for name in acting}
         """The commands that act."""
         self.waiting: list[Change] = []
@@ -277,20 +283,20 @@ class DelayLine:
         Raises ValueError when more than MOST_WAITING changes wait. After that, and after a motion that overflows,
         `waiting` is the same as before the step.
         """
-        if not self.names:
-            return dict(vehicle.step(inputs, state, h))
+        current = {before: inputs[name] for name, before in self.names_before.items()}
+        before, passed, after = self.current or current, 0.0, dict(state)
         line = copy(self)
-        line._send({name: inputs[name] for name in self.names}, vehicle["T_d"])
-        passed, after = 0.0, dict(state)
+        if self.names:
+            line._send({name: inputs[name] for name in self.names}, vehicle["T_d"])
         while passed < h:
             line._receive(t, passed)
             until = min(h, line.waiting[0].remaining) if line.waiting else h
-            after = vehicle.step({**inputs, **line.delayed}, after, until - passed)
-            passed = until
+            after = vehicle.step({**inputs, **before, **line.delayed}, after, until - passed)
+            before, passed = current, until
         line.waiting = [change.after(h) for change in line.waiting]
         line._receive(t + h)
         if all(map(isfinite, after.values())):
-            self.acting, self.waiting = line.acting, line.waiting
+            self.acting, self.waiting, self.current = line.acting, line.waiting, current
         return after
 
     @property

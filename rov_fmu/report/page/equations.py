@@ -21,7 +21,7 @@ from rov_fmu.equation.expression import (
     total,
     written,
 )
-from rov_fmu.equation.forces import COUPLING, forces_of
+from rov_fmu.equation.forces import AT_SURFACE, COUPLING, forces_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis
 from rov_fmu.equation.terms import Equation, equation_of, mass_matrix
@@ -107,7 +107,8 @@ def equations_of(layout: Layout) -> Equations:
     def motion(form: VehicleAxis) -> Line:
         """Return the equation of motion of an axis: with effective masses on the left, if the axis has several."""
         v = form.axis.velocity
-        loads = [force.formula for force in forces_of(layout, names) if force.axis == v]
+        shown = (force for force in forces_of(layout, names) if force.effect is not AT_SURFACE)
+        loads = [force.formula for force in shown if force.axis == v]
         if not has_effective_inertia:
             right = Name(form.axis.coefficient("beta")) * total(loads)
             return line(Name(form.axis.inertia) * _rate(v), right, form.axis.equations[1])
