@@ -4,8 +4,6 @@
 
 #include "world.h"
 
-enum { N_VELOCITIES = N_MONITORED };
-
 static const double TURN = 6.283185307179586;
 
 /* Velocities (m/s, rad/s) below this have fewer digits, because squares underflow where the step tests convergence. */
