@@ -143,6 +143,12 @@ static inline void motion_add(double *to, double change, double *lost)
     *to = sum;
 }
 
+/* MuJoCo keeps the velocity over ground where the current changes, so that nothing need be kept of the current. */
+static inline void current_keep(double now[])
+{
+    (void)now;
+}
+
 #include "delay.c"
 #endif
 

@@ -35,6 +35,7 @@ from tests.vehicles import (
     random_inputs,
     random_state,
     random_vehicle,
+    surfaced,
     tied,
     with_rotors,
 )
@@ -63,6 +64,7 @@ KNOWN = {
 KNOWN |= {"dead time, lag, tables": load_vehicle(THRUST_EFFECTS), "attitude": load_vehicle(SIX_AXES), "fins": FINNED}
 KNOWN |= {
     "tied": tied(SIX, tether=(-0.3, 0.1, -0.2)),
+    "tied, surface, current passes": tied(passed(surfaced(SIX)), tether=(-0.3, 0.1, -0.2)),
     "rotors": with_rotors(SIX),
     "slow rotors": with_rotors(SIX).with_(T_t200=2.5),
 }
