@@ -90,8 +90,7 @@ static void PLAY(GetRealOutputDerivatives)(slot *s)
         const unsigned any = take_byte();
         order[i] = any < 200 ? 1 : (int)any % 4 - 1;
         const unsigned place = vr == NULL ? 0 : place_of(vr[i]);
-        good = good && order[i] == 1 && place >= FIRST_STATE && place < N_VARIABLES
-               && (place < FIRST_CALCULATED || (place >= FIRST_CALCULATED + N_STATES && VARIABLES[place].kind == CALCULATED));
+        good = good && order[i] == 1 && place < N_VARIABLES && VARIABLES[place].is_output;
     }
     verdict wanted = legal(s, WHICH(GetRealOutputDerivatives), good);
     wanted = wanted == ALLOWED && !is_moderate(s->f) ? EITHER : wanted;
