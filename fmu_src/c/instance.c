@@ -619,7 +619,7 @@ static void follow_jump(fmu *f, double time, double t, double h)
 /* Warn when a vehicle is above the surface, which its model does not have. */
 static void check_depth(fmu *f)
 {
-    if (DEPTH < N_VARIABLES && f->now.values[DEPTH] < -1e-9) {
+    if ((int)DEPTH < N_VARIABLES && f->now.values[DEPTH] < -1e-9) {
         WARN_ONCE(f, OUT_OF_WATER, "the vehicle has left the water, and this model has no surface: it goes on as under water. "
                   "Logged once.");
     }
