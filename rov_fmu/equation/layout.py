@@ -431,8 +431,16 @@ class Layout:
 
     @cached_property
     def over_ground(self) -> tuple[str, ...]:
-        """The velocity over ground north, east and down: the derivatives of the position, which are outputs."""
+        """The velocity over ground north, east and down: the derivatives of the position."""
         return tuple(rate_name(name) for name in POSITION if name in self.pose)
+
+    @cached_property
+    def outputs_over_ground(self) -> tuple[str, ...]:
+        """The velocity over ground of a vehicle with points, which is tied to others by it.
+
+        Of other vehicles, it is no output: CasADi, Jaxonomy and PathSim-FMI refuse an output with the name der(x).
+        """
+        return self.over_ground if self.points else ()
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:

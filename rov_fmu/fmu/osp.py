@@ -83,7 +83,7 @@ def _port(point: Point) -> _Group:
 def osp_model_description(layout: Layout) -> bytes:
     """Return the XML document. Every input and output is in one group; those that `_groups` lacks have their own."""
     declared = layout.inputs | layout.state | layout.calculated
-    units = {name: one.unit for name, one in declared.items()} | dict.fromkeys(layout.over_ground, "m/s")
+    units = {name: one.unit for name, one in declared.items()} | dict.fromkeys(layout.outputs_over_ground, "m/s")
     ports = [*map(_port, layout.points)]
     groups = [*ports]
     in_ports = {variable for port in ports for part in port.parts for variable in part.members}

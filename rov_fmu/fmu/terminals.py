@@ -48,13 +48,14 @@ def terminals(layout: Layout) -> list[Terminal]:
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     actuators = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
+    over_ground = layout.outputs_over_ground
     groups = [
         Terminal("thrusters", "input", "bus", f"Commands to the {actuators}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),
         Terminal("body_velocity", "output", "plug", "Velocity through the water, body frame", tuple(layout.velocities)),
-        Terminal("velocity", "output", "plug", "Velocity over ground, north, east and down", layout.over_ground),
+        Terminal("velocity", "output", "plug", "Velocity over ground, north, east and down", over_ground),
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),

@@ -128,7 +128,7 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
     for name, rate in ((name, rate_name(name)) for name in layout.state):
-        causality = "output" if rate in layout.over_ground else "local"
+        causality = "output" if rate in layout.outputs_over_ground else "local"
         rest = {"derivative_of": name, "dependencies": dependencies[rate]}
         add(rate, derivatives[name], causality, "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
