@@ -74,7 +74,8 @@ typedef struct {
 
 /* The warnings that an instance gives once. The first ones are about inputs that saturate, each at the place of the input. The
  * next ones are about harmless calls that the standard does not allow but importers make, about an attitude that is only a
- * guess, about a pulse of 0, about a vehicle above the surface, and about a voltage beyond the range of curves, one for each range. */
+ * guess, about a pulse of 0, about a vehicle above the surface, and about a voltage beyond the range of curves, one for each
+ * range. */
 enum {
     NOT_SET_UP = FIRST_STATE,
     READ_EARLY,

@@ -5,22 +5,9 @@
  * everywhere. */
 #include "fmu.h"
 
+#include "bits.h"
+
 enum { N_OUTPUTS = N_STATES + N_OTHER };
-
-static int read_double(double *value)
-{
-    unsigned long long bits;
-    const int read = scanf("%llx", &bits);
-    memcpy(value, &bits, sizeof *value);
-    return read == 1;
-}
-
-static void write_double(double value, char end)
-{
-    unsigned long long bits;
-    memcpy(&bits, &value, sizeof bits);
-    printf("%016llx%c", bits, end);
-}
 
 int main(int argc, char *argv[])
 {

@@ -114,7 +114,7 @@ def slips(
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
-    frames = {*_frames(compared, suspected)}
+    frames = {*_frames(compared)}
     untried = {*_scalings(suspected), *frames}
     if not untried:
         return ()
@@ -202,7 +202,7 @@ def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
         yield frozenset((one, scales[0]) for one, scales in likely.items())
 
 
-def _frames(compared: Sequence[_Match], suspected: Collection[_Match]) -> Iterator[Scaling]:
+def _frames(compared: Sequence[_Match]) -> Iterator[Scaling]:
     """Yield the channels of each source, and of each file, whose signs its frame decides.
 
     At least one of them is suspected of the other sign.
@@ -211,7 +211,7 @@ def _frames(compared: Sequence[_Match], suspected: Collection[_Match]) -> Iterat
     sources = grouped(((m.file, source), m) for m in turned for source in (m.channel.source, ""))
     for some in sources.values():
         has_two = len({m.channel.quantity.axis for m in some}) > 1
-        if has_two and any(m in suspected and -1.0 in m.scales for m in some):
+        if has_two and any(-1.0 in m.scales for m in some):
             yield frozenset((m, -1.0) for m in some)
 
 

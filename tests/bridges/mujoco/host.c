@@ -4,8 +4,9 @@
  * Usage: host LIBRARY. The input has 36 entries of the mass matrix of the rigid body, and coefficients and inputs. Each
  * further line has the commands of a step. Each line of output has the pose and the velocity after it. Numbers are the
  * bits of a double in hexadecimal: exact everywhere. */
+#include "../../fmu/bits.h"
+
 #include <stdint.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -24,21 +25,6 @@ static const double H = 0.002;
 typedef struct {
     double M[36], qpos[7], qvel[6], ctrl[64], passive[6], xmat[18], rigid[36], time;
 } simulation;
-
-static int read_double(double *value)
-{
-    unsigned long long bits;
-    const int read = scanf("%llx", &bits);
-    memcpy(value, &bits, sizeof *value);
-    return read == 1;
-}
-
-static void write_double(double value, char end)
-{
-    unsigned long long bits;
-    memcpy(&bits, &value, sizeof bits);
-    printf("%016llx%c", bits, end);
-}
 
 static void step_1(const void *model, void *data)
 {
