@@ -228,13 +228,14 @@ def _exact(
     """Return the names of the coefficients that no fit changes: those of rov.toml, and those of a base that its tests
     leave as they are. The curves of a base are uncertain unless their forces were measured, and so are a lag, the drag
     and the inertia of all axes along which a log moves, which by the coupling decide about the other axes, and what
-    loads the axes that a dive shows."""
+    loads the axes that a dive shows. A thruster that was whole may have lost force."""
     uncertain = {c.coefficient(key) for c in layout.curves for key in c.keys if c.name not in measured or key == "T"}
     keys = ("beta", *(f"{key}{end}" for key in ("a_d", "b_d") for end in ("", REVERSE)))
     uncertain |= {axis.coefficient(key) for axis in moved for key in keys}
     uncertain |= {axis.coefficient("F_0") for axis in shown} | {*_centres(layout, shown)}
     own = tests.description.known
-    return frozenset(n for n in tests.known if n not in uncertain or (n in own and not own[n].interval))
+    exact = {n for n in tests.known if n not in uncertain or (n in own and not own[n].interval)}
+    return frozenset(exact - {*layout.health.values()})
 
 
 def _centres(layout: Layout, shown: Collection[Axis]) -> list[str]:

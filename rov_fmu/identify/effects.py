@@ -8,8 +8,8 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import Variant, probability
-from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OFFSET, WIDTH
+from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Start, Suspect, in_order, probability, row_of
+from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
 from rov_fmu.identify.likelihood.posterior import around, hull
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -26,7 +26,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
 
     That of a hypothesis about the structure, which is no effect of unusual size, is that with which it won.
     """
-    file, odds = fit.file.posterior, {one.variant.parameter: one.odds for one in fit.adopted}
+    file, odds = fit.file.posterior, {row_of(fit.objective, one): value for one, value in fit.odds.items()}
     for n, p in enumerate(file.table.parameters):
         if not p.is_effect:
             continue
@@ -36,7 +36,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         is_right = any(axis.name == p.of and one.ratio < 1.0 for axis, one in fit.structure.items())
         is_usual = p.log is not None or p.of_kind.is_of_structure or (p.of_kind.is_usual_if_right and is_right)
         beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
-        evidence, least = odds.get((p.kind, p.of), posterior.evidence(n)), _shortest(fit, p)
+        evidence, least = odds.get(n, posterior.evidence(n)), _shortest(fit, p)
         yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
 
 
@@ -60,29 +60,29 @@ def _beside_base(table: Table, p: Parameter) -> str:
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:
-    """Yield the hypotheses about the structure that won, with the numbers of their parameters, and those that come
-    nearest where the model lacks something."""
-    table, objective = fit.posterior.table, fit.objective
-    for adopted in fit.adopted:
-        structure, index = _named(fit, adopted.variant, adopted.odds), table.index(*adopted.variant.parameter)
-        if index is not None:
-            value, interval = _number(fit, index)
-            structure = replace(structure, value=value, interval=interval, unit=table.parameters[index].unit)
+    """Yield the hypotheses about the structure that won, with the numbers of their rows, and those that come nearest
+    where the model lacks something."""
+    parameters = fit.objective.table.parameters
+    for suspect in in_order(fit.odds):
+        structure, n = _named(fit, suspect, fit.starts[suspect], fit.odds[suspect]), row_of(fit.objective, suspect)
+        if n is not None:
+            value, interval = _number(fit, n)
+            structure = replace(structure, value=value, interval=interval, unit=parameters[n].unit)
         yield structure
-    for variant, z in fit.nearest.items():
-        structure = replace(_named(fit, variant, 0.0), probability=nan)
-        if z is not None:
-            kind = KINDS[variant.kind]
-            structure = replace(structure, value=float(kind.number(z)), unit=kind.unit)
+    for suspect, start in fit.nearest.items():
+        structure, n = replace(_named(fit, suspect, start, 0.0), probability=nan), row_of(fit.objective, suspect)
+        if n is not None:
+            structure = replace(structure, value=float(parameters[n].number(start)), unit=parameters[n].unit)
         yield structure
-    if files := tuple(one.log.file for one in objective.logs if one.lost and _changes_anywhere(fit, one)):
-        yield _named(fit, Variant("momentary commands", files), inf)
+    if files := tuple(one.log.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
+        yield _named(fit, ("momentary commands", files), None, inf)
 
 
-def _named(fit: Fit, variant: Variant, odds: float) -> Structure:
+def _named(fit: Fit, suspect: Suspect, start: Start, odds: float) -> Structure:
     """Return a hypothesis with 2 ln of its odds and what its sentence says."""
-    words = variant.in_words(fit.known, fit.objective.logs)
-    return Structure(variant.kind, words.pop("of"), probability(odds), words=tuple(words.items()))
+    kind, of = suspect
+    words = HYPOTHESES[kind].in_words(fit.known, fit.objective.logs, of, start)
+    return Structure(kind, words.pop("of"), probability(odds), words=tuple(words.items()))
 
 
 def _changes_anywhere(fit: Fit, sampled: SampledLog) -> bool:

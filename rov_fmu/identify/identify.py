@@ -19,8 +19,12 @@ from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, 
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
+from rov_fmu.identify.likelihood.hypotheses import Starts, Suspect
+from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.search import StructureFit
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import (
+    ALARM,
     Answer,
     AxisOfBase,
     AxisResult,
@@ -37,6 +41,7 @@ from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
@@ -64,7 +69,18 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     if not (known.fitted or known.curves):
         own = ", ".join(sorted(tests.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
-    fit = fit_all(known, logs, rows, on_progress)
+    mistakes = dict[frozenset[Suspect], tuple[tuple[Slip, ...], float]]()
+
+    def slips_of(objective: Objective, z: Array, errors: Array, starts: Starts) -> tuple[tuple[Slip, ...], float]:
+        if (key := frozenset(starts)) not in mistakes:
+            mistakes[key] = slips(tests, objective, z, errors, starts)
+        return mistakes[key]
+
+    def is_mistaken(plain: StructureFit) -> bool:
+        told, error = slips_of(plain.objective, plain.minimum.z, plain.posterior.errors, plain.starts)
+        return bool(told) and error <= ALARM
+
+    fit = fit_all(known, logs, rows, on_progress, is_mistaken)
     show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
     show(0)
     predicted = []
@@ -79,7 +95,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    wrong = slips(tests, known, fit.objective, fit.best.z, fit.posterior.errors, fit.adopted)
+    wrong, _ = slips_of(fit.objective, fit.best.z, fit.posterior.errors, fit.starts)
     values = held_out_rows(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests)

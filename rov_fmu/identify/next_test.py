@@ -55,8 +55,9 @@ def next_test(
     now = np.array([shown.get(c, one) for c, one in zip(_COMMANDS, known, strict=True)])
     rest = np.maximum(now**2 - known**2, 0.0)
     worst = int(np.argmax(now))
-    values, vectors = np.linalg.eigh(posterior.covariance / np.outer(posterior.errors, posterior.errors))
-    root = posterior.errors[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+    scale = np.where(posterior.errors > 0.0, posterior.errors, 1.0)
+    values, vectors = np.linalg.eigh(posterior.covariance / np.outer(scale, scale))
+    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     tests = []
     for strength in _STRENGTHS:
         held = motions(posterior.z, (0.0, strength, -strength)).of.items()

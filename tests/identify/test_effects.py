@@ -145,7 +145,7 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
     end = minimise(objective, z, most=1, last=False)
     assert end.value <= objective.value(z, objective.runs(z))
     assert end.information[index, index] > 2.0 / 0.3**2, "the logs tell something of it"
-    clear = found(replace(fit, known=known, posterior=Posterior(table, z, np.eye(len(z)))), wake=1.2)
+    clear = found(replace(fit, posterior=Posterior(table, z, np.eye(len(z)))), wake=1.2)
     (effect,) = (one for one in effects_of(clear) if one.kind == "wake")
     assert (effect.value, effect.of, effect.kept) == (1.2, "heave", True)
     result = replace(without_findings(), effects=(effect,))

@@ -12,7 +12,6 @@ from rov_fmu.identify.assess import EXACT
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.solve import total
 from rov_fmu.identify.next_test import next_test
@@ -78,7 +77,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     assert test.is_useful
     more = ((0.0, 2.0), *plan(test), (0.0, 2.0))
     known, logs, rows = begin(with_logs(tmp_path, (HEAVE, "a", SHORT), (YAW, "a", SHORT), (HEAVE, "b", more)))
-    objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    objective = Objective.of_known(known, logs, rows)
     indices = [fit.posterior.table.index(p.kind, p.of, p.part) for p in objective.table.parameters]
     z = np.array(
         [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(indices, objective.mean, strict=True)]

@@ -14,7 +14,8 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.objective import Objective
-from rov_fmu.identify.likelihood.parameters import table_of
+from rov_fmu.identify.likelihood.search import StructureSearch
+from rov_fmu.identify.result import ALARM
 from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
@@ -144,9 +145,10 @@ def asked_of(folder: Path) -> dict[tuple[str, str], str]:
     """Return what is asked about the files of a folder, by file and quantity."""
     tests = load_tests(folder)
     known, recorded, rows = begin(tests)
-    objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
-    found = slips(tests, known, objective, objective.mean, np.full(len(objective.mean), np.inf))
+    objective = Objective.of_known(known, recorded, rows)
+    found, left = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf))
     assert all(one.evidence > 9.0 for one in found)
+    assert left < ALARM or not found, "the mended logs agree"
     return {(one.file, one.quantity): one.words for one in found}
 
 
@@ -157,6 +159,16 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     (log, *_), sensor = recordings(slip.axis), SENSOR[slip.axis.name]
     quantity = "surge distance" if slip.axis is SURGE else sensor
     assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
+
+
+def test_no_structure_is_sought_where_a_slip_explains_the_errors(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (log, *_), slip = recordings(HEAVE), SLIPS["heave up"]
+    monkeypatch.setattr(StructureSearch, "_round", lambda _: pytest.fail("a structure is sought"))
+    found = identify(load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN)))
+    assert [one.words for one in found.slips] == [QUESTIONS["heave up"]]
+    assert [one.verdict.word for one in found.axes] == ["do not use"]
 
 
 @pytest.mark.parametrize(
@@ -187,7 +199,7 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
     """However exact the fit: the VideoRay of the paper moves as if it had 91 % of its mass."""
     tests = load_tests(folder_of(write_folder(tmp_path, recordings(SURGE)[:1]), KNOWN, FORCES))
     known, recorded, rows = begin(tests)
-    objective = Objective(table_of(known, recorded, sorted({row.noise for row in rows})), recorded, rows)
+    objective = Objective.of_known(known, recorded, rows)
     z, index = objective.mean.copy(), objective.table.index("inertia", "surge")
     assert index is not None
     z[index] = np.log(ratio * known.coefficients["beta_u"])
@@ -198,7 +210,7 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
         return ()
 
     monkeypatch.setattr(module, "_customary", customary)
-    assert not slips(tests, known, objective, z, np.full(len(z), 1e-3))
+    assert slips(tests, objective, z, np.full(len(z), 1e-3)) == ((), np.inf)
     assert tried == [int(is_suspected)]
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import Tests
-from rov_fmu.identify.likelihood.hypotheses import Model, Variant
-from rov_fmu.identify.likelihood.objective import TableRow
+from rov_fmu.identify.likelihood.hypotheses import applied
+from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, recorded
 from rov_fmu.io.csv_table import DataFileError
@@ -205,10 +205,9 @@ def split_of(data_set: DataSet, data: Path | None, into: Path) -> Split:
     known, logs, rows = begin(tests)
     unseen = [found for log in read_folder(folders["test"]).logs if (found := recorded(log, known.layout))]
     begins = {log.log.file: log.record.told[0] + data_set.idle.get(Path(log.log.file).stem, -np.inf) for log in unseen}
-    off = Variant("idle commands", (*begins,), tuple((t, np.inf) for t in begins.values()))
-    training, test = (
-        [_recording(known, log) for log in some] for some in (logs, Model(known, unseen, rows).applied(off).logs)
-    )
+    off = {("idle commands", (*begins,)): tuple((t, np.inf) for t in begins.values())}
+    acting = applied(Objective.of_known(known, unseen, rows), off).logs
+    training, test = ([_recording(known, log) for log in some] for some in (logs, acting))
     tables = read_toml(folders["training"] / ROV_FILE, DataFileError)
     count = {name: _leaves(value) for name, value in tables.items() if name != "vehicle"}
     names = sum(count.get(name, 0) for name in _NAMES)

@@ -11,26 +11,33 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.hypotheses import Model
+from rov_fmu.identify.likelihood.hypotheses import Starts, Suspect
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import (
-    Adopted,
     Misfit,
-    Starts,
+    StructureFit,
     StructureSearch,
-    Trial,
     settled,
     structure,
     unseen_errors,
     windows,
     with_shared,
 )
-from rov_fmu.identify.likelihood.solve import MOST_STEPS, QUICK, Minimum, evidence, evidence_at, minimise, scaled
-from rov_fmu.identify.result import KEPT
+from rov_fmu.identify.likelihood.solve import (
+    QUICK,
+    Minimum,
+    evidence,
+    evidence_at,
+    least_from,
+    minimise,
+    scaled,
+    start_of,
+)
+from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
@@ -49,7 +56,6 @@ the model, and another minimum may explain it."""
 class Fit:
     """The objective at its minimum: what is told, predicted and, without weak effects, written."""
 
-    known: Prior
     objective: Objective
     """Where no test measured the forces of a curve, it is quadratic, as in the file."""
     best: Minimum
@@ -59,16 +65,23 @@ class Fit:
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
     """How much larger J is at the end of the second start."""
-    adopted: tuple[Adopted, ...] = ()
-    """The hypotheses about the structure that won."""
+    starts: Starts = field(default_factory=dict)
+    """The hypotheses about the structure that won, with the coordinates of their rows."""
+    odds: Mapping[Suspect, float] = field(default_factory=dict)
+    """2 ln of the posterior odds of each against the best model without it."""
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
     nearest: Starts = field(default_factory=dict)
-    """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their numbers."""
+    """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their rows."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the data do not tell apart."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
     """The errors of predictions over 10 s along each axis."""
+
+    @property
+    def known(self) -> Prior:
+        """What is known before the fit."""
+        return self.objective.table.known
 
     @property
     def posteriors(self) -> tuple[Posterior, Posterior]:
@@ -101,85 +114,91 @@ class Fit:
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
 
 
-def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent) -> Fit:
+def fit_all(
+    known: Prior,
+    logs: Sequence[SampledLog],
+    rows: Sequence[TableRow],
+    on_progress: Progress = silent,
+    is_mistaken: Callable[[StructureFit], bool] = lambda _: False,
+) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends. The shapes of the other curves only widen the intervals: what is told is a fit in which these are quadratic.
+
+    Where predictions raise the alarm, `is_mistaken` tells whether a mistake in a log is the reason. The structure of
+    the vehicle is not the reason then.
     """
-    model = Model(known, logs, rows)
-    quick, full = model.objective(thinned=True), model.objective()
-    table = full.table
+    quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends, is_enough = _from_starts(quick, on_progress)
     show = moving(on_progress, "all samples", 0.3, 0.6)
     near = minimise(full, scaled(full, ends[0].z), show, last=False)
+    plain, first = settled(StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0])))
+    before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
+    search = StructureSearch(plain, lambda: show_tried(next(tried)))
+    if not (plain.predicted > ALARM and is_mistaken(replace(plain, starts=dict.fromkeys(first)))):
+        search.run()
+    full, near = search.now.objective, search.now.minimum
+    measured = full.table.known.measured_curves
+    for n, curve in enumerate(measured):
+        other, needed = _bending(full, full.table.known.bent | {curve}), evidence_at(full, near) + KEPT
 
-    def search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
-        show_tried(next(tried))
-        return _search(objective, numbers)
+        def bends(value: float, information: Array, other: Objective = other, needed: float = needed) -> bool:
+            return evidence(other, value, information) > needed
 
-    plain = Trial({}, model, full, near, evidence_at(full, near), evidence_at(quick, ends[0]))
-    plain, first = settled(plain, search)
-    held = windows(plain.objective, plain.minimum.z)
-    explained = StructureSearch(plain, search).explained()
-    adopted = (*first, *explained.adopted)
-    model, full, near = explained.trial.model, explained.trial.objective, explained.trial.minimum
-    known = model.known
-    for n, curve in enumerate(known.measured_curves):
-        other, needed = replace(known, bent=known.bent | {curve}), evidence_at(full, near) + KEPT
-        objective = replace(model, known=other).objective()
-
-        def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
-            return evidence(objective, value, information) > needed
-
-        low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
+        low, high = (0.7 + 0.1 * m / len(measured) for m in (n, n + 1))
         show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
-        found = minimise(objective, near.z, show, enough=QUICK, last=False, promises=bends)
+        found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
-            known, full, near = other, objective, minimise(objective, found.z, last=False)
+            full, near = other, minimise(other, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
     on_progress("exact derivatives", 0.8)
     best = minimise(full, scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = [
-        abs(ends[-1].z[index] - ends[0].z[index]) / max(posterior.errors[n], _SAME * full.deviation[n])
+        abs(ends[-1].z[n] - ends[0].z[n]) / max(posterior.errors[n], _SAME * full.deviation[n])
         for n in posterior.of_vehicle
-        if (index := table.index(*full.table.parameters[n].key)) is not None
     ]
-    if max(apart, default=0.0) < 2.0 or adopted:  # other vehicles had the wrong structure
+    odds = {**first, **search.odds}
+    if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
-    measured, told, least = known.bent.intersection(known.measured_curves), full, best
-    if measured < known.bent:
-        told, least = _less_bent(model, known, measured, best, on_progress)
-    file = _less_bent(model, known, frozenset(), least, on_progress) if measured else (told, least)
-    misfits = with_shared(known.layout, structure(told, least))
+    told, least, bent = full, best, full.table.known.bent
+    show, of_measured = moving(on_progress, "quadratic thrust", 0.82, 0.88), bent.intersection(measured)
+    if of_measured < bent:
+        told, least = _less_bent(full, of_measured, best, show)
+    file = _less_bent(full, frozenset(), least, show) if of_measured else (told, least)
+    misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
-    unseen = unseen_errors(told, least.z, held, misfits)
+    unseen = unseen_errors(told, least.z, before, misfits)
     of_file = without_weak_effects(*file)
     return Fit(
-        known,
         told,
         least,
         posterior.widened(ratios, unseen),
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
-        adopted,
-        explained.rivals,
-        explained.nearest,
-        explained.alike,
+        {**dict.fromkeys(first), **search.now.starts},
+        odds,
+        tuple(one.posterior for one in search.rivals),
+        search.nearest,
+        search.alike,
         misfits,
     )
 
 
+def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
+    """Return J where other curves bend."""
+    return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
+
+
 def _less_bent(
-    model: Model, known: Prior, bent: frozenset[str], near: Minimum, on_progress: Progress
+    objective: Objective, bent: frozenset[str], near: Minimum, on_step: Callable[[int], None]
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
-    objective = replace(model, known=replace(known, bent=bent)).objective()
-    show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
-    return objective, minimise(objective, near.z, show, near=near.data, enough=QUICK)
+    other = _bending(objective, bent)
+    return other, minimise(other, near.z, on_step, near=near.data, enough=QUICK)
 
 
 def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
@@ -191,37 +210,12 @@ def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum]
             break
         show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
-            ends.append(_least(quick, start_of(quick, n), show))
+            ends.append(least_from(quick, start_of(quick, n), show))
         except DivergedError:
             continue
     if not ends:
         raise DivergedError
     return sorted(ends, key=lambda end: end.value), is_enough
-
-
-def _least(objective: Objective, start: Array, on_step: Callable[[int], None] = lambda _: None) -> Minimum:
-    """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
-
-    In the valley between both, J has a kink wherever the dead band passes a command of the tests.
-    """
-    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False)
-    larger = objective.table.with_larger_dead_bands(end.z)
-    if np.array_equal(larger, end.z):
-        return end
-    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=QUICK, last=False)
-    return min(end, other, key=lambda found: found.value)
-
-
-def _search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
-    """Return the minimum of J of thinned logs from the first start, in which some parameters have other numbers."""
-    start = start_of(objective)
-    start[[*numbers]] = [*numbers.values()]
-    return _least(objective, start)
-
-
-def start_of(objective: Objective, number: int = 0) -> Array:
-    """Return the coordinates at which a start begins."""
-    return np.asarray(objective.mean + objective.deviation * objective.table.each("of_kind.starts")[:, number])
 
 
 def _is_loud(table: Table, z: Array) -> bool:

@@ -1,4 +1,8 @@
-"""What the structure of the model may lack: one table of hypotheses, and the model in which some of them are true."""
+"""What the structure of the model may lack: one table of hypotheses, and J where some of them are true.
+
+A hypothesis frees rows of the table of parameters, which otherwise stay where they change nothing, or it changes what
+the filter reads of the logs: which samples count, which commands act, and what lies between them.
+"""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,8 +14,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.kinds import TURN
-from rov_fmu.identify.likelihood.objective import Objective, TableRow
-from rov_fmu.identify.likelihood.parameters import Table, table_of
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
 from rov_fmu.identify.result import ALARM
@@ -33,8 +36,17 @@ _ROUNDING = 1e-13
 
 Logs = Sequence[SampledLog]
 Of = tuple[str, ...]
-Change = Callable[[Prior, Logs, "Variant"], tuple[Prior, Logs]]
-InWords = Callable[[Prior, Logs, "Variant"], dict[str, str]]
+"""The names of the thrusters or files that a hypothesis is about; empty if it is about all of them."""
+Suspect = tuple[str, Of]
+"""A key of HYPOTHESES, which is also the kind of its row, and what may have it."""
+Acting = tuple[tuple[float, float], ...]
+"""When the commands of each of some files begin to act, and when they end, s."""
+Start = float | Acting | None
+"""The coordinate from which the row of a hypothesis begins, or the times between which it holds; None without both."""
+Starts = Mapping[Suspect, Start]
+"""Hypotheses that hold together, and where each begins or ends."""
+Change = Callable[[Prior, Logs, Of, Start], tuple[Prior, Logs]]
+InWords = Callable[[Prior, Logs, Of, Start], dict[str, str]]
 
 
 @dataclass(frozen=True)
@@ -42,21 +54,21 @@ class Hypothesis:
     """How the model may be wrong, and what changes it."""
 
     probability: float
-    """The prior probability of all its variants together: how many folders have it."""
-    variants: Callable[[Prior, Logs], Iterator[Of]]
+    """The prior probability that it is true of any thrusters or files: how many folders have it."""
+    suspects: Callable[[Prior, Logs], Iterator[Of]]
     """What may have it: thrusters, or files."""
-    change: Change
-    """The model with it."""
+    change: Change = lambda known, logs, _of, _start: (known, logs)
+    """The model with it, beside its row."""
     starts: tuple[float, ...] = ()
-    """The coordinates from which its parameter begins; empty if it has none."""
+    """The coordinates from which its row begins; empty if it has none."""
     sentence: str = ""
-    """What is told, with `in_words`, `value`, the number of the parameter, and `odds`."""
-    in_words: InWords = lambda _known, _logs, variant: {"of": listed(variant.of)}
+    """What is told, with `in_words`, `value`, the number of the row, and `odds`."""
+    in_words: InWords = lambda _known, _logs, of, _start: {"of": listed(of)}
     """What may have it, as `of`, and what else the sentence says about it."""
     least: float = 0.0
-    """If the number of its parameter is nearer than this to where it is absent, it is told as an effect alone."""
+    """If the number of its row is nearer than this to where it is absent, it is told as an effect alone."""
     why_no_null: str = ""
-    """Why nothing within its bounds is the model without it; empty if it is where its parameter has its null, or with
+    """Why nothing within its bounds is the model without it; empty if it is where its row has its null, or with
     times that leave out nothing."""
     alarm: float = ALARM
     """The error over 10 s, relative to the noise, above which it is tried."""
@@ -70,72 +82,38 @@ class Hypothesis:
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
 
 
-@dataclass(frozen=True)
-class Variant:
-    """A hypothesis about some thrusters or files."""
-
-    kind: str
-    """Its key in HYPOTHESES, which is also the kind of its parameter."""
-    of: Of
-    acting: tuple[tuple[float, float], ...] = ()
-    """When the commands of each of the files begin to act, and when they end, s."""
-
-    @property
-    def parameter(self) -> tuple[str, str]:
-        """The kind of its parameter, and what has it."""
-        return self.kind, self.of[0] if self.of else ""
-
-    def in_words(self, known: Prior, logs: Logs) -> dict[str, str]:
-        """Return what its sentence says about it, where the logs have it."""
-        return HYPOTHESES[self.kind].in_words(known, logs, self)
-
-    def excludes(self, other: "Variant") -> bool:
-        """Return True if both say something of one kind about the same thrusters or files."""
-        return self.kind == other.kind and (not self.of or not {*self.of}.isdisjoint(other.of))
+# ---- The changes of what the filter reads ----------------------------------------------------------------------------
 
 
-# ---- The changes -----------------------------------------------------------------------------------------------------
-
-
-def _with_parameter(kind: str) -> Change:
-    def change(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-        return replace(known, assumed=(*known.assumed, (kind, variant.parameter[1]))), logs
-
-    return change
-
-
-def _momentary(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+def _momentary(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
     coefficients, full = known.coefficients, known.full
-    return known, [one.with_lines(coefficients, full) if one.log.file in variant.of else one for one in logs]
+    return known, [one.with_lines(coefficients, full) if one.log.file in of else one for one in logs]
 
 
-def _settled(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-    return known, [
-        one.settled_at(at) if one.log.file in variant.of and (at := one.jump) is not None else one for one in logs
-    ]
+def _settled(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
+    return known, [one.settled_at(at) if one.log.file in of and (at := one.jump) is not None else one for one in logs]
 
 
-def _without_idle(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
+def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
     """Return the logs without the commands that do not act."""
-    times = dict(zip(variant.of, variant.acting, strict=True))
-
-    def acting(sampled: SampledLog) -> SampledLog:
-        begin, end = times.get(sampled.log.file, (-inf, inf))
-        acts = (sampled.record.told >= begin) & (sampled.record.told < end)
-        return sampled.with_inputs(np.where(acts[:, None], sampled.record.inputs, 0.0))
-
-    return known, [acting(one) for one in logs]
+    assert isinstance(start, tuple)
+    times, found = dict(zip(of, start, strict=True)), []
+    for one in logs:
+        begin, end = times.get(one.log.file, (-inf, inf))
+        acts = (one.record.told >= begin) & (one.record.told < end)
+        found.append(one.with_inputs(np.where(acts[:, None], one.record.inputs, 0.0)))
+    return known, found
 
 
 def _permuted(permutation: Callable[[Of], tuple[Of, float]]) -> Change:
     """Return the change of the commands of some thrusters to those of others, with a sign."""
 
-    def change(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-        others, sign = permutation(variant.of)
+    def change(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
+        others, sign = permutation(of)
         found = []
         for sampled in logs:
             inputs, names = sampled.record.inputs.copy(), [*sampled.layout.inputs]
-            for thruster, other in zip(variant.of, others, strict=True):
+            for thruster, other in zip(of, others, strict=True):
                 if {f"u_{thruster}", f"u_{other}"} <= {*names}:
                     inputs[:, names.index(f"u_{thruster}")] = sign * sampled.record.inputs[:, names.index(f"u_{other}")]
             found.append(sampled.with_inputs(inputs))
@@ -144,7 +122,7 @@ def _permuted(permutation: Callable[[Of], tuple[Of, float]]) -> Change:
     return change
 
 
-def _with_rotors(known: Prior, logs: Logs, _: Variant) -> tuple[Prior, Logs]:
+def _with_rotors(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
     def lagging(layout: Layout) -> Layout:
         return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
 
@@ -154,8 +132,7 @@ def _with_rotors(known: Prior, logs: Logs, _: Variant) -> tuple[Prior, Logs]:
     )
 
 
-def _slewing(known: Prior, logs: Logs, variant: Variant) -> tuple[Prior, Logs]:
-    known, logs = _with_parameter("slew limit")(known, logs, variant)
+def _slewing(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
     return known, [one if one.log.follows_axis else one.refined(_FINEST) for one in logs]
 
 
@@ -193,7 +170,7 @@ def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
 
 
 def _with_both_velocities(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield one variant, about all logs, if one has the velocity over ground both ahead and to starboard."""
+    """Yield one suspect, about all logs, if one has the velocity over ground both ahead and to starboard."""
     if any({SURGE, SWAY} <= {s.axis for s in one.record.sensors if s.is_horizontal_velocity} for one in logs):
         yield ()
 
@@ -204,30 +181,31 @@ def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
     return {"share": percent(lost[axis]), "axis": axis, "rate": significant(1.0 / interval, 2)}
 
 
-def _of_lost(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+def _of_lost(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
     """Return the files, and along which axis most of the command is lost between their rows."""
-    most = max((one for one in logs if one.log.file in variant.of), key=lambda one: max(one.lost.values()))
-    return {"of": listed(variant.of), **lost_in_words(most.lost, most.interval)}
+    most = max((one for one in logs if one.log.file in of), key=lambda one: max(one.lost.values()))
+    return {"of": listed(of), **lost_in_words(most.lost, most.interval)}
 
 
-def _of_settled(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+def _of_settled(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
     """Return each file with the time since its first row from which its velocities count."""
-    some = (one for one in logs if one.log.file in variant.of)
+    some = (one for one in logs if one.log.file in of)
     return {"of": listed(f"{one.log.file} (until {one.settled - one.record.told[0]:.1f} s)" for one in some)}
 
 
-def _of_acting(_: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
     """Return each file whose commands do not always act, with the times since its first row between which they do."""
+    assert isinstance(start, tuple)
     told, words = {one.log.file: one.record.told for one in logs}, []
-    for file, (begin, end) in zip(variant.of, variant.acting, strict=True):
+    for file, (begin, end) in zip(of, start, strict=True):
         first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
         words.append(f"{file} ({first} to {last} s)")
     return {"of": listed(words)}
 
 
-def _of_twins(known: Prior, logs: Logs, variant: Variant) -> dict[str, str]:
+def _of_twins(known: Prior, logs: Logs, of: Of, _: Start) -> dict[str, str]:
     """Return the thrusters that no log tells apart, of which one has it."""
-    return {"of": listed(twins(known, logs, *variant.of), "or")}
+    return {"of": listed(twins(known, logs, *of), "or")}
 
 
 def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
@@ -279,13 +257,13 @@ def _commanded(known: Prior, logs: Logs) -> Iterator[Of]:
 
 
 def _without_voltage(known: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield one variant, about all thrusters, if no log has the voltage of the battery."""
+    """Yield one suspect, about all thrusters, if no log has the voltage of the battery."""
     if known.layout.voltage is None and not known.layout.has_wrench:
         yield from _commanded(known, logs)
 
 
 def _lagging(known: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield one variant, about all thrusters, if all forces may lag, and no curve is a table or a wrench's force."""
+    """Yield one suspect, about all thrusters, if all forces may lag, and no curve is a table or a wrench's force."""
     curves = known.layout.curves
     if (
         logs
@@ -323,10 +301,11 @@ HYPOTHESES = {
     TURN: Hypothesis(
         0.02,
         _with_both_velocities,
-        _with_parameter(TURN),
-        tuple(sign * radians(degrees) for degrees in (6.0, 15.0, 45.0, 90.0, 135.0, 175.0) for sign in (1.0, -1.0)),
-        "the velocity sensor is turned by {value} about the vertical axis, positive to starboard{odds}. The fit turns "
-        "its values back. Correct the angle of mounting where the log is made",
+        starts=tuple(sign * radians(angle) for angle in (6.0, 15.0, 45.0, 90.0, 135.0, 175.0) for sign in (1.0, -1.0)),
+        sentence=(
+            "the velocity sensor is turned by {value} about the vertical axis, positive to starboard{odds}. The fit "
+            "turns its values back. Correct the angle of mounting where the log is made"
+        ),
         least=0.05,
     ),
     "reversed commands": Hypothesis(
@@ -376,30 +355,27 @@ HYPOTHESES = {
     "health": Hypothesis(
         0.1,
         _ill,
-        lambda known, logs, variant: _with_parameter("health")(
-            replace(known, exact=known.exact - {known.layout.health[variant.of[0]]}), logs, variant
-        ),
-        (0.0, 0.5, 0.75),
-        "thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
-        _of_twins,
+        starts=(0.0, 0.5, 0.75),
+        sentence="thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
+        in_words=_of_twins,
         least=0.21,
         is_contrast=True,
     ),
     "command limit": Hypothesis(
         0.03,
         _commanded,
-        _with_parameter("command limit"),
-        (0.4, 0.6, 0.8),
-        "all thrusters: beyond a command of {value}, they push no more{odds}. Check the limits of the speed "
+        starts=(0.4, 0.6, 0.8),
+        sentence="all thrusters: beyond a command of {value}, they push no more{odds}. Check the limits of the speed "
         "controllers, and use only commands below",
     ),
     "voltage drop": Hypothesis(
         0.05,
         _without_voltage,
-        _with_parameter("voltage drop"),
-        (0.1, 0.3),
-        "all thrusters: they lose {value} of their thrust while all have full command, as if the voltage fell with the "
-        "load{odds}. Log the voltage of the battery",
+        starts=(0.1, 0.3),
+        sentence=(
+            "all thrusters: they lose {value} of their thrust while all have full command, as if the voltage fell "
+            "with the load{odds}. Log the voltage of the battery"
+        ),
         alarm=1.0,
     ),
     "slew limit": Hypothesis(
@@ -416,69 +392,53 @@ HYPOTHESES = {
 which samples count, then which commands act, and then what lies between them. Each is tried after the alarm."""
 
 
-def in_order(variants: Iterable[Variant]) -> list[Variant]:
+def in_order(some: Iterable[Suspect]) -> list[Suspect]:
     """Return some hypotheses in the order in which they change a model."""
     kinds = [*HYPOTHESES]
-    return sorted(variants, key=lambda one: (kinds.index(one.kind), one.of))
+    return sorted(some, key=lambda one: (kinds.index(one[0]), one[1]))
 
 
-# ---- The model -------------------------------------------------------------------------------------------------------
+def applied(plain: Objective, starts: Starts, *, thinned: bool = False) -> Objective:
+    """Return J if all these hypotheses are true, whose order does not matter. Raises BuildError.
+
+    They change it in the order of HYPOTHESES: lines between momentary commands follow from those that act.
+    """
+    known, logs = plain.table.known, plain.logs
+    for kind, of in in_order(starts):
+        known, logs = HYPOTHESES[kind].change(known, logs, of, starts[kind, of])
+    freed = ((kind, of[0] if of else "") for kind, of in starts if HYPOTHESES[kind].starts)
+    return Objective.of_known(replace(known, freed=known.freed.union(freed)), logs, plain.rows, thinned=thinned)
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
-    """What is fitted: what is known before, the logs, and the rows of tables."""
-
-    known: Prior
-    logs: Logs
-    rows: Sequence[TableRow]
-
-    @property
-    def table(self) -> Table:
-        """All parameters."""
-        return table_of(self.known, self.logs, sorted({row.noise for row in self.rows}))
-
-    def objective(self, *, thinned: bool = False) -> Objective:
-        """Return J. Raises BuildError."""
-        return Objective(self.table, self.logs, self.rows, thinned=thinned)
-
-    def applied(self, *variants: Variant) -> "Model":
-        """Return the model if all these hypotheses are true, whose order does not matter.
-
-        They change it in the order of HYPOTHESES: lines between momentary commands follow from those that act.
-        """
-        known, logs = self.known, self.logs
-        for variant in in_order(variants):
-            known, logs = HYPOTHESES[variant.kind].change(known, logs, variant)
-        return replace(self, known=known, logs=logs)
+def row_of(objective: Objective, suspect: Suspect) -> int | None:
+    """Return the index of the row that a hypothesis frees, None if it frees none."""
+    kind, of = suspect
+    return objective.table.index(kind, of[0] if of else "") if HYPOTHESES[kind].starts else None
 
 
-def contrasts(model: Model, at: Mapping[tuple[str, str, str], float]) -> dict[str, float]:
+def contrasts(plain: Objective, z: Array) -> dict[str, float]:
     """Return the standard error of the health of each thruster by the data alone.
 
     Noise and slow processes have their usual sizes, because a fit that lacks a fault explains it by noise. The priors
-    of the motion are so wide that they tell nothing. `at` is a point near the fit. A thruster that no log commands, and
+    of the motion are so wide that they tell nothing. `z` is a point near the fit. A thruster that no log commands, and
     a commanded force along an axis of the body, are not among the result. Raises DivergedError.
     """
-    known, names = model.known, [of[0] for of in _ill(model.known, model.logs)]
-    if not names:
+    starts = {("health", of): _WEAK for of in _ill(plain.table.known, plain.logs)}
+    if not starts:
         return {}
-    exact = known.exact - {known.layout.health[name] for name in names}
-    known = replace(known, exact=exact, assumed=(*known.assumed, *(("health", name) for name in names)))
-    objective = replace(model, known=known).objective(thinned=True)
-    parameters = objective.table.parameters
-    z = np.array([at.get(p.key, p.mean) if p.of_motion else p.mean for p in parameters])
-    of = {p.of: n for n, p in enumerate(parameters) if p.kind == "health"}
+    objective = applied(plain, starts, thinned=True)
+    of = {name: n for _, (name,) in starts if (n := objective.table.index("health", name)) is not None}
+    z = np.where(objective.table.each("of_motion"), z, objective.mean)
     z[[*of.values()]] = _WEAK
     z = np.clip(z, objective.low, objective.high)
     tells = np.diag(1.0 / (_WIDER * objective.deviation) ** 2)
     for data in objective.data(z, objective.runs(z), exact=False):
         A = data.slopes / np.sqrt(data.variances)[:, None]
         tells[np.ix_(data.indices, data.indices)] += A.T @ A
-    moves = [n for n, p in enumerate(parameters) if p.of_motion and p.low != p.high and n not in of.values()]
+    moves = [n for n, p in enumerate(objective.table.parameters) if p.of_motion and not p.is_fixed]
     found = {}
     for name, index in of.items():
-        some = [*moves, index]
+        some = [*(n for n in moves if n not in of.values()), index]
         scale = np.sqrt(np.diag(tells)[some])
         inverse = np.linalg.pinv(tells[np.ix_(some, some)] / np.outer(scale, scale), rcond=_ROUNDING, hermitian=True)
         found[name] = float(np.sqrt(inverse[-1, -1]) / scale[-1])

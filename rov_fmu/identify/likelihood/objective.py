@@ -30,7 +30,8 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
-from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table
+from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table, table_of
+from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
@@ -70,7 +71,7 @@ class TableRow:
         parts = {self.subject.name}
         if not isinstance(self.subject, Curve):
             parts |= {"", *(name for t in layout.thrusters_along(self.subject) for name in (t.curve, t.name))}
-        return parameter.of_motion and parameter.of in parts
+        return parameter.of_motion and not parameter.is_fixed and parameter.of in parts
 
 
 def _half_speed(vehicle: Vehicle, curve: Curve, commands: Array) -> Array:
@@ -232,7 +233,15 @@ class Objective:
         filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
         self.filters = [filters[one.layout] for one in logs]
         self.mean, self.deviation, self.low, self.high = map(table.each, ("mean", "deviation", "low", "high"))
+        self.free = ~table.each("is_fixed")
         self.whole = Part(range(len(logs)), range(len(rows)))
+
+    @classmethod
+    def of_known(
+        cls, known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], *, thinned: bool = False
+    ) -> "Objective":
+        """Return J of what is known before the fit, some logs and rows of tables. Raises BuildError."""
+        return cls(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows, thinned=thinned)
 
     def of(self, part: Part) -> "Objective":
         """Return J for a part of the data."""
@@ -305,7 +314,7 @@ class Objective:
         quantities = {m.channel.quantity.name for m in sampled.measured}
         layout = sampled.layout
         names = {"", HORIZONTAL, *layout.by_name, *layout.curves_by_name, *layout.curve_of, *quantities}
-        return parameter.of in names and parameter.low != parameter.high
+        return parameter.of in names and not parameter.is_fixed
 
     # ---- All data ----
 
@@ -325,7 +334,7 @@ class Objective:
 
     def prior(self, z: Array) -> float:
         """Return the part of J that the priors contribute."""
-        return float(np.sum(((z - self.mean) / self.deviation) ** 2))
+        return float(np.sum(((z - self.mean) / self.deviation)[self.free] ** 2))
 
     def samples(self, z: Array, runs: Sequence[Run]) -> list[Samples]:
         """Return the samples of the runs of some parameters, and then those of the rows of tables, if any."""

@@ -79,9 +79,14 @@ class Parameter(Coordinate):
         return self.kind, self.of, self.part
 
     @property
+    def is_fixed(self) -> bool:
+        """True if no fit changes it. It has no error, and nothing in J depends on its prior."""
+        return self.low == self.high
+
+    @property
     def is_effect(self) -> bool:
         """True for an effect of the motion, which may be absent from the vehicle."""
-        return self.null is not None and self.of_motion
+        return self.null is not None and self.of_motion and not self.is_fixed
 
     @property
     def of_kind(self) -> Kind:
@@ -123,6 +128,14 @@ class Table:
     shape_deviation: float = PRIORS["thrust_shape"].deviation
     exact: frozenset[str] = frozenset()
     """The names of the coefficients that no parameter changes."""
+    prior: Prior | None = None
+    """What the parameters were made from; None for a table of no log."""
+
+    @property
+    def known(self) -> Prior:
+        """What the parameters were made from."""
+        assert self.prior
+        return self.prior
 
     def each(self, key: str) -> np.ndarray:
         """Return a number of each parameter, such as its `mean`, or `of_kind.is_size`."""
@@ -340,8 +353,8 @@ class Table:
         return 0.0 if self.index(LAG) is None else LEAST_LAG
 
     def limit(self, z: Array) -> Any:
-        """Return the strongest command that the thrusters follow; inf if there is no limit."""
-        return self.get(z, "command limit", default=np.inf)
+        """Return the strongest command that the thrusters follow."""
+        return self.get(z, "command limit", default=1.0)
 
     def with_larger_dead_bands(self, z: Array) -> Array:
         """Return the coordinates with larger dead bands of measured curves, and linear shares that make up for them.
@@ -351,16 +364,18 @@ class Table:
         larger = z.copy()
         for n, p in enumerate(self.parameters):
             band = self.index("dead band", p.of)
-            if p.kind == "linear thrust" and p.low < p.high and band is not None:
+            if p.kind == "linear thrust" and not p.is_fixed and band is not None:
                 d = self.parameters[band].deviation
                 larger[n], larger[band] = z[n] + 2.0 * d, z[band] + d
         return larger
 
     def followed(self, z: Array, sampled: SampledLog) -> Array:
         """Return the inputs that thrusters follow, by limits and a drop of the voltage: (sets x) rows x inputs."""
-        numbers = np.broadcast(self.limit(z), self.get(z, "slew limit"), self.get(z, "voltage drop"))
-        some = [_followed(sampled, *map(float, each)) for each in numbers]
-        return np.reshape(some, (*np.shape(z)[1:], *sampled.record.inputs.shape)) if len(some) > 1 else some[0]
+        some = np.broadcast_arrays(self.limit(z), self.get(z, "slew limit"), self.get(z, "voltage drop"))
+        numbers = np.reshape(some, (3, -1)).T
+        if (numbers == numbers[0]).all():
+            return _followed(sampled, *numbers[0].tolist())
+        return np.array([_followed(sampled, *each) for each in numbers.tolist()])
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
@@ -375,7 +390,7 @@ def _followed(sampled: SampledLog, limit: float, rise: float, drop: float) -> Ar
     `rise` is the least time from rest to full command, s.
     """
     found = sampled.record.inputs
-    if sampled.log.follows_axis or (limit == np.inf and rise == drop == 0.0):
+    if sampled.log.follows_axis or (limit >= 1.0 and rise == drop == 0.0):
         return found
     found = found.copy()
     indices = [n for n, name in enumerate(sampled.layout.inputs) if name in sampled.layout.commands]
@@ -407,7 +422,7 @@ def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
     shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
     parameters = tuple(p for p in _parameters(known, logs, row_noises) if p.deviation > 0.0)
-    return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact)
+    return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact, known)
 
 
 Make = Callable[..., Parameter]
@@ -444,8 +459,8 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
     for number, sampled in enumerate(logs):
         yield from _of_one_log(sampled, number, make)
     yield from _of_noise(known, logs, make)
-    for kind, of in known.assumed:
-        yield make(kind, of, sets=_set(known, kind, [t for t in known.layout.thrusters if t.name == of]))
+    if logs:
+        yield from _of_structure(known, make)
     for name in row_noises:
         yield make("row noise", name)
 
@@ -472,8 +487,8 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
                 for end in (("", REVERSE) if is_told_astern else ("",))
             ]
             bends = name in known.bent
-            yield from shapes if bends else map(_held, shapes)
-            yield from map(_held, linear) if bends else linear
+            yield from shapes if bends else map(_fixed, shapes)
+            yield from map(_fixed, linear) if bends else linear
         if has_reverse:
             # Forces that were measured astern are data, and not an effect that may be absent.
             null = {"null": None} if is_told_astern else {}
@@ -510,9 +525,19 @@ def _least_linear(curve: Curve, c: Mapping[str, float], end: str) -> float:
     return -b / (a + b)
 
 
-def _held(p: Parameter) -> Parameter:
-    """Return a parameter that stays 0. All models of the curves have the same parameters."""
-    return replace(p, deviation=1e-3, low=0.0, high=0.0)
+def _fixed(p: Parameter, z: float = 0.0) -> Parameter:
+    """Return a parameter that stays where it is. All models have the same parameters."""
+    return replace(p, mean=z, low=z, high=z)
+
+
+def _of_structure(known: Prior, make: Make) -> Iterator[Parameter]:
+    """Yield what hypotheses about the structure may free. It stays at what is known, or where it changes nothing."""
+    for kind in (kind for kind, one in KINDS.items() if one.is_of_structure):
+        for part in known.layout.thrusters if KINDS[kind].is_coefficient else (None,):
+            row = make(kind, part.name if part else "", sets=_set(known, kind, [part] if part else []))
+            absent = known.coefficients[row.sets[0]] if row.sets else row.null
+            if absent is not None and (row.sets or not part):
+                yield row if (kind, row.of) in known.freed else _fixed(row, absent)
 
 
 def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
@@ -561,8 +586,9 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
     for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield make("slow force", axis.name)
-            if any(one.is_momentary and axis.name in one.layout.by_name for one in logs):
-                yield make("short force", axis.name)
+            if own := [one.is_momentary for one in logs if one.lost and axis.name in one.layout.by_name]:
+                short = make("short force", axis.name)
+                yield short if any(own) else _fixed(short, short.mean)
     if logs and not known.layout.fins:
         yield make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):

@@ -48,7 +48,7 @@ class Posterior:
         The common scale of all forces, of which the motion tells nothing, is a coordinate of its own in place of one of
         its parameters. What the priors tell of it would be lost in rounding beside what exact data tell of each.
         """
-        free = [n for n in range(len(z)) if n not in absent]
+        free = [n for n, p in enumerate(table.parameters) if n not in absent and not p.is_fixed]
         forces = table.scale_of_forces(z)[free]
         basis = np.eye(len(free))
         if forces.any():
@@ -88,7 +88,7 @@ class Posterior:
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
-        free = np.ix_(*[[n for n in range(len(parameters)) if n not in self.absent]] * 2)
+        free = np.ix_(*[np.flatnonzero(np.diag(self.covariance) > 0.0)] * 2)
         data = np.zeros_like(prior)
         data[free] = np.linalg.inv(self.covariance[free]) - prior[free]
         return self.of(self.table, self.z, 2.0 * (prior + data / np.outer(factors, factors)), self.absent)
@@ -136,8 +136,9 @@ class Posterior:
 
     @cached_property
     def of_vehicle(self) -> tuple[int, ...]:
-        """The indices of the parameters of the vehicle itself: neither of one log nor of noise."""
-        return tuple(n for n, p in enumerate(self.table.parameters) if p.of_motion and p.log is None)
+        """The indices of the free parameters of the vehicle itself: neither of one log nor of noise."""
+        parameters = enumerate(self.table.parameters)
+        return tuple(n for n, p in parameters if p.of_motion and p.log is None and not p.is_fixed)
 
     def numbers(self, values: Callable[[Array], Array]) -> tuple[Array, Array, Array]:
         """Return some numbers of the vehicle, their covariance, and their covariance by the prior.

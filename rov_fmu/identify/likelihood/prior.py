@@ -37,7 +37,8 @@ class Prior:
     guessed from the thrust."""
     has_times: bool = False
     """True if there are tables of time constants, which contain the lag."""
-    assumed: tuple[tuple[str, str], ...] = ()
-    """The kinds of the parameters of hypotheses about the structure, and what has each of them."""
+    freed: frozenset[tuple[str, str]] = frozenset()
+    """The rows of hypotheses about the structure that a fit may change, by their kind and what has them. The others
+    stay where they change nothing."""
     bent: frozenset[str] = frozenset()
     """The curves whose shape deviates. The others are quadratic, and the fit determines their linear share."""

@@ -9,9 +9,9 @@ factor (Laplace approximation), with the prior probability, decides. What wins i
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property, reduce
+from functools import cache, cached_property, reduce
 from itertools import islice
-from math import hypot, inf, log, nan, sqrt
+from math import hypot, inf, isnan, log, nan, sqrt
 
 import numpy as np
 
@@ -21,19 +21,22 @@ from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.hypotheses import (
     CONTRAST,
     HYPOTHESES,
-    Model,
-    Variant,
+    Of,
+    Start,
+    Starts,
+    Suspect,
+    applied,
     commands_of,
     contrasts,
-    in_order,
+    row_of,
     thrusters_alike,
 )
 from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
-from rov_fmu.identify.likelihood.objective import OUTLYING, Data, Objective, cost, with_samples
+from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, least_from, minimise, scaled, start_of, total
 from rov_fmu.identify.result import ALARM, USUAL, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -71,12 +74,6 @@ _IDLE = 0.5
 """Commands may not act where the unknown force makes up for their thrust but for this share of its square."""
 _LONGEST_IDLE = 0.5
 """Commands do not act during at most this share of a log, at its beginning or at its end."""
-
-Search = Callable[[Objective, Mapping[int, float]], Minimum]
-"""A function that minimises J of thinned logs from a start in which some parameters, by their indices, have numbers."""
-Key = tuple[str, str, str]
-Starts = Mapping[Variant, float | None]
-"""Hypotheses that hold together, with the coordinates from which their parameters begin; None if one has none."""
 
 
 # ---- The alarm -------------------------------------------------------------------------------------------------------
@@ -211,23 +208,21 @@ def with_shared(layout: Layout, errors: Mapping[Axis, Misfit]) -> dict[Axis, Mis
 # ---- Before any fit --------------------------------------------------------------------------------------------------
 
 
-def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> Variant:
-    """Return a hypothesis with the times between which the commands of its files act, if it has times.
+def times_of(objective: Objective, best: Array, files: Of) -> dict[str, tuple[float, float]]:
+    """Return the times between which the commands of those files act in which they do not always act, s.
 
     The filter follows an unknown force r with a slow process of the largest size. Before and after, r makes up for the
     thrust T. The sum of r² - (r + T)² - T²/2 from the beginning of a log, and that from its end, are largest where the
     commands begin and cease to act. A position tells r late. So only axes with measured velocities count where there
     are some.
     """
-    if not HYPOTHESES[variant.kind].has_times:
-        return variant
     table, z, found = objective.table, best.copy(), {}
     for n, p in enumerate(table.parameters):
-        if (kind := p.of_kind).is_size:
+        if (kind := p.of_kind).is_size and not p.is_fixed:
             z[n] = p.high if kind.slow and kind.slow.acts_as == "force" else p.low
     coefficients = table.coefficients(best)
-    for n, sampled in enumerate(model.logs):
-        if sampled.log.file not in variant.of:
+    for n, sampled in enumerate(objective.logs):
+        if sampled.log.file not in files:
             continue
         scale = np.array([float(table.force_unit(z, form.axis)) for form in sampled.layout.axes])
         prompt = {m.sensor.axis for m in sampled.measured if m.sensor.is_velocity} or {*sampled.layout.bare_axes}
@@ -249,193 +244,159 @@ def timed(model: Model, objective: Objective, best: Array, variant: Variant) -> 
         if begins or ends:
             begin, end = time[at][begins] if begins else -inf, time[at][-1 - ends] if ends else inf
             found[sampled.log.file] = float(begin), float(end)
-    return replace(variant, of=tuple(found), acting=tuple(found.values()))
+    return found
 
 
-class Comparison:
-    """J of thinned logs with each set of hypotheses, before it is fitted, at one point.
-
-    The vehicle adapts to a set by one linear step of the scales of thrust, drag and inertia.
-    """
-
-    def __init__(self, model: Model, held: Starts, point: Mapping[Key, float]) -> None:
-        """`model` is without hypotheses. At the point, some are held, and parameters that it lacks have their means."""
-        self.model, self.point = model, point
-        self.objective = model.applied(*held).objective(thinned=True)
-        self.z, self.data = self._start(self.objective, held), list[Data]()
-        self.free = np.flatnonzero([p.of_kind.adapts for p in self.objective.table.parameters])
-        with suppress(DivergedError):
-            self.data = self.objective.data(self.z, self.objective.runs(self.z), exact=False)
-        self.values = dict[frozenset[tuple[Variant, float | None]], float]()
-
-    def value(self, starts: Starts) -> float:
-        """Return J with some hypotheses; inf where a motion diverges."""
-        key = frozenset(starts.items())
-        if key not in self.values:
-            self.values[key] = inf
-            with suppress(DivergedError):
-                self.values[key] = self._value(starts)
-        return self.values[key]
-
-    def _value(self, starts: Starts) -> float:
-        objective = self.model.applied(*starts).objective(thinned=True)
-        z = self._start(objective, starts)
-        runs = objective.runs(z)
-        if not self.data:
-            return objective.value(z, runs)
-        data = with_samples(self.data, objective.samples(z, runs))
-        gradient, information = total(self.objective, self.z, data)
-        free, end = self.free, self.z.copy()
-        most = _FARTHEST * self.objective.deviation[free]
-        end[free] += np.clip(-np.linalg.solve(information[np.ix_(free, free)], gradient[free]), -most, most)
-        end = np.clip(end, self.objective.low, self.objective.high)
-        change = end - self.z
-        costs = [cost(one.innovations + one.slopes @ change[[*one.indices]], one.variances) for one in data]
-        return self.objective.prior(end) + sum(costs)
-
-    def _start(self, objective: Objective, starts: Starts) -> Array:
-        """Return the point with the coordinates from which the parameters of some hypotheses begin."""
-        z = coordinates(self.point, objective.table)
-        for index, start in numbers_of(objective.table, starts).items():
-            z[index] = start
-        return z
-
-
-def rough(table: Table) -> dict[Key, float]:
+def rough(table: Table) -> Array:
     """Return a point near the means of the priors, with noise that is large enough for a rough vehicle.
 
     A fit without the right hypothesis bends the vehicle until wrong ones look right.
     """
-    point = {p.key: p.mean + _LOUD * p.deviation for p in table.parameters if p.kind == WHITE}
-    forces = (p for p in table.parameters if (slow := p.of_kind.slow) and slow.acts_as == "force")
-    return point | {p.key: log(_FORCE) for p in forces}
+    z = table.each("mean")
+    for n, p in enumerate(table.parameters):
+        if p.kind == WHITE:
+            z[n] += _LOUD * p.deviation
+        elif (slow := p.of_kind.slow) and slow.acts_as == "force":
+            z[n] = log(_FORCE)
+    return z
 
 
-def point_of(table: Table, z: Array) -> dict[Key, float]:
-    """Return the coordinates of all parameters by their keys."""
-    return dict(zip((p.key for p in table.parameters), z.tolist(), strict=True))
+def begun(objective: Objective, z: Array, starts: Starts) -> Array:
+    """Return a point where the rows of some hypotheses begin, and those of all others are where they are fixed."""
+    found = z.copy()
+    for suspect, start in starts.items():
+        if (n := row_of(objective, suspect)) is not None:
+            found[n] = start
+    return np.clip(found, objective.low, objective.high)
 
 
-def coordinates(point: Mapping[Key, float], table: Table) -> Array:
-    """Return the coordinates of a point. Parameters that it lacks have their means."""
-    return np.array([point.get(p.key, p.mean) for p in table.parameters])
+def comparison(plain: Objective, held: Starts, point: Array) -> Callable[[Starts], float]:
+    """Return the function that gives J of thinned logs with a set of hypotheses, before it is fitted, near a point.
 
+    The vehicle adapts to a set by one linear step of the scales of thrust, drag and inertia. The derivatives are those
+    with the hypotheses that are held. J is infinite where a motion diverges.
+    """
+    objective = applied(plain, held, thinned=True)
+    z, free = begun(objective, point, held), np.flatnonzero(objective.table.each("of_kind.adapts"))
+    most = _FARTHEST * objective.deviation[free]
+    try:
+        slopes = objective.data(z, objective.runs(z), exact=False)
+    except DivergedError:
+        slopes = []
 
-def numbers_of(table: Table, starts: Starts) -> dict[int, float]:
-    """Return the indices of the parameters of some hypotheses, with the coordinates from which they begin."""
-    return {
-        index: start
-        for variant, start in starts.items()
-        if start is not None and (index := table.index(*variant.parameter)) is not None
-    }
+    @cache
+    def value(some: frozenset[tuple[Suspect, Start]]) -> float:
+        changed = applied(plain, dict(some), thinned=True)
+        start = begun(changed, z, dict(some))
+        try:
+            runs = changed.runs(start)
+            if not slopes:
+                return changed.value(start, runs)
+            data = with_samples(slopes, changed.samples(start, runs))
+            gradient, information = total(objective, z, data)
+        except DivergedError:
+            return inf
+        end = z.copy()
+        end[free] += np.clip(-np.linalg.solve(information[np.ix_(free, free)], gradient[free]), -most, most)
+        change = (end := np.clip(end, objective.low, objective.high)) - z
+        costs = [cost(one.innovations + one.slopes @ change[[*one.indices]], one.variances) for one in data]
+        return objective.prior(end) + sum(costs)
+
+    return lambda starts: value(frozenset(starts.items()))
 
 
 # ---- The search ------------------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True)
-class Adopted:
-    """A hypothesis that won."""
-
-    variant: Variant
-    odds: float
-    """2 ln of its posterior odds against the best model without it."""
-
-
 @dataclass(frozen=True, eq=False)
-class Trial:
+class StructureFit:
     """The fit with some hypotheses."""
 
     starts: Starts
-    """The hypotheses, with the coordinates at which their parameters end."""
-    model: Model
+    """The hypotheses, with the coordinates at which their rows end."""
     objective: Objective
     minimum: Minimum
     score: float
     """2 ln of the posterior probability, but for a constant."""
     quick: float
     """2 ln of the evidence of thinned logs."""
-    absent: frozenset[Variant] = frozenset()
-    """The hypotheses for which its parameters are no evidence: they end near where these are absent."""
 
     @cached_property
     def misfits(self) -> dict[Axis, Misfit]:
         """The errors of predictions over 10 s along each axis."""
         return structure(self.objective, self.minimum)
 
+    @cached_property
+    def predicted(self) -> float:
+        """The largest error of predictions over 10 s of all axes, also where commands change between rows."""
+        return worst(structure(self.objective, self.minimum, ahead=True))
 
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """The fit with the hypotheses that won."""
+    @cached_property
+    def posterior(self) -> Posterior:
+        """With all effects."""
+        return Posterior.of(self.objective.table, self.minimum.z, self.minimum.information)
 
-    trial: Trial
-    adopted: tuple[Adopted, ...]
-    rivals: tuple[Posterior, ...]
-    """The fits with hypotheses that did not win, and whose odds are near even."""
-    nearest: Starts
-    """The hypotheses that are more probable than others, but do not explain the errors over 10 s."""
-    alike: tuple[tuple[str, ...], ...]
-    """Thrusters along one axis whose forces the data do not tell apart."""
+    @property
+    def needed(self) -> Starts:
+        """The hypotheses but those for whose rows there is no evidence: they end near where these are absent."""
+        rows = {suspect: row_of(self.objective, suspect) for suspect in self.starts}
+        return {one: self.starts[one] for one, n in rows.items() if n is None or self.posterior.evidence(n) > WINS}
 
 
-def fitted(model: Model, starts: Starts, prior: float, search: Search, enough: float = -inf) -> Trial | None:
+def _fit_of(starts: Starts, objective: Objective, end: Minimum, prior: float, quick: float) -> StructureFit:
+    """Return the fit with some hypotheses, whose rows are where it ends."""
+    rows = {suspect: row_of(objective, suspect) for suspect in starts}
+    ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
+    return StructureFit(ends, objective, end, evidence_at(objective, end) + prior, quick)
+
+
+def fitted(plain: Objective, starts: Starts, prior: float, enough: float = -inf) -> StructureFit | None:
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
-    `prior` is 2 ln of their prior probability, and `search` fits thinned logs. The result is None if a motion diverges,
-    or if the evidence of thinned logs is below `enough`.
+    `prior` is 2 ln of their prior probability. The result is None if a motion diverges, or if the evidence of thinned
+    logs is below `enough`.
     """
-    model = model.applied(*starts)
-    thinned, objective = model.objective(thinned=True), model.objective()
+    thinned, objective = applied(plain, starts, thinned=True), applied(plain, starts)
     with suppress(DivergedError):
-        end = search(thinned, numbers_of(thinned.table, starts))
+        end = least_from(thinned, begun(thinned, start_of(thinned), starts))
         quick = evidence_at(thinned, end)
         if quick > enough:
-            full = minimise(objective, scaled(objective, end.z), last=False)
-            return _trial(starts, model, objective, full, prior, quick)
+            return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
     return None
 
 
-def refitted(model: Model, starts: Starts, prior: float, near: Trial) -> Trial | None:
+def refitted(plain: Objective, starts: Starts, prior: float, near: StructureFit) -> StructureFit | None:
     """Return the minimum of J with some hypotheses, from the end of another fit; None if a motion diverges."""
-    model = model.applied(*starts)
-    objective = model.objective()
+    objective = applied(plain, starts)
     with suppress(DivergedError):
-        start = coordinates(point_of(near.objective.table, near.minimum.z), objective.table)
-        return _trial(starts, model, objective, minimise(objective, start, last=False), prior, near.quick)
+        end = minimise(objective, begun(objective, near.minimum.z, {}), last=False)
+        return _fit_of(starts, objective, end, prior, near.quick)
     return None
 
 
-def _trial(starts: Starts, model: Model, objective: Objective, full: Minimum, prior: float, quick: float) -> Trial:
-    """Return the fit with some hypotheses, whose parameters are where it ends."""
-    indices = {one: objective.table.index(*one.parameter) for one in starts}
-    ends = {one: None if index is None else float(full.z[index]) for one, index in indices.items()}
-    posterior = Posterior.of(objective.table, full.z, full.information)
-    absent = (one for one, index in indices.items() if index is not None and posterior.evidence(index) <= WINS)
-    return Trial(ends, model, objective, full, evidence_at(objective, full) + prior, quick, frozenset(absent))
-
-
-def settled(plain: Trial, search: Search) -> tuple[Trial, tuple[Adopted, ...]]:
-    """Return the fit without the samples that would mislead the search, and the hypotheses that leave these out.
+def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
+    """Return the fit without the samples that would mislead the search, and the odds of the hypotheses that leave these
+    out.
 
     Only J of the other samples is compared.
     """
-    adopted = list[Adopted]()
-    if worst(structure(plain.objective, plain.minimum, ahead=True)) > ALARM:
+    odds = dict[Suspect, float]()
+    if plain.predicted > ALARM:
         for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
-            variants = [Variant(kind, of) for of in HYPOTHESES[kind].variants(plain.model.known, plain.model.logs)]
-            for variant in variants:
-                prior = 2.0 * log(HYPOTHESES[kind].probability / len(variants))
-                trial = fitted(plain.model, {variant: None}, prior, search)
-                if trial and (odds := trial.score - plain.score - _left_out(plain, trial.objective)) > WINS:
-                    adopted.append(Adopted(variant, odds))
-                    plain = replace(trial, starts={}, score=trial.score - prior)
-    return plain, tuple(adopted)
+            every = [*HYPOTHESES[kind].suspects(plain.objective.table.known, plain.objective.logs)]
+            for of in every:
+                prior = 2.0 * log(HYPOTHESES[kind].probability / len(every))
+                fit = fitted(plain.objective, {(kind, of): None}, prior)
+                if fit and (gain := fit.score - plain.score - _left_out(plain, fit.objective)) > WINS:
+                    odds[kind, of] = gain
+                    plain = replace(fit, starts={}, score=fit.score - prior)
+    return plain, odds
 
 
-def _left_out(trial: Trial, objective: Objective) -> float:
+def _left_out(fit: StructureFit, objective: Objective) -> float:
     """Return the part of J of the samples that another objective leaves out."""
     gone = 0.0
-    for old, new, data in zip(trial.objective.records, objective.records, trial.minimum.data, strict=False):
+    for old, new, data in zip(fit.objective.records, objective.records, fit.minimum.data, strict=False):
         if len(new.time) < len(old.time):
             left_out = ~np.isin(old.time + 1j * old.sensor, new.time + 1j * new.sensor)
             gone += cost(data.innovations[left_out], data.variances[left_out])
@@ -449,118 +410,113 @@ class StructureSearch:
     as the others are unknown may be wrong.
     """
 
-    def __init__(self, plain: Trial, search: Search) -> None:
-        """`plain` is the fit without hypotheses; `search` fits thinned logs from a start with much noise."""
-        self.model, self.search = plain.model, search
-        self.now = self.plain = plain
-        self.tried: dict[frozenset[Variant], Trial | None] = {frozenset(): plain}
-        self.lost = dict[Variant | None, float]()
+    def __init__(self, plain: StructureFit, on_fit: Callable[[], None] = lambda: None) -> None:
+        """`plain` is the fit without hypotheses; `on_fit` is called before each other fit."""
+        self.plain, self.on_fit = plain, on_fit
+        self.now = plain
+        """The fit with the hypotheses that won."""
+        self.tried: dict[frozenset[Suspect], StructureFit | None] = {frozenset(): plain}
+        self.lost = dict[Suspect | None, float]()
         """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
+        self.rivals = list[StructureFit]()
+        """The fits with hypotheses that did not win, and whose odds are near even."""
+        self.nearest = dict[Suspect, Start]()
+        """The hypotheses that are more probable than others, but do not explain the errors over 10 s."""
 
-    def explained(self) -> Explained:
-        """Try the hypotheses where the alarm asks for it, and return the fit with those that win."""
-        rivals = list[Trial]()
+    def run(self) -> None:
+        """Try the hypotheses where the alarm asks for it."""
         for _ in range(_ROUNDS):
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
             if self._gain(best) <= 0.0:
-                rivals = [one for one in fits if one.score > self.now.score - CLOSE]
+                self.rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
-            self.now = self._without_absent(best)
-        now, nearest = self._explaining()
-        trials = [one for one in self.tried.values() if one]
-        adopted = (
-            Adopted(variant, now.score - max(one.score for one in trials if variant not in one.starts))
-            for variant in in_order(now.starts)
-        )
-        posteriors = (Posterior.of(one.objective.table, one.minimum.z, one.minimum.information) for one in rivals)
-        return Explained(now, tuple(adopted), tuple(posteriors), nearest, tuple(self._alike()))
+            self.now = self._with_needed(best)
+        # Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
+        # else. A lag hardly shows in the errors over 10 s, and J sees it.
+        while doubtful := {one: z for one, z in self.now.starts.items() if not self._explains(one)}:
+            self.nearest |= doubtful
+            self.now = self._best_of(self.now.starts.keys() - doubtful.keys())
 
-    def _alike(self) -> Iterator[tuple[str, ...]]:
-        """Yield the groups of commanded thrusters along one axis that the data do not tell apart."""
-        known, logs = self.model.known, self.model.logs
+    @property
+    def odds(self) -> dict[Suspect, float]:
+        """2 ln of the posterior odds of each hypothesis that won, against the best model without it."""
+        fits = [one for one in self.tried.values() if one]
+        return {
+            one: self.now.score - max(fit.score for fit in fits if one not in fit.starts) for one in self.now.starts
+        }
+
+    @property
+    def alike(self) -> tuple[Of, ...]:
+        """The groups of commanded thrusters along one axis that the data do not tell apart."""
+        layout, logs = self.plain.objective.table.layout, self.plain.objective.logs
         unknown = {name for name, error in self.contrasts.items() if error >= CONTRAST}
-        same = thrusters_alike(known.layout, [*map(commands_of, logs)])
+        same = thrusters_alike(layout, [*map(commands_of, logs)])
         names = {name for group in same if unknown.intersection(group) for name in group}
-        along = [known.layout.thrusters_along(axis) for axis in known.layout.bare_axes]
+        along = [layout.thrusters_along(axis) for axis in layout.bare_axes]
         groups = (tuple(t.name for t in some if t.name in names) for some in along)
-        yield from dict.fromkeys(group for group in groups if len(group) > 1)
+        return tuple(dict.fromkeys(group for group in groups if len(group) > 1))
 
-    def _explaining(self) -> tuple[Trial, Starts]:
-        """Return the fit with those hypotheses that explain the errors over 10 s, and the others that had won.
-
-        Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
-        else. A lag hardly shows in these errors, and J sees it.
-        """
-        now, nearest = self.now, dict[Variant, float | None]()
-        while doubtful := {v: z for v, z in now.starts.items() if not self._explains(now, v)}:
-            nearest |= doubtful
-            now = self._best_of(now.starts.keys() - doubtful.keys())
-        return now, nearest
-
-    def _best_of(self, variants: Collection[Variant]) -> Trial:
+    def _best_of(self, some: Collection[Suspect]) -> StructureFit:
         """Return the most probable fit with only some of these hypotheses."""
-        some = (one for one in self.tried.values() if one and one.starts.keys() <= {*variants})
-        return max(some, key=lambda one: one.score)
+        fits = (one for one in self.tried.values() if one and one.starts.keys() <= {*some})
+        return max(fits, key=lambda one: one.score)
 
-    def _explains(self, now: Trial, variant: Variant) -> bool:
+    def _explains(self, suspect: Suspect) -> bool:
         """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger."""
-        if not HYPOTHESES[variant.kind].changes_thrust or HYPOTHESES[variant.kind].has_times:
+        (kind, of), layout = suspect, self.now.objective.table.layout
+        if not HYPOTHESES[kind].changes_thrust or HYPOTHESES[kind].has_times:
             return True
-        layout = now.model.known.layout
-        without = self._best_of(now.starts.keys() - {variant})
-        before, after = without.misfits, now.misfits
-        ill = [t for t in layout.thrusters if t.name in variant.of or not variant.of]
+        without = self._best_of(self.now.starts.keys() - {suspect})
+        before, after = without.misfits, self.now.misfits
+        ill = [t for t in layout.thrusters if t.name in of or not of]
         on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
         others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
         worst_of = max(on, key=lambda axis: before[axis].ratio, default=None)
         if worst_of is None:  # nothing tells these errors
             return others
-        if before[worst_of].ratio <= min(USUAL, HYPOTHESES[variant.kind].alarm):
+        if before[worst_of].ratio <= min(USUAL, HYPOTHESES[kind].alarm):
             return False
         left = (after[worst_of].ratio ** 2 - 1.0) / (before[worst_of].ratio ** 2 - 1.0)
         return others and left <= _LEFT and all(after[axis].ratio <= ALARM for axis in on)
 
-    def _gain(self, other: Trial) -> float:
+    def _gain(self, other: StructureFit) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""
         return other.score - self.now.score - (-WINS if len(other.starts) < len(self.now.starts) else WINS)
 
-    def _without_absent(self, trial: Trial) -> Trial:
+    def _with_needed(self, fit: StructureFit) -> StructureFit:
         """Return a fit without the hypotheses for which it has no evidence, from there, unless it is clearly worse.
 
         Such a fit is better than the last one because it ended in another minimum, which needs no hypothesis.
         """
-        rest = {one: start for one, start in trial.starts.items() if one not in trial.absent}
-        if len(rest) == len(trial.starts):
-            return trial
-        other, before = refitted(self.model, rest, self._prior(rest), trial), self.tried.get(frozenset(rest))
+        rest = fit.needed
+        if len(rest) == len(fit.starts):
+            return fit
+        key = frozenset(rest)
+        other, before = refitted(self.plain.objective, rest, self._prior(rest), fit), self.tried.get(key)
         if not other or (before and before.score >= other.score):
-            return trial
-        self.tried[frozenset(rest)] = other
-        return other if other.score > trial.score - WINS else trial
+            return fit
+        self.tried[key] = other
+        return other if other.score > fit.score - WINS else fit
 
     @cached_property
-    def variants(self) -> list[Variant]:
-        """All hypotheses."""
-        known, logs, plain = self.model.known, self.model.logs, self.plain
-        kinds = ((kind, one) for kind, one in HYPOTHESES.items() if not one.is_first)
-        every = (Variant(kind, of) for kind, one in kinds for of in one.variants(known, logs))
-        some = (timed(self.model, plain.objective, plain.minimum.z, one) for one in every)
-        return [
-            variant
-            for variant in some
-            if (variant.of or not HYPOTHESES[variant.kind].has_times)
-            and (
-                not HYPOTHESES[variant.kind].is_contrast
-                or all(self.contrasts.get(n, inf) < CONTRAST for n in variant.of)
-            )
-        ]
+    def suspects(self) -> dict[Suspect, Sequence[Start]]:
+        """All hypotheses, with where each may begin."""
+        objective, found = self.plain.objective, dict[Suspect, Sequence[Start]]()
+        for kind, one in HYPOTHESES.items():
+            for of in () if one.is_first else one.suspects(objective.table.known, objective.logs):
+                if one.has_times:
+                    if times := times_of(objective, self.plain.minimum.z, of):
+                        found[kind, tuple(times)] = (tuple(times.values()),)
+                elif not one.is_contrast or all(self.contrasts.get(name, inf) < CONTRAST for name in of):
+                    found[kind, of] = one.starts or (None,)
+        return found
 
     @cached_property
     def contrasts(self) -> dict[str, float]:
         """The standard error of the health of each thruster by the data alone; empty if a motion diverges."""
         with suppress(DivergedError):
-            return contrasts(self.model, point_of(self.plain.objective.table, self.plain.minimum.z))
+            return contrasts(self.plain.objective, self.plain.minimum.z)
         return {}
 
     @property
@@ -570,34 +526,35 @@ class StructureSearch:
         return [starts, *({other: start for other, start in starts.items() if other is not one} for one in starts)]
 
     @cached_property
-    def rough(self) -> Comparison:
+    def _rough(self) -> Callable[[Starts], float]:
         """J near the means of the priors."""
-        return Comparison(self.model, {}, rough(self.plain.objective.table))
+        return comparison(self.plain.objective, {}, rough(self.plain.objective.table))
 
-    def _prior(self, variants: Iterable[Variant]) -> float:
+    def _prior(self, some: Iterable[Suspect]) -> float:
         """Return 2 ln of the prior probability of some hypotheses."""
-        kinds = [one.kind for one in self.variants]
-        return sum(2.0 * log(HYPOTHESES[one.kind].probability / kinds.count(one.kind)) for one in variants)
+        kinds = [kind for kind, _ in self.suspects]
+        return sum(2.0 * log(HYPOTHESES[kind].probability / kinds.count(kind)) for kind, _ in some)
 
-    def _round(self) -> list[Trial]:
+    def _round(self) -> list[StructureFit]:
         """Return fits with other sets of hypotheses, where the alarm asks for them.
 
         If one set has won by far, sets whose J falls much less before any fit wait for the next round.
         """
-        fits, won = list[Trial](), -inf
+        fits, won = list[StructureFit](), -inf
         for starts, gain in [*self._promising()]:
             if gain < won - _FAR:
                 continue
             enough = max(one.quick for one in (self.now, *fits)) - WINS
-            trial = fitted(self.model, starts, self._prior(starts), self.search, enough)
-            # Without a trial, the evidence of thinned logs is not enough.
-            is_worse = trial.score < self.now.score if trial else enough < self.now.quick
+            self.on_fit()
+            fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
+            # Without a fit, the evidence of thinned logs is not enough.
+            is_worse = fit.score < self.now.score if fit else enough < self.now.quick
             if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():
                 self.lost[self._new(starts)] = gain
-            self.tried[frozenset(starts)] = trial
-            if trial:
-                fits.append(trial)
-                if trial.score > self.now.score + _FAR:
+            self.tried[frozenset(starts)] = fit
+            if fit:
+                fits.append(fit)
+                if fit.score > self.now.score + _FAR:
                     won = max(won, gain)
         return fits
 
@@ -607,19 +564,20 @@ class StructureSearch:
         The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
         """
         now = self.now
-        predicted = filtered = worst(structure(now.objective, now.minimum, ahead=True))
-        if any(one.lost and not one.is_momentary for one in now.model.logs):
+        predicted = filtered = now.predicted
+        if any(one.lost and not one.is_momentary for one in now.objective.logs):
             filtered = worst(now.misfits)
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
-        for variant in self.variants if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
-            hypothesis = HYPOTHESES[variant.kind]
+        for suspect in self.suspects if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
+            (kind, of), hypothesis = suspect, HYPOTHESES[suspect[0]]
             if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
             for some in self._smaller:
-                if len(some) < _MOST and not any(variant.excludes(other) for other in some):
-                    sets = [{**some, variant: start} for start in hypothesis.starts or (None,)]
+                excludes = any(kind == other and (not of or {*of} & {*own}) for other, own in some)
+                if len(some) < _MOST and not excludes:
+                    sets = [{**some, suspect: start} for start in self.suspects[suspect]]
                     (shown if hypothesis.changes_thrust else others).extend(sets)
         shown = [some for some in shown if frozenset(some) not in self.tried]
         if shown:
@@ -633,12 +591,14 @@ class StructureSearch:
         falls by more than it did before that fit.
         """
         now = self.now
-        at_fit = Comparison(self.model, now.starts, point_of(now.objective.table, now.minimum.z))
-        found = ([_fall(at, now.starts, some) for at in (self.rough, at_fit)] for some in sets)
+        points = self._rough, comparison(self.plain.objective, now.starts, now.minimum.z)
+        before = [J(now.starts) for J in points]
+        every = ([one - J(some) for J, one in zip(points, before, strict=True)] for some in sets)
+        found = ([-inf if isnan(fall) else fall for fall in some] for some in every)
         falls = {n: some for n, some in enumerate(found) if max(some) > self.lost.get(self._new(sets[n]), -inf)}
-        chosen = dict[frozenset[Variant], int]()
+        chosen = dict[frozenset[Suspect], int]()
         for point in (0, 1):
-            best = dict[frozenset[Variant], int]()
+            best = dict[frozenset[Suspect], int]()
             for n in sorted(falls, key=lambda one: falls[one][point], reverse=True):
                 if falls[n][point] > 0.0:
                     best.setdefault(frozenset(sets[n]), n)
@@ -647,12 +607,6 @@ class StructureSearch:
         order = sorted(((max(falls[n]), n) for n in chosen.values()), reverse=True)
         yield from ((sets[n], fall) for fall, n in order)
 
-    def _new(self, starts: Starts) -> Variant | None:
+    def _new(self, starts: Starts) -> Suspect | None:
         """Return the hypothesis of a set that is not among those that won; None if there is none."""
         return next(iter(starts.keys() - self.now.starts.keys()), None)
-
-
-def _fall(at: Comparison, before: Starts, after: Starts) -> float:
-    """Return by how much J falls from some hypotheses to others; -inf where a motion diverges."""
-    value = at.value(after)
-    return at.value(before) - value if value < inf else -inf

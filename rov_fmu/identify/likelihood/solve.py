@@ -97,6 +97,24 @@ def minimise(
     return now
 
 
+def start_of(objective: Objective, number: int = 0) -> Array:
+    """Return the coordinates at which a start begins."""
+    return np.asarray(objective.mean + objective.deviation * objective.table.each("of_kind.starts")[:, number])
+
+
+def least_from(objective: Objective, start: Array, on_step: Callable[[int], None] = lambda _: None) -> Minimum:
+    """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
+
+    In the valley between both, J has a kink wherever the dead band passes a command of the tests.
+    """
+    end = minimise(objective, start, on_step=on_step, enough=QUICK, last=False)
+    larger = objective.table.with_larger_dead_bands(end.z)
+    if np.array_equal(larger, end.z):
+        return end
+    other = minimise(objective, larger, lambda step: on_step(step + MOST_STEPS), enough=QUICK, last=False)
+    return min(end, other, key=lambda found: found.value)
+
+
 def _descended(objective: Objective, start: Minimum) -> Minimum:
     """Return a point with a smaller J, after a few steps with the same derivatives, or the same point.
 
@@ -240,7 +258,7 @@ def _size_curvature(data: float, prior: float, prior_slope: float) -> float:
 
 def _step(objective: Objective, z: Array, gradient: Array, information: Array, free: Chosen, damping: float) -> Array:
     """Return the end of a damped step. What would leave its bounds stays at them, and the others move on without it."""
-    weight, moving = 2.0 / objective.deviation**2, free.copy()
+    weight, moving = 2.0 / objective.deviation**2, free & objective.free
     is_size = objective.table.each("of_kind.is_size")
     change = np.clip(z, objective.low, objective.high) - z  # an effect that becomes absent is beyond
     moving &= ~((z <= objective.low) & (gradient > 0.0)) & ~((z >= objective.high) & (gradient < 0.0)) & (change == 0.0)
@@ -259,9 +277,13 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
 
 
 def evidence(objective: Objective, value: float, information: Array) -> float:
-    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation)."""
-    widths = np.diag(objective.deviation)
-    return -value - float(np.linalg.slogdet(widths @ information @ widths).logabsdet)
+    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation).
+
+    A parameter about which the data tell nothing does not change it.
+    """
+    free = objective.free
+    widths = np.diag(objective.deviation[free])
+    return -value - float(np.linalg.slogdet(0.5 * widths @ information[np.ix_(free, free)] @ widths).logabsdet)
 
 
 def evidence_at(objective: Objective, minimum: Minimum) -> float:

@@ -24,7 +24,7 @@ by such a factor. The scale of commands is checked where they are read.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import hypot, log, pi
+from math import hypot, inf, log, pi
 
 import numpy as np
 
@@ -32,18 +32,17 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, SWAY, YAW, Axis
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
-from rov_fmu.identify.likelihood.fit import start_of
-from rov_fmu.identify.likelihood.hypotheses import Model
+from rov_fmu.identify.likelihood.hypotheses import Starts, applied
 from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
-from rov_fmu.identify.likelihood.search import Adopted
-from rov_fmu.identify.likelihood.solve import minimise
+from rov_fmu.identify.likelihood.search import structure, worst
+from rov_fmu.identify.likelihood.solve import Minimum, minimise, start_of
 from rov_fmu.identify.result import Slip
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.log import Channel, Log
+from rov_fmu.tank.log import Channel
 
 _CERTAIN, _WEIGHED = 2.0, 0.05
 """An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
@@ -98,18 +97,14 @@ Scaling = frozenset[tuple[_Match, float]]
 
 
 def slips(
-    tests: Tests,
-    known: Prior,
-    objective: Objective,
-    best: Array,
-    errors: Array,
-    adopted: Sequence[Adopted] = (),
-) -> tuple[Slip, ...]:
-    """Return the mistakes that explain the logs much better. `best` is where J is least for the files as they stand.
+    tests: Tests, objective: Objective, best: Array, errors: Array, starts: Starts | None = None
+) -> tuple[tuple[Slip, ...], float]:
+    """Return the mistakes that explain the logs much better, and the errors R over 10 s that the best of them leaves.
 
-    `errors` are the standard errors there, and `adopted` has the hypotheses about the structure that won. Where several
-    explanations are about as good, each is told for its files.
+    `best` is where J is least for the files as they stand, `errors` are the standard errors there, and `starts` has the
+    hypotheses about the structure that won. Where several explanations are about as good, each is told for its files.
     """
+    known = objective.table.known
     compared = [one for n in range(len(objective.logs)) for one in _matches(objective, n, known.guessed)]
     inertias = {*_inertias(known, objective, best, errors)}
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
@@ -117,11 +112,18 @@ def slips(
     frames = {*_frames(compared)}
     untried = {*_scalings(suspected), *frames}
     if not untried:
-        return ()
+        return (), inf
+    fits = dict[Scaling, tuple[Objective, Minimum]]()
 
     def least(scaling: Scaling, start: Array | None = None) -> float:
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
-        return _least(tests, adopted, scaling, start) + unlikely
+        quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
+        try:
+            end = minimise(quick, start_of(quick) if start is None else start, last=False)
+        except DivergedError:
+            return inf
+        fits[scaling] = quick, end
+        return end.value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling) + unlikely
 
     as_it_is, J = least(frozenset(), best), dict[Scaling, float]()
     while untried:  # The best explanation may need fewer channels than it has.
@@ -136,10 +138,11 @@ def slips(
             if scaling in frames:
                 name, question = _frame_in_words(scaling)
             told.setdefault((match.file, name), {}).setdefault(question, as_it_is - J[scaling])
-    return tuple(
+    mistakes = (
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
     )
+    return tuple(mistakes), worst(structure(*fits[first])) if first in fits else inf
 
 
 def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:
@@ -222,23 +225,12 @@ def _frame_in_words(frame: Scaling) -> tuple[str, str]:
     return f"frame of {sources.pop()}" if len(sources) == 1 else "frame", question
 
 
-def _least(tests: Tests, adopted: Sequence[Adopted], scaling: Scaling, start: Array | None = None) -> float:
-    """Return the least J of thinned logs, as a density of the values in the files; inf if no simulation is finite."""
+def _corrected(tests: Tests, scaling: Scaling) -> Objective:
+    """Return J of the logs with the true values of some of their channels."""
     scales = {one.channel: scale for one, scale in scaling}
-    logs = [_corrected(one, scales) for one in tests.folder.logs]
-    known, recorded, rows = begin(replace(tests, folder=replace(tests.folder, logs=logs)))
-    model = Model(known, recorded, rows).applied(*(one.variant for one in adopted))
-    quick = model.objective(thinned=True)
-    try:
-        value = minimise(quick, start_of(quick) if start is None else start, last=False).value
-    except DivergedError:
-        return np.inf
-    return value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
-
-
-def _corrected(log: Log, scales: Mapping[Channel, float]) -> Log:
-    """Return a log with the true values of some of its channels."""
-    return replace(log, channels=tuple(replace(c, values=c.values / scales.get(c, 1.0)) for c in log.channels))
+    channels = ([replace(c, values=c.values / scales.get(c, 1.0)) for c in one.channels] for one in tests.folder.logs)
+    logs = [replace(log, channels=tuple(own)) for log, own in zip(tests.folder.logs, channels, strict=True)]
+    return Objective.of_known(*begin(replace(tests, folder=replace(tests.folder, logs=logs))))
 
 
 # ---- Comparison with the vehicle of the priors -----------------------------------------------------------------------

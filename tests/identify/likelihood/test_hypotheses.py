@@ -4,7 +4,7 @@ The logs are simulated by the vehicle of the FMU, whose thrusters are ill, or wh
 from the log to the thrusters. So what is named is what was done.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -17,12 +17,13 @@ import rov_fmu
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.likelihood.fit import _search, start_of
 from rov_fmu.identify.likelihood.hypotheses import (
     CONTRAST,
     HYPOTHESES,
-    Model,
-    Variant,
+    Start,
+    Starts,
+    Suspect,
+    applied,
     contrasts,
     in_order,
     probability,
@@ -33,21 +34,20 @@ from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
-    Comparison,
     Misfit,
-    Starts,
+    StructureFit,
     StructureSearch,
-    Trial,
+    comparison,
     fitted,
     rough,
     structure,
-    timed,
+    times_of,
     unseen_errors,
     windows,
     with_shared,
     worst,
 )
-from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
+from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, start_of
 from rov_fmu.identify.result import ALARM, USUAL
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank import log as tank_log
@@ -172,47 +172,54 @@ def folder(path: Path, vehicle: str, fault: Fault, seed: int = 0, dives: int = 1
 
 
 @pytest.fixture(scope="module")
-def model(tmp_path_factory: pytest.TempPathFactory) -> Model:
+def model(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     """A dive of the VideoRay."""
     tests = load_tests(folder(tmp_path_factory.mktemp("model"), "videoray", Fault("")))
-    return Model(*begin(tests))
+    return Objective.of_known(*begin(tests))
 
 
 @pytest.fixture(scope="module")
-def four_axes(tmp_path_factory: pytest.TempPathFactory) -> Model:
+def four_axes(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     """A dive of the BlueROV2, whose sway is measured, too."""
-    return Model(*begin(load_tests(folder(tmp_path_factory.mktemp("four_axes"), "bluerov2", Fault("")))))
+    return Objective.of_known(*begin(load_tests(folder(tmp_path_factory.mktemp("four_axes"), "bluerov2", Fault("")))))
 
 
 # ---- What each changes -----------------------------------------------------------------------------------------------
 
 
-def test_each_hypothesis_changes_what_acts(four_axes: Model) -> None:
-    """A variant changes the commands that the filter reads, or adds a parameter, and nothing else."""
-    (sampled,), plain = four_axes.logs, {p.key for p in four_axes.table.parameters}
+def test_each_hypothesis_changes_what_acts(four_axes: Objective) -> None:
+    """It changes the commands that the filter reads, or frees its row, and nothing else. All models have all rows."""
+    (sampled,), plain = four_axes.logs, four_axes.table.parameters
     for kind, hypothesis in HYPOTHESES.items():
-        for of in hypothesis.variants(four_axes.known, four_axes.logs):
-            acting = ((sampled.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else ()
-            changed = four_axes.applied(Variant(kind, of, acting))
+        for of in hypothesis.suspects(four_axes.table.known, four_axes.logs):
+            acting = ((sampled.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else None
+            changed = applied(four_axes, {(kind, of): acting})
+            rows = [*zip(changed.table.parameters, plain, strict=True)]
+            assert all(one.key == other.key for one, other in rows)
+            freed = {one.key for one, other in rows if one.is_fixed < other.is_fixed}
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
-                assert {p.key for p in changed.table.parameters} == plain
+                assert not freed
                 continue
-            added = {p.key for p in changed.table.parameters} - plain
             is_other = not np.array_equal(changed.logs[0].record.inputs, sampled.record.inputs)
             if kind == "momentary commands":
-                assert {key[0] for key in added} == {"short force"}
+                assert {key[0] for key in freed} == {"short force"}
                 continue
-            assert added == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
-            assert added or is_other
+            assert freed == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
+            assert freed or is_other
     assert sum(one.probability for one in HYPOTHESES.values()) < 0.65
 
 
-def test_idle_commands_of_one_file_leave_another_alone(model: Model) -> None:
+def with_logs(objective: Objective, logs: Sequence[SampledLog]) -> Objective:
+    """J with other logs."""
+    return Objective.of_known(objective.table.known, logs, objective.rows)
+
+
+def test_idle_commands_of_one_file_leave_another_alone(model: Objective) -> None:
     (sampled,) = model.logs
     other, told = replace(sampled, log=replace(sampled.log, file="other.csv")), sampled.record.told
-    idle = Variant("idle commands", (sampled.log.file,), ((told[5], np.inf),))
-    first, second = replace(model, logs=[sampled, other]).applied(idle).logs
+    idle: Suspect = "idle commands", (sampled.log.file,)
+    first, second = applied(with_logs(model, [sampled, other]), {idle: ((told[5], np.inf),)}).logs
     assert not first.record.inputs[:5].any()
     assert np.array_equal(second.record.inputs, other.record.inputs)
 
@@ -227,32 +234,34 @@ def with_jump(sampled: SampledLog) -> SampledLog:
     return replace(sampled, measured=tuple(map(jumping, sampled.measured)))
 
 
-def one_of_each(model: Model) -> list[Variant]:
-    """One variant of each hypothesis about a model whose log has momentary commands and a velocity that jumps."""
-    told = model.logs[0].record.told
-    found = []
+def one_of_each(model: Objective) -> Starts:
+    """One hypothesis of each kind about a model whose log has momentary commands and a velocity that jumps."""
+    told, found = model.logs[0].record.told, dict[Suspect, Start]()
     for kind, hypothesis in HYPOTHESES.items():
-        of = next(hypothesis.variants(model.known, model.logs))
-        found.append(Variant(kind, of, ((told[5], np.inf),) * len(of) if hypothesis.has_times else ()))
+        of = next(hypothesis.suspects(model.table.known, model.logs))
+        found[kind, of] = ((told[5], np.inf),) * len(of) if hypothesis.has_times else None
     return found
 
 
-def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Model) -> None:
+def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Objective) -> None:
     """Lines between momentary commands are those of the commands that act, and a slew limit repeats none of them."""
-    lossy = replace(four_axes, logs=[with_jump(replace(one, lost={"yaw": 0.1})) for one in four_axes.logs])
-    every = one_of_each(lossy)
-    for first, second in combinations(every, 2):
-        (sampled,), (other,) = lossy.applied(first, second).logs, lossy.applied(second, first).logs
+    lossy = with_logs(four_axes, [with_jump(replace(one, lost={"yaw": 0.1})) for one in four_axes.logs])
+    starts = one_of_each(lossy)
+    every = [*starts]
+    for pair in combinations(every, 2):
+        one, two = (applied(lossy, {name: starts[name] for name in names}) for names in (pair, pair[::-1]))
+        (sampled,), (other,) = one.logs, two.logs
         assert (sampled.is_momentary, sampled.layout) == (other.is_momentary, other.layout)
         for key in ("told", "since", "inputs", "beside"):
-            assert np.array_equal(getattr(sampled.record, key), getattr(other.record, key)), (first, second, key)
-        assert lossy.applied(first, second).table.parameters == lossy.applied(second, first).table.parameters
+            assert np.array_equal(getattr(sampled.record, key), getattr(other.record, key)), (pair, key)
+        assert one.table.parameters == two.table.parameters
     assert in_order(reversed(every)) == every
-    (momentary,) = (one for one in every if one.kind == "momentary commands")
-    for variant in every[: every.index(momentary)]:
-        acting = lossy.applied(variant)
-        (lines,) = lossy.applied(momentary, variant).logs
-        (expected,) = (log.with_lines(acting.known.coefficients, acting.known.full) for log in acting.logs)
+    (momentary,) = (one for one in every if one[0] == "momentary commands")
+    for name in every[: every.index(momentary)]:
+        acting = applied(lossy, {name: starts[name]})
+        (lines,) = applied(lossy, {momentary: None, name: starts[name]}).logs
+        known = acting.table.known
+        (expected,) = (log.with_lines(known.coefficients, known.full) for log in acting.logs)
         assert lines.record.beside is not None
         assert expected.record.beside is not None
         assert np.array_equal(lines.record.beside, expected.record.beside)
@@ -260,12 +269,12 @@ def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Mod
         lines.with_inputs(lines.record.inputs)
 
 
-def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
+def test_only_a_rows_own_limits_change_its_commands(model: Objective) -> None:
     """The commands that act are those of a loop written out separately."""
     (sampled,) = model.logs
     names = [name for name in sampled.layout.inputs if name in sampled.layout.commands]
     u = sampled.record.inputs[:, [[*sampled.layout.inputs].index(name) for name in names]]
-    limited = model.applied(Variant("command limit", ()))
+    limited = applied(model, {("command limit", ()): None})
     z = np.array([p.mean for p in limited.table.parameters])
     index = limited.table.index("command limit")
     assert index is not None
@@ -274,7 +283,7 @@ def test_only_a_rows_own_limits_change_its_commands(model: Model) -> None:
     found = limited.table.followed(sets, limited.logs[0])
     assert np.array_equal(found[0][:, : len(names)], np.clip(u, -0.55, 0.55))
     assert np.array_equal(found[1], sampled.record.inputs)
-    slow = model.applied(Variant("slew limit", ()))
+    slow = applied(model, {("slew limit", ()): None})
     (fine,), z = slow.logs, np.array([p.mean for p in slow.table.parameters])
     index = slow.table.index("slew limit")
     assert index is not None
@@ -305,7 +314,7 @@ def seldom(sampled: SampledLog, number: int) -> SampledLog:
 @pytest.mark.parametrize("number", [1, 4])
 @pytest.mark.parametrize("kind", HYPOTHESES)
 def test_a_hypothesis_that_is_absent_is_the_model_without_it(
-    kind: str, number: int, model: Model, four_axes: Model
+    kind: str, number: int, model: Objective, four_axes: Objective
 ) -> None:
     """J of the data is the same, and close to where the hypothesis is absent, it is almost the same."""
     hypothesis, null = HYPOTHESES[kind], KINDS[kind].null if HYPOTHESES[kind].starts else None
@@ -314,29 +323,31 @@ def test_a_hypothesis_that_is_absent_is_the_model_without_it(
     if not has_null:
         return
     of_kind = four_axes if kind == TURN else model
-    plain = replace(of_kind, logs=[seldom(one, number) for one in of_kind.logs])
+    plain = with_logs(of_kind, [seldom(one, number) for one in of_kind.logs])
     if hypothesis.is_first:
-        absent = replace(plain, logs=[one.settled_at(-np.inf) for one in plain.logs])
+        absent = with_logs(plain, [one.settled_at(-np.inf) for one in plain.logs])
     else:
-        of = next(hypothesis.variants(plain.known, plain.logs))
-        absent = plain.applied(Variant(kind, of, ((-np.inf, np.inf),) * len(of) if hypothesis.has_times else ()))
+        of = next(hypothesis.suspects(plain.table.known, plain.logs))
+        absent = applied(plain, {(kind, of): ((-np.inf, np.inf),) * len(of) if hypothesis.has_times else None})
     values = []
     for some in (plain, absent):
-        objective = some.objective(thinned=True)
+        objective = applied(some, {}, thinned=True)
         indices = [n for n, p in enumerate(objective.table.parameters) if p.kind == kind]
         sets = np.repeat(np.array([p.mean for p in objective.table.parameters])[:, None], 2, axis=1)
         sets[indices] = null
         runs = objective.runs(sets[:, 0])
         values.append(objective.value(sets[:, 0], runs) - objective.prior(sets[:, 0]))
-        sets[indices, 1] += np.where(objective.high[indices] > sets[indices, 1], 1e-11, -1e-11)
+        sets[indices, 1] += objective.free[indices] * np.where(
+            objective.high[indices] > sets[indices, 1], 1e-11, -1e-11
+        )
         near = objective.trials(sets, [objective.whole] * 2, runs)
         values += [value - objective.prior(z) for (value, _), z in zip(near, sets.T, strict=True)]
     assert values == pytest.approx([values[0]] * len(values), abs=1e-6, rel=0.0)
 
 
-def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
-    known, (sampled,) = model.known, model.logs
-    assert [*HYPOTHESES["health"].variants(known, model.logs)] == [(name,) for name in ("l", "r", "t")]
+def test_thrusters_that_no_log_tells_apart_are_twins(model: Objective) -> None:
+    known, (sampled,) = model.table.known, model.logs
+    assert [*HYPOTHESES["health"].suspects(known, model.logs)] == [(name,) for name in ("l", "r", "t")]
     inputs = sampled.record.inputs.copy()
     inputs[:, 1] = inputs[:, 0]
     alike = [sampled.with_inputs(inputs)]
@@ -345,7 +356,7 @@ def test_thrusters_that_no_log_tells_apart_are_twins(model: Model) -> None:
         known, layout=replace(known.layout, axes=tuple(f for f in known.layout.axes if f.axis.name == "surge"))
     )
     assert twins(straight, alike, "l") == ("l", "r")
-    assert list(HYPOTHESES["health"].variants(straight, alike)) == [("l",)]
+    assert list(HYPOTHESES["health"].suspects(straight, alike)) == [("l",)]
 
 
 def test_momentary_commands_lose_what_changes_between_rows() -> None:
@@ -372,22 +383,21 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
     """Also a vehicle with the wrong drag tells it, and none whose commands are reversed for the whole log."""
     logs = {"dive.csv": dive("videoray", Fault("", acting=off_beside(start, end)), np.random.default_rng(3))}
     tests = load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', logs))
-    model = Model(*begin(tests))
-    (of,) = HYPOTHESES["idle commands"].variants(model.known, model.logs)
-    variant = Variant("idle commands", of)
+    model = Objective.of_known(*begin(tests))
+    (of,) = HYPOTHESES["idle commands"].suspects(model.table.known, model.logs)
     z = np.array([p.mean + np.log(drag) * (p.kind == "quadratic drag") for p in model.table.parameters])
-    found = timed(model, model.objective(), z, variant)
-    assert found.of == (of if start > 0.0 or end < SECONDS else ())
-    for begins, ends in found.acting:
+    found = times_of(model, z, of)
+    assert tuple(found) == (of if start > 0.0 or end < SECONDS else ())
+    for begins, ends in found.values():
         assert max(begins, 0.0) == pytest.approx(start, abs=0.35)
         assert min(ends, SECONDS) == pytest.approx(end, abs=0.35)
-        changed, whole = model.applied(found).logs[0].record, model.logs[0].record
+        changed = applied(model, {("idle commands", of): ((begins, ends),)}).logs[0].record
+        whole = model.logs[0].record
         acts = (whole.told >= begins) & (whole.told < ends)
         assert not changed.inputs[~acts].any()
         assert np.array_equal(changed.inputs[acts], whole.inputs[acts])
     (sampled,) = model.logs
-    against = replace(model, logs=[sampled.with_inputs(-sampled.record.inputs)])
-    assert not timed(against, against.objective(), z, variant).of
+    assert not times_of(with_logs(model, [sampled.with_inputs(-sampled.record.inputs)]), z, of)
 
 
 @pytest.mark.parametrize(
@@ -402,10 +412,10 @@ def test_commands_are_idle_until_the_thrusters_are_on(start: float, end: float, 
     ids=["from row to row", "close rows", "small changes", "a pilot's stick", "steps that hold"],
 )
 def test_only_what_lines_between_far_rows_lack_is_lost(
-    values: Array, interval: float, share: float, model: Model
+    values: Array, interval: float, share: float, model: Objective
 ) -> None:
     """The same function decides in the hypotheses and in what `inspect` tells."""
-    layout = model.known.layout
+    layout = model.table.known.layout
     thrusters = [t.name for t in layout.thrusters]
     rows = np.array([interval * n for n in range(len(values))])
     commands = tank_log.Commands.of_rows(thrusters, rows, np.array([values] * len(thrusters)).T, tank_log.Source(""))
@@ -418,10 +428,11 @@ def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path
     """The law changes them 400 times a second, so that the log has the noise of the estimates. Its rows stay apart."""
     logs = {"flight.csv": flown(rov_fmu.load(vehicle), 12.0, 1)}
     known, recorded, rows = begin(load_tests(folder_of(tmp_path, f'base = "{vehicle}"\n{HEAD}', logs)))
-    assert list(HYPOTHESES["momentary commands"].variants(known, recorded)) == [("flight.csv",)]
-    (sampled,) = Model(known, recorded, rows).applied(Variant("momentary commands", ("flight.csv",))).logs
+    assert list(HYPOTHESES["momentary commands"].suspects(known, recorded)) == [("flight.csv",)]
+    plain = Objective.of_known(known, recorded, rows)
+    (sampled,) = applied(plain, {("momentary commands", ("flight.csv",)): None}).logs
     assert sampled.is_momentary
-    assert not list(HYPOTHESES["momentary commands"].variants(known, [sampled]))
+    assert not list(HYPOTHESES["momentary commands"].suspects(known, [sampled]))
     least = 1e-3  # of full thrust
     assert sampled.record.beside is not None
     assert sampled.record.beside.shape == (len(sampled.record.told), len(sampled.layout.axes))
@@ -429,7 +440,7 @@ def test_a_flight_of_the_autopilot_has_momentary_commands(vehicle: str, tmp_path
     assert np.any(sampled.record.beside > 5.0 * least)
 
 
-def test_lines_between_momentary_commands_are_wrong_where_their_second_differences_are_large(model: Model) -> None:
+def test_lines_between_momentary_commands_are_wrong_where_their_second_differences_are_large(model: Objective) -> None:
     """Commands that jump at any time and then settle, known 100 times per row, give the true mean of each row."""
     rng, rows, fine = np.random.default_rng(0), 400, 100
     target = np.repeat(rng.uniform(-0.5, 0.5, 40), rows * fine // 40)
@@ -437,7 +448,7 @@ def test_lines_between_momentary_commands_are_wrong_where_their_second_differenc
     for n, wanted in enumerate(np.roll(target, 37)):
         now += (wanted - now) / fine  # a stick that moves within a row
         command[n] = now
-    known, log = model.known, model.logs[0]
+    known, log = model.table.known, model.logs[0]
     layout, names = log.layout, [*log.layout.inputs]
     thrusters = [names.index(f"u_{t.name}") for t in layout.thrusters_along(SURGE)]
     axis = [form.axis for form in layout.axes].index(SURGE)
@@ -461,14 +472,16 @@ def test_lines_between_momentary_commands_are_wrong_where_their_second_differenc
 
 
 @pytest.mark.parametrize(("lack", "error"), [(0.0, 0.01), (0.04, np.hypot(0.01, 0.06)), (1e9, np.hypot(0.01, 1.0))])
-def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(lack: float, error: float, model: Model) -> None:
-    objective = model.objective()
-    axes = [form.axis for form in model.known.layout.axes]
+def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
+    lack: float, error: float, model: Objective
+) -> None:
+    objective = model
+    axes = [form.axis for form in model.table.known.layout.axes]
     z = np.array([p.mean for p in objective.table.parameters])
     found = unseen_errors(objective, z, {}, dict.fromkeys(axes, Misfit(1.0, lack)))
     exact = Posterior(objective.table, z, np.diag(np.full(len(z), 1e-8)))
     for axis in axes:
-        if not model.known.coefficients[axis.coefficient("F_0")]:  # a load is no part of the thrust
+        if not model.table.known.coefficients[axis.coefficient("F_0")]:  # a load is no part of the thrust
 
             def logarithms(z: Array, axis: Axis = axis) -> Array:
                 vehicle, shapes = objective.table.model(z)
@@ -478,10 +491,12 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(lack: flo
             assert np.sqrt(np.diag(covariance)) == pytest.approx([error, error], rel=0.01)
 
 
-def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_scale_of_sensors(model: Model) -> None:
+def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_scale_of_sensors(
+    model: Objective,
+) -> None:
     """Of a vehicle whose velocities are all 1 % larger, and whose time constants are longer by a shift of commands."""
-    nothing = dict.fromkeys((form.axis for form in model.known.layout.axes), Misfit())
-    objective = replace(model, logs=[replace(one, lost={"yaw": 0.1}) for one in model.logs]).objective()
+    nothing = dict.fromkeys((form.axis for form in model.table.known.layout.axes), Misfit())
+    objective = with_logs(model, [replace(one, lost={"yaw": 0.1}) for one in model.logs])
     table, (sampled,) = objective.table, objective.logs
     index, file = table.index("logging width", sampled.log.file), sampled.log.file
     assert index is not None
@@ -511,13 +526,13 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     assert narrow.widened({}, np.zeros_like(found)) is narrow
 
 
-def test_velocities_before_they_jump_are_left_out(model: Model, tmp_path: Path) -> None:
+def test_velocities_before_they_jump_are_left_out(model: Objective, tmp_path: Path) -> None:
     """An estimator without a position drifts away until it gets one. All else in the log stays."""
-    assert not [*HYPOTHESES["unsettled velocity"].variants(model.known, model.logs)]
+    assert not [*HYPOTHESES["unsettled velocity"].suspects(model.table.known, model.logs)]
     drifting = folder(tmp_path, "videoray", Fault("", settled=16.5))
-    other = Model(*begin(load_tests(drifting)))
-    (of,) = HYPOTHESES["unsettled velocity"].variants(other.known, other.logs)
-    left = other.applied(Variant("unsettled velocity", of))
+    other = Objective.of_known(*begin(load_tests(drifting)))
+    (of,) = HYPOTHESES["unsettled velocity"].suspects(other.table.known, other.logs)
+    left = applied(other, {("unsettled velocity", of): None})
     ((sampled,), (whole,)) = left.logs, other.logs
     assert of == ("dive_0.csv",)
     assert sampled.settled == pytest.approx(16.5)
@@ -542,11 +557,12 @@ def test_only_what_is_named_silences_the_alarm(health: float, tmp_path: Path) ->
     thruster is wrong, although large slow and short forces explain each next sample.
     """
     logs = {"flight.csv": flown(rov_fmu.load("bluerov2").with_(health_3=health), 25.0, 1)}
-    held = Model(*begin(load_tests(folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', logs))))
+    held = Objective.of_known(*begin(load_tests(folder_of(tmp_path, f'base = "bluerov2"\n{HEAD}', logs))))
     loud = {"slow force", "short force", "slow gain", "coloured noise"} if health < 1.0 else set[str]()
-    for model in (held, held.applied(Variant("momentary commands", ("flight.csv",)))):
-        objective = model.objective()
-        z = np.array([p.mean + 2.0 * p.deviation * (p.kind in loud) for p in model.table.parameters])
+    for objective in (held, applied(held, {("momentary commands", ("flight.csv",)): None})):
+        z = np.array(
+            [p.mean + 2.0 * p.deviation * (p.kind in loud and not p.is_fixed) for p in objective.table.parameters]
+        )
         runs = objective.runs(z)
         data = [Data.of(run, [], len(z)) for run in runs]
         best = Minimum(z, objective.value(z, runs), runs, data, np.eye(len(z)))
@@ -556,19 +572,20 @@ def test_only_what_is_named_silences_the_alarm(health: float, tmp_path: Path) ->
             assert errors["yaw"] > ALARM
         else:
             assert max(errors.values()) < USUAL
-        if model is held:
+        if objective is held:
             ahead = {axis.name: one.ratio for axis, one in structure(objective, best, ahead=True).items()}
             assert ahead["yaw"] > ALARM
 
 
-def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(model: Model) -> None:
+def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(model: Objective) -> None:
     table = model.table
     deviation = np.array([p.deviation for p in table.parameters])
-    narrow = Posterior(table, np.array([p.mean for p in table.parameters]), np.diag((0.01 * deviation) ** 2))
-    axes = [form.axis for form in model.known.layout.axes]
+    narrow = Posterior.of(table, model.mean, np.diag(2.0 / (0.01 * deviation) ** 2))
+    axes = [form.axis for form in model.table.known.layout.axes]
     nothing = np.zeros((len(deviation), len(deviation)))
     assert narrow.widened(dict.fromkeys(axes, 1.0), nothing) is narrow
-    slightly = narrow.widened(dict.fromkeys(axes, 1.01), nothing).errors / narrow.errors
+    errors = narrow.widened(dict.fromkeys(axes, 1.01), nothing).errors
+    slightly = errors[model.free] / narrow.errors[model.free]
     assert 1.0 <= slightly.min() <= slightly.max() < 1.03, "there is no cliff"
     wide = narrow.widened({axis: 5.0 if axis.name == "heave" else 1.0 for axis in axes}, nothing)
     for p, before, after, prior in zip(table.parameters, narrow.errors, wide.errors, deviation, strict=True):
@@ -588,33 +605,34 @@ def test_a_probability_follows_from_the_odds() -> None:
 # ---- The search ------------------------------------------------------------------------------------------------------
 
 
-REVERSED, DEAD = Variant("reversed commands", ("r",)), Variant("health", ("r",))
+REVERSED: Suspect = "reversed commands", ("r",)
+DEAD: Suspect = "health", ("r",)
 
 
 @pytest.fixture(scope="module")
-def reversed_model(tmp_path_factory: pytest.TempPathFactory) -> Model:
+def reversed_model(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     """A dive with a reversed thruster, which looks dead as long as the other thruster is taken for the whole."""
     fault = faults(["l", "r"])["reversed"]
-    return Model(*begin(load_tests(folder(tmp_path_factory.mktemp("reversed"), "videoray", fault, 2))))
+    return Objective.of_known(*begin(load_tests(folder(tmp_path_factory.mktemp("reversed"), "videoray", fault, 2))))
 
 
-def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Model) -> None:
-    at = Comparison(reversed_model, {}, rough(reversed_model.table))
+def test_before_any_fit_j_shows_which_thruster_is_ill(reversed_model: Objective) -> None:
+    J = comparison(reversed_model, {}, rough(reversed_model.table))
     values = {
-        (kind, of): min(at.value({Variant(kind, of): start}) for start in hypothesis.starts or (None,))
+        (kind, of): min(J({(kind, of): start}) for start in hypothesis.starts or (None,))
         for kind, hypothesis in HYPOTHESES.items()
         if hypothesis.changes_thrust and not hypothesis.has_times
-        for of in hypothesis.variants(reversed_model.known, reversed_model.logs)
+        for of in hypothesis.suspects(reversed_model.table.known, reversed_model.logs)
     }
     assert min(values, key=lambda key: values[key]) == ("reversed commands", ("r",))
-    assert values["health", ("r",)] < at.value({})
+    assert values["health", ("r",)] < J({})
 
 
 def test_the_data_tell_the_health_of_a_thruster_that_turns_the_vehicle_and_not_of_one_that_is_alone(
-    model: Model,
+    model: Objective,
 ) -> None:
     """Of the vertical one, less drag, inertia and load explain the motion as well."""
-    told = contrasts(model, {})
+    told = contrasts(model, model.mean)
     assert max(told["l"], told["r"]) < 0.1 * CONTRAST
     assert told["t"] > 2.0 * CONTRAST
 
@@ -632,59 +650,64 @@ def test_the_data_tell_the_health_of_a_thruster_that_turns_the_vehicle_and_not_o
 def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_others(
     before: dict[Axis, float],
     after: dict[Axis, float],
-    names: list[Variant],
-    reversed_model: Model,
+    names: list[Suspect],
+    reversed_model: Objective,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The other one comes nearest, and the model that is told is without it."""
-
-    def trial(starts: Starts, score: float, errors: dict[Axis, float]) -> Trial:
-        return Trial(starts, reversed_model, cast("Objective", errors), cast("Minimum", None), score, score)
-
+    errors = {"plain": before, "dead": after}
     monkeypatch.setattr(
         "rov_fmu.identify.likelihood.search.structure",
-        lambda errors, *_, **__: {axis: Misfit(error) for axis, error in errors.items()},
+        lambda _, of: {axis: Misfit(error) for axis, error in errors[of].items()},
     )
-    plain, dead = trial({}, 0.0, before), trial({DEAD: 0.0}, 100.0, after)
-    search = StructureSearch(plain, _search)
-    search.variants, search.contrasts, search.now = [], {}, dead
-    search.tried[frozenset({DEAD})] = dead
-    found = search.explained()
-    assert [one.variant for one in found.adopted] == names
-    assert found.nearest == ({} if names else {DEAD: 0.0})
-    assert found.trial is (dead if names else plain)
+    plain, dead = (
+        StructureFit(starts, reversed_model, cast("Minimum", of), score, score)
+        for starts, of, score in (({}, "plain", 0.0), ({DEAD: 0.0}, "dead", 100.0))
+    )
+    search = searching(plain, dead, monkeypatch)
+    search.run()
+    assert [*search.odds] == names
+    assert search.nearest == ({} if names else {DEAD: 0.0})
+    assert search.now is (dead if names else plain)
+
+
+def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.MonkeyPatch) -> StructureSearch:
+    """A search that holds a fit, and in which nothing asks for another one."""
+    search = StructureSearch(plain)
+    search.suspects, search.contrasts, search.now = {REVERSED: (None,), DEAD: (0.5,)}, {}, now
+    search.tried[frozenset(now.starts)] = now
+    monkeypatch.setattr(search, "_round", list)
+    return search
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])
 def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
-    alone: float, names: list[Variant], reversed_model: Model, monkeypatch: pytest.MonkeyPatch
+    alone: float, names: list[Suspect], reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No alarm asks for it: the fit with both is as good as that with the right one."""
-    scores = {frozenset[Variant](): 0.0, frozenset({DEAD, REVERSED}): 30.0}
+    scores = {frozenset[Suspect](): 0.0, frozenset({DEAD, REVERSED}): 30.0}
     scores |= {frozenset({REVERSED}): alone, frozenset({DEAD}): 12.0}
 
-    def trial(model: Model, starts: Starts, *_: object) -> Trial:
+    def fit(_: object, starts: Starts, *__: object) -> StructureFit:
         score = scores[frozenset(starts)]
-        return Trial(starts, model, cast("Objective", None), cast("Minimum", None), score, score)
+        return StructureFit(starts, reversed_model, cast("Minimum", None), score, score)
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", trial)
-    search = StructureSearch(trial(reversed_model, {}), _search)
-    search.variants, search.contrasts = [REVERSED, DEAD], {}
-    search.now = trial(reversed_model, dict.fromkeys([DEAD, REVERSED]))
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
+    monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
+    search = StructureSearch(fit(None, {}))
+    search.suspects, search.contrasts = {REVERSED: (None,), DEAD: (0.5,)}, {}
+    search.now = fit(None, {DEAD: 0.5, REVERSED: None})
     search.tried[frozenset(search.now.starts)] = search.now
-    found = search.explained()
-    assert {one.variant for one in found.adopted} == {*names}
+    search.run()
+    assert {*search.odds} == {*names}
     best = scores[frozenset(names)]
-    assert {one.variant: one.odds for one in found.adopted} == {
-        name: best - max(scores[some] for some in scores if name not in some) for name in names
-    }
+    assert search.odds == {name: best - max(scores[some] for some in scores if name not in some) for name in names}
 
 
-def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(reversed_model: Model) -> None:
-    quick = reversed_model.objective(thinned=True)
-    plain = Trial({}, reversed_model, quick, minimise(quick, quick.mean, most=0, last=False), 0.0, 0.0)
-    search = StructureSearch(plain, _search)
+def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(reversed_model: Objective) -> None:
+    quick = applied(reversed_model, {}, thinned=True)
+    search = StructureSearch(StructureFit({}, quick, minimise(quick, quick.mean, most=0, last=False), 0.0, 0.0))
     sets: list[Starts] = [{REVERSED: None}, {DEAD: 0.5}]
     (first, fall), (second, _) = search._ranked(sets)
     assert (first, second) == tuple(sets)
@@ -696,40 +719,43 @@ def test_a_hypothesis_that_lost_is_tried_again_only_where_j_falls_by_more(revers
 
 @pytest.mark.parametrize(("again", "names"), [(38.0, {REVERSED}), (20.0, {REVERSED, DEAD})])
 def test_another_minimum_is_no_evidence_for_a_hypothesis(
-    again: float, names: set[Variant], reversed_model: Model, monkeypatch: pytest.MonkeyPatch
+    again: float, names: set[Suspect], reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A fit is much better with a thruster that ends whole. So it is without that hypothesis, if begun from there."""
 
-    def trial(starts: Starts, score: float) -> Trial:
-        nothing = cast("Objective", None), cast("Minimum", None)
-        return Trial(starts, reversed_model, *nothing, score, 0.0, frozenset({DEAD} & {*starts}))
+    def fit(starts: Starts, score: float) -> StructureFit:
+        return StructureFit(starts, reversed_model, cast("Minimum", None), score, 0.0)
 
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: trial(starts, again))
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: fit(starts, again))
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
-    search = StructureSearch(trial({}, 0.0), _search)
-    search.variants, search.contrasts = [REVERSED, DEAD], {}
-    search.now = search.tried[frozenset({REVERSED})] = trial({REVERSED: None}, 10.0)
-    both = search.tried[frozenset({REVERSED, DEAD})] = trial({REVERSED: None, DEAD: 1.0}, 40.0)
+    monkeypatch.setattr(
+        StructureFit, "needed", property(lambda self: {k: z for k, z in self.starts.items() if k != DEAD})
+    )
+    search = searching(fit({}, 0.0), fit({REVERSED: None}, 10.0), monkeypatch)
+    both = search.tried[frozenset({REVERSED, DEAD})] = fit({REVERSED: None, DEAD: 1.0}, 40.0)
     rounds = iter([[both]])
     monkeypatch.setattr(search, "_round", lambda: next(rounds, []))
-    assert {*search.explained().trial.starts} == names
+    search.run()
+    assert {*search.now.starts} == names
 
 
 @pytest.mark.long
-def test_a_wrong_hypothesis_is_taken_back(reversed_model: Model, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
     """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays."""
-    quick = reversed_model.objective(thinned=True)
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.applied", lambda plain, starts, **_: applied(plain, starts, thinned=True)
+    )
+    quick = applied(reversed_model, {}, thinned=True)
     near = minimise(quick, start_of(quick), enough=8.0, last=False)
     start = evidence(quick, near.value, near.information)
-    search = StructureSearch(Trial({}, reversed_model, quick, near, start, start), _search)
-    monkeypatch.setattr(Model, "objective", lambda self, **_: Objective(self.table, self.logs, self.rows, thinned=True))
-    dead = fitted(reversed_model, {DEAD: 0.0}, 0.0, _search)
+    search = StructureSearch(StructureFit({}, quick, near, start, start))
+    dead = fitted(reversed_model, {DEAD: 0.0}, 0.0)
     assert dead
     assert dead.score > search.now.score
     search.tried[frozenset({DEAD})] = search.now = dead
-    found = search.explained()
-    assert [one.variant for one in found.adopted] == [REVERSED]
-    assert worst(structure(found.trial.objective, found.trial.minimum)) < ALARM
+    search.run()
+    assert [*search.odds] == [REVERSED]
+    assert worst(structure(search.now.objective, search.now.minimum)) < ALARM
 
 
 # ---- What wins -------------------------------------------------------------------------------------------------------

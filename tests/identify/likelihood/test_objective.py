@@ -13,7 +13,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood import parameters
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
-from rov_fmu.identify.likelihood.parameters import Parameter, table_of
+from rov_fmu.identify.likelihood.parameters import Parameter
 from rov_fmu.identify.likelihood.solve import minimise, refits, total
 from rov_fmu.tank.arrays import Array
 from tests.folders import folder_of, pulled, responses
@@ -35,7 +35,7 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
         write_log(path, str(n), run(VIDEORAY, axis, PLAN, 5.0).noisy(random))
     known, logs, rows = begin(load_tests(path))
     known = replace(known, bent=frozenset({"rear"}))
-    return Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    return Objective.of_known(known, logs, rows)
 
 
 @pytest.fixture(scope="module")
@@ -148,7 +148,7 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     log = write_log(path, "0", run(stronger, SURGE, PLAN, 5.0).noisy(np.random.default_rng(0), "distance"))
     add_voltage(log)
     known, logs, rows = begin(load_tests(path))
-    objective = Objective(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows)
+    objective = Objective.of_known(known, logs, rows)
     kinds = [p.kind for p in objective.table.parameters]
     assert {"voltage", "current", "slow gain", "slow velocity"} <= {*kinds}
     z = objective.mean.copy()
@@ -174,7 +174,8 @@ def test_the_number_of_threads_changes_no_bit(
 def test_j_is_the_sum_of_its_parts(objective: Objective, point: Array) -> None:
     """The prior, each sample of each log, and each row of a table, by the formula."""
     runs, parameters = objective.runs(point), objective.table.parameters
-    expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in zip(point.tolist(), parameters, strict=True))
+    free = ((z, p) for z, p in zip(point.tolist(), parameters, strict=True) if not p.is_fixed)
+    expected = sum(((z - p.mean) / p.deviation) ** 2 for z, p in free)
     for off, S in [*((one.innovations, one.variances) for one in runs), objective.row_values(point)]:
         u = np.abs(off) / np.sqrt(S)
         expected += float(

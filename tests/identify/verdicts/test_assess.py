@@ -13,7 +13,6 @@ from rov_fmu.identify.assess import answers, answers_of_file, commands_of_answer
 from rov_fmu.identify.assess import tested_commands as of_tests
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.hypotheses import Model
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -162,7 +161,7 @@ def test_a_steady_table_tests_its_commands_and_thrust_tables_test_none(tmp_path:
     tables = responses(VIDEORAY, HEAVE)
     tests = load_tests(folder_of(tmp_path, f"{HEAD}[known]\n{MASS}{TURNS}", {**FORCES, **tables}))
     known, logs, rows = begin(tests)
-    objective = Model(known, logs, rows).objective()
+    objective = Objective.of_known(known, logs, rows)
     assert of_tests(objective, objective.mean)[HEAVE] == (0.7, 0.8)
 
 
