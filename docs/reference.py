@@ -20,6 +20,7 @@ from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.fmu.variables import LOG_CATEGORIES
 from rov_fmu.identify.likelihood.kinds import PRIORS
+from rov_fmu.identify.result import CONSTANTS
 from rov_fmu.identify.verdict import RULES
 from rov_fmu.io.toml_file import Strict
 from rov_fmu.report.page import equations
@@ -62,6 +63,8 @@ def tables() -> dict[str, Table]:
     kept = gates.stages()
     found |= {"gates": gates.gates(kept), "strangers": gates.by_kind(kept[-1:])}
     found["hidden"] = gates.by_kind(kept[-1:], hidden=True)
+    chosen = ((f"{one.value:g}", one.words, one.seen) for one in CONSTANTS.values())
+    found["chosen"] = [("number", "of", "what was seen"), *chosen]
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,

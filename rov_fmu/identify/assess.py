@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.likelihood.records import push_along
-from rov_fmu.identify.result import LEAST_TESTED, Answer, Tested, are_alike
+from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -27,8 +27,8 @@ _WIDEST_HALF = 50.0
 """The largest half-width of an interval of a logarithm."""
 EXACT = 0.01
 """No answer is claimed to better than 1 %, also if nothing that determines it is fitted."""
-ROCKING = 0.03
-"""Nor is a V_ss to better than 3 % where the vehicle may have rocked unseen, which raises its drag by 3 to 7 %."""
+ROCKING = CONSTANTS["rocking"].value
+"""Nor is a V_ss to better than this where the vehicle may have rocked unseen."""
 _STOPPED = 0.1
 _GRID = np.linspace(0.0, 1.0, 101)
 """The commands among which the one is found that holds a speed."""

@@ -63,16 +63,14 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
     """Yield the hypotheses about the structure that won, with the numbers of their rows, and those that come nearest
     where the model lacks something."""
     parameters = fit.objective.table.parameters
-    for suspect in in_order(fit.odds):
-        structure, n = _named(fit, suspect, fit.starts[suspect], fit.odds[suspect]), row_of(fit.objective, suspect)
+    won = [(suspect, fit.starts[suspect], fit.odds[suspect]) for suspect in in_order(fit.odds)]
+    for suspect, start, odds in (*won, *((suspect, start, nan) for suspect, start in fit.nearest.items())):
+        structure, n = _named(fit, suspect, start, odds), row_of(fit.objective, suspect)
         if n is not None:
-            value, interval = _number(fit, n)
+            value, interval = (
+                _number(fit, n) if suspect in fit.odds else (float(parameters[n].number(start)), (nan, nan))
+            )
             structure = replace(structure, value=value, interval=interval, unit=parameters[n].unit)
-        yield structure
-    for suspect, start in fit.nearest.items():
-        structure, n = replace(_named(fit, suspect, start, 0.0), probability=nan), row_of(fit.objective, suspect)
-        if n is not None:
-            structure = replace(structure, value=float(parameters[n].number(start)), unit=parameters[n].unit)
         yield structure
     if files := tuple(one.log.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
         yield _named(fit, ("momentary commands", files), None, inf)

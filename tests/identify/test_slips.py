@@ -166,7 +166,7 @@ def test_no_structure_is_sought_where_a_slip_explains_the_errors(
 ) -> None:
     (log, *_), slip = recordings(HEAVE), SLIPS["heave up"]
     monkeypatch.setattr(StructureSearch, "_round", lambda _: pytest.fail("a structure is sought"))
-    found = identify(load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN)))
+    found = identify(load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN, FORCES)))
     assert [one.words for one in found.slips] == [QUESTIONS["heave up"]]
     assert [one.verdict.word for one in found.axes] == ["do not use"]
 

@@ -1,7 +1,7 @@
 """The fit: a start on few samples, another one if noise takes the place of the model, the better one to the end on all
 samples, and the posterior there."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
@@ -119,15 +119,15 @@ def fit_all(
     logs: Sequence[SampledLog],
     rows: Sequence[TableRow],
     on_progress: Progress = silent,
-    is_mistaken: Callable[[StructureFit], bool] = lambda _: False,
+    is_mistaken: Callable[[StructureFit, Collection[str]], bool] = lambda *_: False,
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends. The shapes of the other curves only widen the intervals: what is told is a fit in which these are quadratic.
 
-    Where predictions raise the alarm, `is_mistaken` tells whether a mistake in a log is the reason. The structure of
-    the vehicle is not the reason then.
+    Where predictions raise the alarm, `is_mistaken` tells whether a mistake in a log is the reason, and not the
+    structure. It gets the fit, and the names of the thrusters that the data tell apart.
     """
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends, is_enough = _from_starts(quick, on_progress)
@@ -137,7 +137,7 @@ def fit_all(
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
     search = StructureSearch(plain, lambda: show_tried(next(tried)))
-    if not (plain.predicted > ALARM and is_mistaken(replace(plain, starts=dict.fromkeys(first)))):
+    if not (plain.predicted > ALARM and is_mistaken(replace(plain, starts=dict.fromkeys(first)), search.apart)):
         search.run()
     full, near = search.now.objective, search.now.minimum
     measured = full.table.known.measured_curves

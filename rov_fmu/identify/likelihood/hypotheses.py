@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood.kinds import TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
-from rov_fmu.identify.result import ALARM
+from rov_fmu.identify.result import ALARM, CONSTANTS
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant
@@ -27,10 +27,8 @@ _FINEST = 0.05
 """The time between two rows within which a slew limit moves a command, s."""
 _WEAK, _WIDER = 0.7, 10.0
 """The health of thrusters at which the data are asked about it, and how many times as wide the priors are then."""
-CONTRAST = 0.2
-"""A hypothesis about single thrusters is tried if the data alone tell the health of each to this standard error. It is
-0.003 to 0.12 where logs tell thrusters apart, and 0.45 to 4 where these always have nearly the same commands."""
-
+CONTRAST = CONSTANTS["contrast"].value
+"""A hypothesis about single thrusters is tried if the data alone tell the health of each to this standard error."""
 _ROUNDING = 1e-13
 """What is smaller relative to the largest eigenvalue of the scaled information is rounding."""
 

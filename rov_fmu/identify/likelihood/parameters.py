@@ -533,11 +533,11 @@ def _fixed(p: Parameter, z: float = 0.0) -> Parameter:
 def _of_structure(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield what hypotheses about the structure may free. It stays at what is known, or where it changes nothing."""
     for kind in (kind for kind, one in KINDS.items() if one.is_of_structure):
-        for part in known.layout.thrusters if KINDS[kind].is_coefficient else (None,):
-            row = make(kind, part.name if part else "", sets=_set(known, kind, [part] if part else []))
-            absent = known.coefficients[row.sets[0]] if row.sets else row.null
-            if absent is not None and (row.sets or not part):
-                yield row if (kind, row.of) in known.freed else _fixed(row, absent)
+        for of, name in known.layout.health.items() if KINDS[kind].is_coefficient else [("", "")]:
+            row = make(kind, of, sets=(name,) if name else ())
+            absent = known.coefficients.get(name, row.null or 0.0)
+            if {*row.sets} <= {*known.layout.coefficients}:
+                yield row if (kind, of) in known.freed else _fixed(row, absent)
 
 
 def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:

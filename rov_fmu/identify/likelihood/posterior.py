@@ -14,16 +14,13 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.objective import derivatives
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.result import Interval
+from rov_fmu.identify.result import CONSTANTS, Interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import quantile
 
 DEGREES_OF_FREEDOM = 10.0
 QUANTILE = quantile(DEGREES_OF_FREEDOM)
 """Half the width of a 95 % interval in standard errors."""
-_ALIKE = 2.0
-"""The number of samples in turn in which the structure lacks the same. With it, 96 % of the intervals of drawn vehicles
-with a wrong structure contain the truth; with 6, 97 % of those 1.5 times as wide; with 1, 94 %, some far off."""
 _WORST = 1e3
 """The largest error of predictions that counts. It is infinite where a motion diverges."""
 _LEAST = 1e-10
@@ -84,7 +81,7 @@ class Posterior:
                 of[name] = min([of.get(name, _WORST), *along])
         parameters = self.table.parameters
         errors = np.array([min(of.get(p.of, worst), _WORST) if p.of_motion else 0.0 for p in parameters])
-        factors = np.sqrt(1.0 + _ALIKE * np.maximum(errors**2 - 1.0, 0.0))
+        factors = np.sqrt(1.0 + CONSTANTS["alike"].value * np.maximum(errors**2 - 1.0, 0.0))
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
@@ -108,7 +105,11 @@ class Posterior:
         return np.array([z, *around(z, self.error(index))])
 
     def evidence(self, index: int) -> float:
-        """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent."""
+        """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent.
+
+        It is what the Laplace approximation gives for models with and without it. Both densities are taken as normal
+        beyond the bounds, too. So a null at a bound counts as one inside, here and wherever J decides.
+        """
         p, error = self.table.parameters[index], self.error(index)
         assert p.null is not None
         after, before = ((self.z[index] - p.null) / error) ** 2, ((p.mean - p.null) / p.deviation) ** 2

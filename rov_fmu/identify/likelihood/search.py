@@ -37,7 +37,7 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, least_from, minimise, scaled, start_of, total
-from rov_fmu.identify.result import ALARM, USUAL, least_error, moves
+from rov_fmu.identify.result import ALARM, CONSTANTS, USUAL, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
@@ -58,16 +58,13 @@ _FORCE, _LOUD = 0.03, 1.0
 its mean where J compares hypotheses before any fit."""
 _FARTHEST = 3.0
 """The most by which parameters adapt to a hypothesis there, in deviations of their priors."""
-_LATE, _NARROWEST, _HALF = 0.05, 0.2, 0.5
-"""How much earlier or later commands that change between rows act along an axis (standard error), relative to the
-window in which they change; the narrowest window, relative to the time between two rows; and the command whose time
-constant this changes."""
-MOST_OF_ROW = 0.5
+_HALF = 0.5
+"""The command whose time constant changes where commands act earlier or later."""
+MOST_OF_ROW = CONSTANTS["most of row"].value
 """Commands that change within more than this part of the time between two rows are momentary values: they change at any
 time."""
-LEAST_LACK, _LACKS = 0.01, 1.5
-"""What the structure lacks, as a standard error of the logarithms of speeds and inertias: at least the first number,
-and so many times the errors over 10 s beyond the noise, relative to the motion."""
+LEAST_LACK = 0.01
+"""What the structure lacks is at least this standard error of the logarithms of speeds and inertias."""
 _IDLE_STEP = 0.1
 """The time between two values of the unknown force that tell when commands do not act, s."""
 _IDLE = 0.5
@@ -160,7 +157,10 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
 def windows(objective: Objective, z: Array) -> dict[str, float]:
     """Return the part of the time between two rows in which a command may change, of each log that loses commands."""
     found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.lost}
-    return {file: 1.0 if width > MOST_OF_ROW else max(float(width), _NARROWEST) for file, width in found.items()}
+    return {
+        file: 1.0 if width > MOST_OF_ROW else max(float(width), CONSTANTS["narrowest"].value)
+        for file, width in found.items()
+    }
 
 
 def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
@@ -181,13 +181,13 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     found = np.zeros((len(z), len(z)))
     vehicle, shapes = objective.table.model(z)
     for axis, misfit in misfits.items():
-        lack = hypot(LEAST_LACK, min(_LACKS * misfit.lack, 1.0))
+        lack = hypot(LEAST_LACK, min(CONSTANTS["lack"].value * misfit.lack, 1.0))
         scale = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
         is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
         found += lack**2 * (np.outer(scale, scale) + np.diag(is_inertia))
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
         if widths and 0.0 < time < inf:
-            found += np.diag(is_inertia * (_LATE * max(widths) / time) ** 2)
+            found += np.diag(is_inertia * (CONSTANTS["late"].value * max(widths) / time) ** 2)
     return found
 
 
@@ -369,7 +369,7 @@ def refitted(plain: Objective, starts: Starts, prior: float, near: StructureFit)
     """Return the minimum of J with some hypotheses, from the end of another fit; None if a motion diverges."""
     objective = applied(plain, starts)
     with suppress(DivergedError):
-        end = minimise(objective, begun(objective, near.minimum.z, {}), last=False)
+        end = minimise(objective, begun(objective, near.minimum.z, starts), last=False)
         return _fit_of(starts, objective, end, prior, near.quick)
     return None
 
@@ -447,10 +447,15 @@ class StructureSearch:
         }
 
     @property
+    def apart(self) -> list[str]:
+        """The thrusters that the data tell from all others."""
+        return [name for name, error in self.contrasts.items() if error < CONTRAST]
+
+    @property
     def alike(self) -> tuple[Of, ...]:
         """The groups of commanded thrusters along one axis that the data do not tell apart."""
         layout, logs = self.plain.objective.table.layout, self.plain.objective.logs
-        unknown = {name for name, error in self.contrasts.items() if error >= CONTRAST}
+        unknown = self.contrasts.keys() - {*self.apart}
         same = thrusters_alike(layout, [*map(commands_of, logs)])
         names = {name for group in same if unknown.intersection(group) for name in group}
         along = [layout.thrusters_along(axis) for axis in layout.bare_axes]
@@ -508,7 +513,7 @@ class StructureSearch:
                 if one.has_times:
                     if times := times_of(objective, self.plain.minimum.z, of):
                         found[kind, tuple(times)] = (tuple(times.values()),)
-                elif not one.is_contrast or all(self.contrasts.get(name, inf) < CONTRAST for name in of):
+                elif not one.is_contrast or {*of} <= {*self.apart}:
                     found[kind, of] = one.starts or (None,)
         return found
 
@@ -538,7 +543,8 @@ class StructureSearch:
     def _round(self) -> list[StructureFit]:
         """Return fits with other sets of hypotheses, where the alarm asks for them.
 
-        If one set has won by far, sets whose J falls much less before any fit wait for the next round.
+        Without an alarm, what does not change the thrust begins at the last fit: the vehicle is near. If one set has
+        won by far, sets whose J falls much less before any fit wait for the next round.
         """
         fits, won = list[StructureFit](), -inf
         for starts, gain in [*self._promising()]:
@@ -546,7 +552,10 @@ class StructureSearch:
                 continue
             enough = max(one.quick for one in (self.now, *fits)) - WINS
             self.on_fit()
-            fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
+            if gain == -inf and worst(self.now.misfits) <= ALARM:
+                fit = refitted(self.plain.objective, starts, self._prior(starts), self.now)
+            else:
+                fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
             # Without a fit, the evidence of thinned logs is not enough.
             is_worse = fit.score < self.now.score if fit else enough < self.now.quick
             if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():

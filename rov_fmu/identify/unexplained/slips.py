@@ -97,9 +97,16 @@ Scaling = frozenset[tuple[_Match, float]]
 
 
 def slips(
-    tests: Tests, objective: Objective, best: Array, errors: Array, starts: Starts | None = None
+    tests: Tests,
+    objective: Objective,
+    best: Array,
+    errors: Array,
+    starts: Starts | None = None,
+    apart: Collection[str] = (),
 ) -> tuple[tuple[Slip, ...], float]:
     """Return the mistakes that explain the logs much better, and the errors R over 10 s that the best of them leaves.
+
+    R is infinite where reversed or swapped commands of the thrusters `apart` may explain a sign as well.
 
     `best` is where J is least for the files as they stand, `errors` are the standard errors there, and `starts` has the
     hypotheses about the structure that won. Where several explanations are about as good, each is told for its files.
@@ -142,7 +149,10 @@ def slips(
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
     )
-    return tuple(mistakes), worst(structure(*fits[first])) if first in fits else inf
+    layout = objective.table.layout
+    axes = {axis for one, scale in first if scale < 0.0 and (axis := one.channel.quantity.axis)}
+    is_told = first in fits and not any(t.name in apart for axis in axes for t in layout.thrusters_along(axis))
+    return tuple(mistakes), worst(structure(*fits[first])) if is_told else inf
 
 
 def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:

@@ -764,6 +764,7 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch
 def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None:
     found = identify(load_tests(folder(path, vehicle, fault, seed, dives)))
     assert [(one.kind, one.of) for one in found.structures] == [(fault.kind, fault.of)] * bool(fault.kind)
+    assert not found.slips
     for told in found.structures:
         assert told.probability > 0.95
         if fault.value is not None:
@@ -776,6 +777,12 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
 @pytest.mark.long
 def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["dead"], 1, 1)
+
+
+@pytest.mark.long
+def test_swapped_thrusters_are_no_heading_of_the_other_sign(tmp_path: Path) -> None:
+    """Both explain the errors. The search for the structure goes on, because the data tell the thrusters apart."""
+    check(tmp_path, "videoray", faults(["l", "r"])["swapped"], 1, 1)
 
 
 @pytest.mark.long

@@ -48,11 +48,11 @@ sensor lag of the depth sensor: 0 ± 0.3, 0 to inf, absent at 0
 sensor lag of the position sensor: 0 ± 0.3, 0 to inf, absent at 0
 thrust scale rear: ln 1 ± 0.1, 0 to inf
 thrust shape rear: 0 ± 1, -inf to inf
-linear thrust rear: 0 ± 0.001, 0 to 0
+linear thrust rear: 0 ± 0.1, 0 to 0
 reverse thrust rear: 0 ± 0.1, -inf to inf, absent at 0
 dead band rear: 0 ± 0.05, 0 to 0.5, absent at 0
 thrust scale top: ln 1 ± 1, 0 to inf
-thrust shape top: 0 ± 0.001, 0 to 0
+thrust shape top: 0 ± 1, 0 to 0
 linear thrust top: 0 ± 0.3, -0.25 to inf
 linear thrust top astern: 0 ± 0.3, -0.25 to inf
 reverse thrust top: 0 ± 0.5, -inf to inf
@@ -93,9 +93,17 @@ white noise surge distance: ln 0.011 ± 0.7, 0.00149 to inf
 coloured noise surge distance: ln 0.3 ± 1, 0 to inf
 correlation time surge distance: ln 2 ± 1, 0 to inf
 row noise forces of top: ln 0.03 ± 1, 0.001 to inf
+health l: 1 ± 0.5, 1 to 1, absent at 1
+health r: 1 ± 0.5, 1 to 1, absent at 1
+health t: 1 ± 0.5, 1 to 1, absent at 1
+command limit: 1 ± 0.3, 1 to 1, absent at 1
+slew limit: 0 ± 0.5, 0 to 0, absent at 0
+voltage drop: 0 ± 0.15, 0 to 0, absent at 0
+turned velocity sensor: 0 ± 1.5, 0 to 0, absent at 0
 """
 """The usual number and the deviation of each parameter, or those of its logarithm, its bounds, and where an effect is
-absent. docs/identify-method.md has the deviations, and what an h/2 of a logger is. Drag is that of the base."""
+absent. docs/identify-method.md has the deviations, and what an h/2 of a logger is. Drag is that of the base. Rows of
+hypotheses are fixed where they change nothing."""
 
 
 def told(p: Parameter) -> str:
