@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -19,7 +19,7 @@ from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, 
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
-from rov_fmu.identify.likelihood.search import StructureFit
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import (
     ALARM,
@@ -39,6 +39,7 @@ from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import Progress, moving, silent
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
 from rov_fmu.vehicle.checks import no_thrust
@@ -66,12 +67,13 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     if not (known.fitted or known.curves):
         own = ", ".join(sorted(tests.description.known))
         raise DataFileError(f"{tests.folder.path}: nothing is identifiable: rov.toml gives all that it tests ({own})")
-    wrong: tuple[Slip, ...] | None = None
+    wrong = tuple[Slip, ...]()
 
-    def is_mistaken(plain: StructureFit, apart: Collection[str]) -> bool:
+    def is_mistaken(objective: Objective, z: Array, errors: Array) -> bool:
         nonlocal wrong
-        wrong, error = slips(tests, plain.objective, plain.minimum.z, plain.posterior.errors, plain.starts, apart)
-        return bool(wrong) and error <= ALARM
+        found, left = slips(tests, objective, z, errors)
+        wrong = found if left <= ALARM else ()
+        return bool(wrong)
 
     fit = fit_all(known, logs, rows, on_progress, is_mistaken)
     show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
@@ -88,8 +90,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
-    if wrong is None or fit.odds:
-        wrong, _ = slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts)
+    wrong = wrong or slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts)[0]
     values = held_out_rows(fit.objective, fit.best)
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests)

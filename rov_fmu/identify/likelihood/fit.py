@@ -1,7 +1,7 @@
 """The fit: a start on few samples, another one if noise takes the place of the model, the better one to the end on all
 samples, and the posterior there."""
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
@@ -28,6 +28,7 @@ from rov_fmu.identify.likelihood.search import (
     with_shared,
 )
 from rov_fmu.identify.likelihood.solve import (
+    MOST_STEPS,
     QUICK,
     Minimum,
     evidence,
@@ -47,6 +48,8 @@ _SAME = 0.01
 _STARTS = ("start 1", "start 2", "a more careful start")
 """Two starts, and one for a motion that diverges from both. The kinds of the parameters say where they begin: with much
 noise, J has few minima far from the data, and a heavier vehicle with less drag is careful."""
+_UNREFINED = 4
+"""The most steps on all samples of a fit that is wrong because of a mistake in a log."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -119,29 +122,36 @@ def fit_all(
     logs: Sequence[SampledLog],
     rows: Sequence[TableRow],
     on_progress: Progress = silent,
-    is_mistaken: Callable[[StructureFit, Collection[str]], bool] = lambda *_: False,
+    is_mistaken: Callable[[Objective, Array, Array], bool] = lambda *_: False,
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
     bends. The shapes of the other curves only widen the intervals: what is told is a fit in which these are quadratic.
 
-    Where predictions raise the alarm, `is_mistaken` tells whether a mistake in a log is the reason, and not the
-    structure. It gets the fit, and the names of the thrusters that the data tell apart.
+    Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
+    the reason, and not the structure. Such a fit is not refined, because nobody should use it.
     """
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends, is_enough = _from_starts(quick, on_progress)
-    show = moving(on_progress, "all samples", 0.3, 0.6)
-    near = minimise(full, scaled(full, ends[0].z), show, last=False)
-    plain, first = settled(StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0])))
+    show, start = moving(on_progress, "all samples", 0.3, 0.6), StructureFit({}, quick, ends[0], 0.0, 0.0)
+    is_wrong = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
+    most = _UNREFINED if is_wrong else MOST_STEPS
+    near = minimise(full, scaled(full, ends[0].z), show, most=most, last=False)
+    plain, first = (
+        StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0])),
+        dict[Suspect, float](),
+    )
+    if not is_wrong:
+        plain, first = settled(plain)
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
     search = StructureSearch(plain, lambda: show_tried(next(tried)))
-    if not (plain.predicted > ALARM and is_mistaken(replace(plain, starts=dict.fromkeys(first)), search.apart)):
+    if not is_wrong:
         search.run()
     full, near = search.now.objective, search.now.minimum
     measured = full.table.known.measured_curves
-    for n, curve in enumerate(measured):
+    for n, curve in enumerate(() if is_wrong else measured):
         other, needed = _bending(full, full.table.known.bent | {curve}), evidence_at(full, near) + KEPT
 
         def bends(value: float, information: Array, other: Objective = other, needed: float = needed) -> bool:
@@ -167,8 +177,8 @@ def fit_all(
     told, least, bent = full, best, full.table.known.bent
     show, of_measured = moving(on_progress, "quadratic thrust", 0.82, 0.88), bent.intersection(measured)
     if of_measured < bent:
-        told, least = _less_bent(full, of_measured, best, show)
-    file = _less_bent(full, frozenset(), least, show) if of_measured else (told, least)
+        told, least = _less_bent(full, of_measured, best, most, show)
+    file = _less_bent(full, frozenset(), least, most, show) if of_measured else (told, least)
     misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
     unseen = unseen_errors(told, least.z, before, misfits)
@@ -194,11 +204,11 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
 
 
 def _less_bent(
-    objective: Objective, bent: frozenset[str], near: Minimum, on_step: Callable[[int], None]
+    objective: Objective, bent: frozenset[str], near: Minimum, most: int, on_step: Callable[[int], None]
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
     other = _bending(objective, bent)
-    return other, minimise(other, near.z, on_step, near=near.data, enough=QUICK)
+    return other, minimise(other, near.z, on_step, near=near.data, most=most, enough=QUICK)
 
 
 def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:

@@ -5,6 +5,7 @@ the filter reads of the logs: which samples count, which commands act, and what 
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import exp, inf, radians
@@ -13,6 +14,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.layout import Layout
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.kinds import TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
@@ -441,6 +443,13 @@ def contrasts(plain: Objective, z: Array) -> dict[str, float]:
         inverse = np.linalg.pinv(tells[np.ix_(some, some)] / np.outer(scale, scale), rcond=_ROUNDING, hermitian=True)
         found[name] = float(np.sqrt(inverse[-1, -1]) / scale[-1])
     return found
+
+
+def apart(plain: Objective, z: Array) -> dict[str, bool]:
+    """Return whether the data tell each thruster from all others, by its name; nothing if a motion diverges."""
+    with suppress(DivergedError):
+        return {name: error < CONTRAST for name, error in contrasts(plain, z).items()}
+    return {}
 
 
 def probability(odds: float) -> float:

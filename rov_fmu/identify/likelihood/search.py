@@ -19,15 +19,14 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.hypotheses import (
-    CONTRAST,
     HYPOTHESES,
     Of,
     Start,
     Starts,
     Suspect,
+    apart,
     applied,
     commands_of,
-    contrasts,
     row_of,
     thrusters_alike,
 )
@@ -446,16 +445,16 @@ class StructureSearch:
             one: self.now.score - max(fit.score for fit in fits if one not in fit.starts) for one in self.now.starts
         }
 
-    @property
-    def apart(self) -> list[str]:
-        """The thrusters that the data tell from all others."""
-        return [name for name, error in self.contrasts.items() if error < CONTRAST]
+    @cached_property
+    def apart(self) -> dict[str, bool]:
+        """Whether the data tell each thruster from all others."""
+        return apart(self.plain.objective, self.plain.minimum.z)
 
     @property
     def alike(self) -> tuple[Of, ...]:
         """The groups of commanded thrusters along one axis that the data do not tell apart."""
         layout, logs = self.plain.objective.table.layout, self.plain.objective.logs
-        unknown = self.contrasts.keys() - {*self.apart}
+        unknown = {name for name, is_apart in self.apart.items() if not is_apart}
         same = thrusters_alike(layout, [*map(commands_of, logs)])
         names = {name for group in same if unknown.intersection(group) for name in group}
         along = [layout.thrusters_along(axis) for axis in layout.bare_axes]
@@ -513,16 +512,9 @@ class StructureSearch:
                 if one.has_times:
                     if times := times_of(objective, self.plain.minimum.z, of):
                         found[kind, tuple(times)] = (tuple(times.values()),)
-                elif not one.is_contrast or {*of} <= {*self.apart}:
+                elif not one.is_contrast or all(map(self.apart.get, of)):
                     found[kind, of] = one.starts or (None,)
         return found
-
-    @cached_property
-    def contrasts(self) -> dict[str, float]:
-        """The standard error of the health of each thruster by the data alone; empty if a motion diverges."""
-        with suppress(DivergedError):
-            return contrasts(self.plain.objective, self.plain.minimum.z)
-        return {}
 
     @property
     def _smaller(self) -> list[Starts]:

@@ -32,7 +32,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, SWAY, YAW, Axis
 from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.filter import DivergedError, Slow
-from rov_fmu.identify.likelihood.hypotheses import Starts, applied
+from rov_fmu.identify.likelihood.hypotheses import Starts, apart, applied
 from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
@@ -102,11 +102,10 @@ def slips(
     best: Array,
     errors: Array,
     starts: Starts | None = None,
-    apart: Collection[str] = (),
 ) -> tuple[tuple[Slip, ...], float]:
     """Return the mistakes that explain the logs much better, and the errors R over 10 s that the best of them leaves.
 
-    R is infinite where reversed or swapped commands of the thrusters `apart` may explain a sign as well.
+    R is infinite where reversed or swapped commands of thrusters that the data tell apart may explain a sign as well.
 
     `best` is where J is least for the files as they stand, `errors` are the standard errors there, and `starts` has the
     hypotheses about the structure that won. Where several explanations are about as good, each is told for its files.
@@ -151,7 +150,8 @@ def slips(
     )
     layout = objective.table.layout
     axes = {axis for one, scale in first if scale < 0.0 and (axis := one.channel.quantity.axis)}
-    is_told = first in fits and not any(t.name in apart for axis in axes for t in layout.thrusters_along(axis))
+    drivers = {thruster.name for axis in axes for thruster in layout.thrusters_along(axis)}
+    is_told = first in fits and not (drivers and any(map(apart(objective, best).get, drivers)))
     return tuple(mistakes), worst(structure(*fits[first])) if is_told else inf
 
 

@@ -674,7 +674,7 @@ def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_
 def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.MonkeyPatch) -> StructureSearch:
     """A search that holds a fit, and in which nothing asks for another one."""
     search = StructureSearch(plain)
-    search.suspects, search.contrasts, search.now = {REVERSED: (None,), DEAD: (0.5,)}, {}, now
+    search.suspects, search.apart, search.now = {REVERSED: (None,), DEAD: (0.5,)}, {}, now
     search.tried[frozenset(now.starts)] = now
     monkeypatch.setattr(search, "_round", list)
     return search
@@ -693,10 +693,11 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
         return StructureFit(starts, reversed_model, cast("Minimum", None), score, score)
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
+    for name in ("fitted", "refitted"):
+        monkeypatch.setattr(f"rov_fmu.identify.likelihood.search.{name}", fit)
     monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
     search = StructureSearch(fit(None, {}))
-    search.suspects, search.contrasts = {REVERSED: (None,), DEAD: (0.5,)}, {}
+    search.suspects, search.apart = {REVERSED: (None,), DEAD: (0.5,)}, {}
     search.now = fit(None, {DEAD: 0.5, REVERSED: None})
     search.tried[frozenset(search.now.starts)] = search.now
     search.run()
