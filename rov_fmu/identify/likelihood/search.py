@@ -535,8 +535,7 @@ class StructureSearch:
     def _round(self) -> list[StructureFit]:
         """Return fits with other sets of hypotheses, where the alarm asks for them.
 
-        Without an alarm, what does not change the thrust begins at the last fit: the vehicle is near. If one set has
-        won by far, sets whose J falls much less before any fit wait for the next round.
+        If one set has won by far, sets whose J falls much less before any fit wait for the next round.
         """
         fits, won = list[StructureFit](), -inf
         for starts, gain in [*self._promising()]:
@@ -544,10 +543,7 @@ class StructureSearch:
                 continue
             enough = max(one.quick for one in (self.now, *fits)) - WINS
             self.on_fit()
-            if gain == -inf and worst(self.now.misfits) <= ALARM:
-                fit = refitted(self.plain.objective, starts, self._prior(starts), self.now)
-            else:
-                fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
+            fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
             # Without a fit, the evidence of thinned logs is not enough.
             is_worse = fit.score < self.now.score if fit else enough < self.now.quick
             if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():

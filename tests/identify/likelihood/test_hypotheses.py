@@ -693,8 +693,7 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
         return StructureFit(starts, reversed_model, cast("Minimum", None), score, score)
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
-    for name in ("fitted", "refitted"):
-        monkeypatch.setattr(f"rov_fmu.identify.likelihood.search.{name}", fit)
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
     monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
     search = StructureSearch(fit(None, {}))
     search.suspects, search.apart = {REVERSED: (None,), DEAD: (0.5,)}, {}
