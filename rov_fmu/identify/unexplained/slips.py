@@ -103,7 +103,7 @@ def slips(
     errors: Array,
     starts: Starts | None = None,
 ) -> tuple[tuple[Slip, ...], float]:
-    """Return the mistakes that explain the logs much better, and the errors R over 10 s that the best of them leaves.
+    """Return the mistakes that explain the logs much better, and the error R that the best leaves along its axes.
 
     R is infinite where reversed or swapped commands of thrusters that the data tell apart may explain a sign as well.
 
@@ -152,7 +152,10 @@ def slips(
     axes = {axis for one, scale in first if scale < 0.0 and (axis := one.channel.quantity.axis)}
     drivers = {thruster.name for axis in axes for thruster in layout.thrusters_along(axis)}
     is_told = first in fits and not (drivers and any(map(apart(objective, best).get, drivers)))
-    return tuple(mistakes), worst(structure(*fits[first])) if is_told else inf
+    if not is_told:
+        return tuple(mistakes), inf
+    concerned = {one.channel.quantity.axis for one, _ in first}
+    return tuple(mistakes), worst({axis: one for axis, one in structure(*fits[first]).items() if axis in concerned})
 
 
 def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> Iterator[tuple[Axis, float, float]]:
