@@ -90,7 +90,7 @@ def build(
     - `on_content`: called once the content is made and the compilers begin.
     - `on_compiled`: called with the name of each platform that has been compiled.
 
-        build(load_vehicle(find_vehicle("videoray")), "videoray.fmu", platforms="host").path
+        rov_fmu.build_fmu(rov_fmu.load("videoray"), "videoray.fmu", platforms="host").path
 
     Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the

@@ -21,7 +21,7 @@ from platformdirs import user_cache_path
 from rov_fmu.c.own_files import own_folder
 from rov_fmu.io.child_process import cause, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
-from rov_fmu.io.messages import MOST, listed
+from rov_fmu.io.messages import MOST, RovError, listed
 from rov_fmu.io.paths import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
@@ -56,7 +56,7 @@ _NO_SPACE = ("No space left on device", "NoSpaceLeft", "FileTooBig", "File too l
 """What the compiler prints about a file that it could not write completely."""
 
 
-class BuildError(Exception):
+class BuildError(RovError):
     """An error that ends a build. Its text is one line, possibly followed by the compiler's own output."""
 
 
