@@ -249,7 +249,7 @@ def _interface() -> str:
             if kind == "class" and not members:
                 types.append(f"`{name}`")
                 continue
-            rows.append(_described(path, value) if kind != "data" else (f"`{path}`", _said_of_data(name)))
+            rows.append(_described(path, value) if kind != "data" else (f"`rov_fmu.{name}`", _said_of_data(name)))
             rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
         parts = [f"## {heading}", markdown(rows) if rows[1:] else "", f"Types: {', '.join(types)}." if types else ""]
         found.append("\n\n".join(filter(None, parts)))

@@ -60,6 +60,7 @@ if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
     from rov_fmu.study.run.run_study import study as run_study
     from rov_fmu.vehicle.shipped import SHIPPED, find_vehicle
+    from rov_fmu.vehicle.steady import Steady
     from rov_fmu.vehicle.uncertainty import Uncertainty
     from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
     from rov_fmu.vehicle.writer import write_tuned, write_vehicle
@@ -97,6 +98,7 @@ __all__ = [
     "RovVectorEnv",
     "SensorNoise",
     "Slip",
+    "Steady",
     "StepJacobian",
     "StudyError",
     "Target",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.messages import InputError, only, shown
 from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.steady import Steady, steady_with
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
 if TYPE_CHECKING:
@@ -257,10 +258,30 @@ class VehicleModel(Vehicle):
 
         Raises InputError if the vehicle has no such axis.
         """
+        return super().response(self._axis(axis), command)
+
+    def find(self, axis: Axis | str, velocity: float, inputs: Mapping[str, float] = _NONE) -> Steady:
+        """Return the command, thrust and electric power that hold a steady velocity along an axis alone.
+
+        - `axis`: the axis or its name.
+        - `velocity`: the velocity through the water, m/s or rad/s, with its sign.
+        - `inputs`: loads, N and N.m, and the voltage, V, where they are not the usual ones.
+
+            rov_fmu.load("bluerov2").find("surge", 1.0).thrust  # N
+
+        Raises InputError if no command gives this velocity, with the largest one in its direction.
+        """
+        kind = self._axis(axis)
+        if kind in self.unidentified:
+            raise InputError(f"{kind.name} was not identified, so no number of its motion is told")
+        return steady_with(self, kind, velocity, inputs)
+
+    def _axis(self, axis: Axis | str) -> Axis:
+        """Return an axis of the vehicle. Raises InputError if it has no axis of this name."""
         kinds = {name: kind.axis for name, kind in self.layout.by_name.items()}
         if isinstance(axis, str) and axis not in kinds:
             raise InputError(f"axis = {shown(axis)}: the vehicle has no such axis{only(axis, [*kinds])}")
-        return super().response(kinds[axis] if isinstance(axis, str) else axis, command)
+        return kinds[axis] if isinstance(axis, str) else axis
 
     def _all_inputs(self, inputs: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all inputs. What is kept between steps, such as commands that act, stays as it is."""

@@ -109,6 +109,7 @@ COMMANDS = [
     "fly",
     "identify",
     "inspect",
+    "list",
     "prove",
     "schema",
     "sdf",
