@@ -16,7 +16,7 @@ from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, VERDICT
-from rov_fmu.vehicle.steady import speed_table
+from rov_fmu.vehicle.steady import beyond_stated, speed_table
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
@@ -35,6 +35,7 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
         tested = [f"{name} from {ends[0]:.0%} to {ends[1]:.0%}" for name, ends in vehicle.tested.items()]
         holds += [f"Tests of each axis had commands of {listed(tested)}."] if tested else []
+    holds += beyond_stated(vehicle)
     holds += [
         f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)
     ]

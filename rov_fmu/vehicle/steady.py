@@ -6,7 +6,7 @@ from math import copysign, floor, isclose, isfinite, log10
 from types import MappingProxyType
 from typing import NamedTuple
 
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -14,6 +14,8 @@ _GRID = 20
 """The number of intervals of the commands from 0 to full command in which a speed is looked for."""
 _CLOSE, _MOST_TRIES = 1e-10, 200
 """The relative error of a speed at which the search ends, and the most commands that it tries."""
+_STATED = 0.1
+"""How far a top speed may differ from the one that is stated, relative to the larger one."""
 _MOST_ROWS = 6
 """The most speeds of a motion in the table."""
 _NONE: Mapping[str, float] = MappingProxyType({})
@@ -60,6 +62,26 @@ def _power(vehicle: Vehicle, held: Mapping[str, float]) -> float | None:
         given = sum(gain * fractions[name] for name, gain in layout.gains[thruster].items())
         power += table.voltage * table.current(given)
     return power
+
+
+def beyond_stated(vehicle: Vehicle) -> Iterator[str]:
+    """Yield a sentence for each top speed that differs from the one that somebody states of the real vehicle, with the
+    velocities at which the coefficients were measured."""
+    for name, stated in vehicle.stated.items():
+        axis = AXES[name]
+        if not vehicle.layout.signs(axis):
+            continue
+        velocity, unit = steady_at(vehicle, axis, 1.0).velocity, axis.unit
+        if isclose(velocity, stated.value, rel_tol=_STATED):
+            continue
+        measured = "it is not known up to which speed its coefficients were measured"
+        if stated.measured:
+            low, high = stated.measured
+            measured = f"its coefficients were measured between {low:g} and {high:g} {unit}"
+        yield (
+            f"At full command, {axis.name} {axis.positive} reaches {velocity:.2f} {unit}, and {stated.source} states "
+            f"{stated.value:g} {unit}; {measured}."
+        )
 
 
 class _Search:

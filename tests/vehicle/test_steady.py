@@ -1,17 +1,22 @@
 """What a steady speed takes: the command that gives it, the thrust against drag and loads, the electric power."""
 
 import re
+from dataclasses import replace
 from math import inf
+from pathlib import Path
 
 import pytest
 
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE
+from rov_fmu.fmu.card import card_text
 from rov_fmu.io.messages import InputError
+from rov_fmu.vehicle.description import StatedSpeed
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.steady import speed_table, steady_at
 from rov_fmu.vehicle.vehicle import Vehicle
+from tests.commands import BARE
 from tests.vehicles import VEHICLES
 
 DRIVEN = {name: one for name, one in VEHICLES.items() if any(one.layout.signs(axis) for axis in one.layout.bare_axes)}
@@ -108,3 +113,51 @@ def test_the_vehicles_that_ship_are_listed_with_their_descriptions(capsys: pytes
     said = capsys.readouterr().out
     for name in SHIPPED:
         assert re.search(rf"^{name} +{re.escape(rov_fmu.load(name).description)}$", said, re.MULTILINE)
+
+
+@pytest.mark.parametrize("share", [0.5, 0.92, 1.0, 1.08, 2.0])
+def test_another_top_speed_than_the_stated_one_is_told_where_it_is_flown(
+    share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rov = rov_fmu.load("videoray")
+    reached = rov.response("surge", 1.0)[0]
+    stated = StatedSpeed(value=share * reached, unit="m/s", source="the yard", measured=(0.3, 1.5))
+    path = tmp_path / "own.toml"
+    rov_fmu.write_vehicle(replace(rov, data=None, pictures=None, stated={"surge": stated}), path)
+    assert rov_fmu.load(path).stated == {"surge": stated}, "as it was written"
+    assert main(["fly", str(path), "-o", str(tmp_path / "fly.html")]) == 0
+    words = f"At full command, surge forward reaches {reached:.2f} m/s, and the yard states {stated.value:g} m/s; "
+    words += "its coefficients were measured between 0.3 and 1.5 m/s."
+    is_told = not 0.9 <= share <= 1.1
+    said = [
+        capsys.readouterr().err,
+        (tmp_path / "fly.html").read_text(encoding="utf-8"),
+        card_text(rov_fmu.load(path)).replace("\n  ", " "),
+    ]
+    assert [words in one.replace("\xa0", " ") for one in said] == [is_told] * 3
+
+
+@pytest.mark.parametrize(
+    ("stated", "reason"),
+    [
+        (
+            'sway = { value = 1.5, unit = "m/s", source = "x" }',
+            "sway: the vehicle has no such axis, only heave",
+        ),
+        ('yaw = { value = 1.5, unit = "m/s", source = "x" }', "must have the speed of yaw in rad/s, and not in m/s"),
+        (
+            'ahead = { value = 1.5, unit = "m/s", source = "x" }',
+            "must have speeds of surge, sway, heave",
+        ),
+        ('surge = { value = 0.0, unit = "m/s", source = "x" }', "surge.value = 0.0: must be"),
+    ],
+)
+def test_a_stated_speed_that_cannot_be_gives_one_line(
+    stated: str, reason: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(f"{BARE.read_text(encoding='utf-8')}\n[validity.stated]\n{stated}\n", encoding="utf-8")
+    assert main(["simulate", str(path), "--find", "surge=1"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "validity.stated" in line
+    assert reason in line
