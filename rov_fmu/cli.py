@@ -225,7 +225,7 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     started = perf_counter()
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
-    with compiling(chosen) as (begin, done):
+    with compiling() as (begin, done):
         built = build(
             loaded,
             platforms=chosen,

@@ -117,10 +117,6 @@ def check_names_and_keys(parts: Tables, lost: set[str], data: Toml) -> Iterator[
     yield from _check_keys(parts)
     if "axes" not in lost:
         yield from _check_cross(parts)
-        for name in parts.validity.stated if parts.validity else ():
-            if name not in (names := [axis.name for axis in parts.axis_tables]):
-                reason = f"the vehicle has no such axis, only {', '.join(names)}"
-                yield key_line(f"validity.stated.{name}", reason)
 
 
 # ---- Names and keys --------------------------------------------------------------------------------------------------
