@@ -15,6 +15,7 @@ import click
 from matplotlib.figure import Figure
 
 from docs import compared
+from rov_fmu import homes
 from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
@@ -248,10 +249,10 @@ def _interface() -> str:
             if kind == "class" and not members:
                 types.append(f"`{name}`")
                 continue
-            rows.append(_described(path, value) if kind != "data" else (f"`{path}`", _said_of_data(module, name)))
+            rows.append(_described(path, value) if kind != "data" else (f"`rov_fmu.{name}`", _said_of_data(name)))
             rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
-        also = f"\n\nTypes: {', '.join(types)}." if types else ""
-        found.append(f"## {heading}\n\n{markdown(rows)}{also}")
+        parts = [f"## {heading}", markdown(rows) if rows[1:] else "", f"Types: {', '.join(types)}." if types else ""]
+        found.append("\n\n".join(filter(None, parts)))
     return "\n\n".join(found)
 
 
@@ -270,8 +271,9 @@ def _described(name: str, value: Any) -> tuple[str, str]:
     return f"`{name}{arguments}`", _first_sentence(getdoc(value) or "")
 
 
-def _said_of_data(module: str, name: str) -> str:
-    """The first sentence of the text below an assignment of a module."""
+def _said_of_data(name: str) -> str:
+    """The first sentence of the text below an assignment of a public name."""
+    module, _ = homes()[name]
     (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(module)), re.MULTILINE | re.DOTALL)
     return _first_sentence(words)
 

@@ -1,4 +1,4 @@
-"""The command rov-fmu: build, simulate, fly, sitl, export, prove, study, identify, inspect, tune, schema, tables.
+"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, study, identify, inspect, tune, schema, tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -161,7 +161,7 @@ class _Commands(click.Group):
 def _commands(context: click.Context) -> None:
     """Make an FMU of an identified underwater vehicle (ROV).
 
-    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships.
+    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships, which `rov-fmu list` lists.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -225,7 +225,7 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     started = perf_counter()
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
-    with compiling(chosen) as (begin, done):
+    with compiling() as (begin, done):
         built = build(
             loaded,
             platforms=chosen,
@@ -256,6 +256,21 @@ def _print_built(built: "Built", seconds: float) -> None:
     paragraph(out, built.note)
     following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
     print_end(built.written, following)
+
+
+# ---- list ------------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("list")
+def _list() -> None:
+    """List the vehicles that ship."""
+    from rov_fmu.report.console import print_table, table
+    from rov_fmu.vehicle.vehicle import load_vehicle
+
+    found = table("", "VEHICLE", [], ["what it is"])
+    for name, path in SHIPPED.items():
+        found.add_row(name, load_vehicle(path).description)
+    print_table(found)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
@@ -295,16 +310,30 @@ def _print_built(built: "Built", seconds: float) -> None:
     metavar="[FILE.png]",
     help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
+@click.option(
+    "--find",
+    "wanted",
+    multiple=True,
+    metavar="AXIS=SPEED",
+    help="Print the command, thrust and electric power that hold a speed (m/s, rad/s) along an axis, such as "
+    "surge=1.0, in place of a simulation. It may be repeated.",
+)
 @_force_option()
-def _simulate(vehicle: Path, **options: Any) -> None:
-    """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
+def _simulate(vehicle: Path, wanted: tuple[str, ...], **options: Any) -> None:
+    """Simulate a vehicle without an FMU, or find the thrust for a speed. The default is the VideoRay Pro 4.
 
     Inputs that are not set have their usual values, and states start at 0. Without -o and --plot the values at the end
     are printed.
     """
-    from rov_fmu.interface.simulate_command import Options, simulate_vehicle
+    from rov_fmu.interface.simulate_command import Options, find_speeds, simulate_vehicle
 
-    simulate_vehicle(vehicle, Options(**options))
+    if not wanted:
+        simulate_vehicle(vehicle, Options(**options))
+        return
+    if others := [name for name, value in options.items() if value not in (None, False) and name != "settings"]:
+        option = {"commands": "input"}.get(others[0], others[0])
+        raise click.UsageError(f"simulate: --find simulates nothing: leave --{option} out")
+    find_speeds(vehicle, wanted, options["settings"])
 
 
 @contextmanager

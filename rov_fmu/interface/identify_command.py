@@ -7,12 +7,43 @@ from pathlib import Path
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.identify.result import Identification
+from rov_fmu.interface.arguments import checked_paths
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, is_mcap
-from rov_fmu.io.messages import InputError, Progress
+from rov_fmu.io.messages import InputError, Progress, silent
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.writer import check_report, vehicle_output
+
+
+def identify_folder(
+    tests: str | Path | Sequence[str | Path],
+    *,
+    base: str | Path | None = None,
+    output: str | Path | None = None,
+    report: str | Path | None = None,
+    mcap: str | Path | None = None,
+    force: bool = False,
+    on_progress: Progress = silent,
+) -> Identification:
+    """Identify a vehicle, as `rov-fmu identify` does.
+
+    - `tests`: a folder of tank tests or dive logs with its rov.toml, or one log or several of one folder.
+    - `base`: the vehicle to begin from, in place of that which rov.toml names: a name or a path.
+    - `output`, `report`, `mcap`: the vehicle file, the report and the MCAP file to write.
+    - `force`: True to replace files that rov-fmu did not write, or that have changed since.
+    - `on_progress`: called with the name of each step, and the share of its part of the work that is done.
+
+        found = rov_fmu.identify_folder("my_tests", output="my_rov.toml", report="my_rov.html")
+        rov_fmu.load(found.vehicle).response("surge", 0.3)  # m/s, s
+
+    Raises FileError, InputError, WriteError, and BuildError where the filter cannot be compiled.
+    """
+    paths = checked_paths("tests", tests)
+    given = [None if one is None else Path(one) for one in (output, report, mcap)]
+    found = find_vehicle(base) if base else None
+    return identify_tests(paths, *given, base=found, force=force, begin=lambda _: on_progress)[0]
 
 
 def identify_tests(

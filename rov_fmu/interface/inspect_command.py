@@ -5,11 +5,26 @@ from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.inspection.inspected import Inspected, inspect_logs
+from rov_fmu.identify.inspection import inspected as inspection
+from rov_fmu.identify.inspection.inspected import Inspected
+from rov_fmu.interface.arguments import checked_paths
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.folder import folder_and_files
+
+
+def inspect_logs(logs: str | Path | Sequence[str | Path]) -> Inspected:
+    """Return what logs contain, and what no fit can learn from them, as `rov-fmu inspect` does.
+
+    - `logs`: a folder, or one log or several of one folder. What cannot be read is among the warnings.
+
+        found = rov_fmu.inspect_logs("dive.csv")
+        found.warnings, found.undetermined, found.text  # sentences, and the draft of rov.toml
+
+    Raises FileError if no log can be read.
+    """
+    return inspection.inspect_logs(checked_paths("logs", logs))
 
 
 def inspect_tests(
@@ -21,7 +36,7 @@ def inspect_tests(
     written, each with what it replaced. Raises FileError, and WriteError if a file cannot be written.
     """
     check_targets([(report, PAGE)], paths, force=force)
-    inspected = inspect_logs(paths)
+    inspected = inspection.inspect_logs(paths)
     outputs = []
     if report:
         from rov_fmu.report.inspection_page import inspection_page  # imports Matplotlib, which takes a second

@@ -44,7 +44,41 @@ def moving(on_progress: Progress, step: str, low: float, high: float) -> Callabl
     return lambda count: on_progress(step, high - (high - low) * exp(-count / _USUAL_STEPS))
 
 
-class _LinesError(Exception):
+class RovError(Exception):
+    """Everything that rov-fmu raises of its own. The message is a line for each reason.
+
+    `except rov_fmu.RovError` catches them all:
+
+        RovError
+            BeyondError *
+            BuildError
+                OptionError
+            ChildError *
+                LimitError *
+            DivergedError *
+            ExpressionError *
+            FileError
+                DataFileError
+                    UnreadableFileError
+                NoResultsError
+                PlanError
+                VehicleFileError
+            InputError
+                UnknownNameError
+            LoadError *
+            ProofError
+            RunError *
+            StudyError
+            TimeError *
+            TuningError
+            WriteError
+
+    FileError, InputError, OptionError and TuningError are also a ValueError, UnknownNameError is a KeyError, and
+    WriteError an OSError. Those with a star are internal: they become one of the others before they reach a caller.
+    """
+
+
+class _LinesError(RovError):
     """An exception whose message has a line for each reason."""
 
     def __init__(self, *reasons: str) -> None:

@@ -35,7 +35,7 @@ else:
 class Strict(BaseModel):
     """A table of a TOML file. It may have no other keys, and no number in quotes. Editors show its docstrings."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True, defer_build=True)
 
     @staticmethod
     def hint(_key: str, /) -> str:

@@ -120,22 +120,25 @@ def parts() -> Iterator[Parts]:
 
 
 @contextmanager
-def compiling(platforms: Sequence[str]) -> Iterator[tuple[Callable[[], None], Callable[[str], None]]]:
+def compiling() -> Iterator[tuple[Callable[[Sequence[str]], None], Callable[[str], None]]]:
     """Show a part for the content of an FMU, and then one for each platform; these are compiled in parallel.
 
-    Yields the function to call when the compilers begin, and the one to call with each platform that is done. A pipe
-    gets a line for each of several platforms.
+    Yields the function to call with the platforms when the compilers begin, and the one to call with each that is done.
+    A pipe gets a line for each of several platforms.
     """
     with parts() as shown:
         if shown.is_shown:
             shown.begin("making the content")
 
-        def begin() -> None:
+        chosen: list[str] = []
+
+        def begin(platforms: Sequence[str]) -> None:
+            chosen.extend(platforms)
             if platforms:
                 shown.begin(*(f"compiling {name}" for name in platforms))
 
         def done(name: str) -> None:
-            if shown.is_shown or len(platforms) > 1:
+            if shown.is_shown or len(chosen) > 1:
                 shown.end(f"compiling {name}")
 
         yield begin, done

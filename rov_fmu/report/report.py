@@ -16,6 +16,7 @@ from rov_fmu.report.plots.logs import height_of, plot_log
 from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.steady import speed_table
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _SIZE = 3.7, 2.7
@@ -55,6 +56,8 @@ def report_page(results: Identification, on_progress: Progress = silent) -> str:
         picture=_picture(results, shown, partial(plot, "Main prediction", "log")) if shown else None,
         script=inline_script("plots.js"),
         card=card(results.vehicle),
+        speeds=[*speed_table(results.vehicle)],
+        layout=results.vehicle.layout,
         KNOTS=KNOTS,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,

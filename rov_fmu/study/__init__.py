@@ -1,8 +1,8 @@
 """Studies: many runs of an FMU with uncertain parameters, and their results as data frames.
 
-    from rov_fmu.study import study
+    import rov_fmu
 
-    results = study("plan.toml", "results")
+    results = rov_fmu.run_study("plan.toml", "results")
     results.runs, results.trajectories(), results.bands("u"), results.sensitivity("stopping_distance")
 
 Needs the extra `study`: pip install "rov-fmu[study]".

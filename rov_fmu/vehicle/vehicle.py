@@ -26,7 +26,7 @@ from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, o
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, parse_toml, problem_lines
 from rov_fmu.vehicle.checks import check_parts, no_thrust
-from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
+from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance, StatedSpeed
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Basis, Estimated, File, read_tables
@@ -106,6 +106,8 @@ class Vehicle:
     """The weakest and the strongest thruster command for which the model was identified."""
     tested: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """The commands along axes between which these were tested, by the names of the axes."""
+    stated: Mapping[str, StatedSpeed] = field(default_factory=dict)
+    """The top speeds that others state of the real vehicle, by the names of the axes."""
     alternatives: Mapping[str, Alternative] = field(default_factory=dict)
     """Other sets of published coefficients, by a name for each set."""
     data: Path | None = None
@@ -527,6 +529,7 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
         },
         command_range=validity.command_range,
         tested=validity.tested,
+        stated=validity.stated,
         alternatives=file.alternatives,
         limits=validity.limits,
         provenance=file.provenance,

@@ -201,8 +201,8 @@ def test_a_pipe_gets_a_line_again_and_again(
 
 def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.CaptureFixture[str]) -> None:
     for platforms in (["linux"], ["linux", "windows"]):
-        with compiling(platforms) as (begin, done):
-            begin()
+        with compiling() as (begin, done):
+            begin(platforms)
             for name in platforms:
                 done(name)
         found = capsys.readouterr().err

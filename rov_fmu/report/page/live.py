@@ -23,6 +23,7 @@ from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
 from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
+from rov_fmu.vehicle.steady import beyond_stated
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
@@ -149,7 +150,9 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mappin
     Raises DataFileError.
     """
     vehicle = flown[0].vehicle
-    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown, recording), compact=compact)
+    beyond = [*beyond_stated(vehicle)]
+    shown = live(flown, recording)
+    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=shown, beyond=beyond, compact=compact)
 
 
 def _data(flown: Flown) -> dict[str, Any]:

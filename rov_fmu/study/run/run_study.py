@@ -34,7 +34,7 @@ def study(
     - `scheduler`: the address of a Dask scheduler that is used instead.
     - `on_progress`: called with the state of the runs.
 
-        study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
+        rov_fmu.run_study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
 
     Worker processes import the calling script, so a script must call this below `if __name__ == "__main__":`.
 

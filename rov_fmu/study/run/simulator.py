@@ -14,7 +14,7 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
-from rov_fmu.io.messages import brief, reason_of
+from rov_fmu.io.messages import RovError, brief, reason_of
 from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
 from rov_fmu.study.plan.model import TYPES, Model, Variable
 from rov_fmu.study.plan.plan import Plan
@@ -23,7 +23,7 @@ _Call = Callable[..., int]
 """A function of the FMU, which returns a status."""
 
 
-class LoadError(Exception):
+class LoadError(RovError):
     """The FMU cannot be instantiated on this machine."""
 
 
@@ -207,7 +207,7 @@ def _loading() -> Iterator[None]:
         os.chdir(here)
 
 
-class _FailedError(Exception):
+class _FailedError(RovError):
     """A call of the FMU failed."""
 
 
