@@ -137,10 +137,21 @@ def test_what_is_told_takes_the_place_of_a_question_mark_alone(own: str) -> None
     assert all(kept[name] == value or kept[name].items() >= value.items() for name, value in numbers.items())
 
 
+@pytest.mark.parametrize("draft", [DRAFT, TOLD])
 @pytest.mark.parametrize(
-    "own", ["axes = 3", 'columns = "x"\nvehicle = []', "dives.a = 3", "dives = []", "[dives.a]\nfiles = 3"]
+    "own",
+    [
+        *("axes = 3", 'columns = "x"\nvehicle = []', "dives.a = 3", "dives = []", "[dives.a]\nfiles = 3"),
+        *('thruster = "?"', 'body = "?"', '[curves.all]\nthrust = "?"\nT = 3.0', 'thruster = [3, "A"]'),
+    ],
 )
-def test_a_key_of_a_wrong_type_stays_as_it_is(own: str) -> None:
-    text = completed(own, lacking(own, DRAFT, has_vehicle=False))
+def test_a_key_of_a_wrong_type_stays_as_it_is(own: str, draft: str) -> None:
+    text = completed(own, lacking(own, draft, has_vehicle=False))
     assert tomllib.loads(own).items() <= tomllib.loads(text).items() or "dives" in own
-    assert lacking(text, DRAFT, has_vehicle=False) == ""
+    assert lacking(text, draft, has_vehicle=False) == ""
+
+
+def test_thrusters_without_a_name_of_their_own_stay() -> None:
+    own = '[[thruster]]\nname = [1]\ndirection = "?"\n'
+    after = tomllib.loads(completed(own, lacking(own, TOLD, has_vehicle=False)))
+    assert [one["name"] for one in after["thruster"]] == [[1], "A", "B"]

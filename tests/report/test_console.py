@@ -9,7 +9,7 @@ from time import sleep
 
 import pytest
 from rich.console import Console
-from rich.progress import Progress, TextColumn
+from rich.progress import TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
@@ -35,7 +35,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     print_table(found, out)
     paragraph(out, FOREIGN)
     out.print(FOREIGN)
-    display = Progress(TextColumn("{task.description}", markup=False), console=out)
+    display = Display(TextColumn("{task.description}", markup=False), console=out)
     shown = Parts(display)
     shown.begin(FOREIGN)(FOREIGN, 0.5)
     shown.print(FOREIGN)
@@ -222,13 +222,14 @@ def test_what_is_left_becomes_smaller_until_the_next_step_is_done(
 def test_an_answer_takes_the_place_of_the_one_before(capsys: pytest.CaptureFixture[str]) -> None:
     """In a pipe, each has a line."""
     answers = ["heave 0.5 m/s at 50%, fits the depth to 9 cm", "heave 0.46 m/s at 50%, fits the depth to 2 cm"]
-    display = Display(console=Console(file=io.StringIO(), width=100))
+    out = io.StringIO()
+    display = Display(console=Console(file=out, width=100))
     for shown in (Parts(display), Parts(None)):
         for answer in answers:
             shown.tell("heave", answer)
     assert capsys.readouterr().err == "".join(f"rov-fmu: so far: {answer}\n" for answer in answers)
     display.print(*display.get_renderables())
-    assert re.findall("so far: .*", display.console.file.getvalue()) == [f"so far: {answers[-1]}"]
+    assert re.findall("so far: .*", out.getvalue()) == [f"so far: {answers[-1]}"]
 
 
 def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.CaptureFixture[str]) -> None:

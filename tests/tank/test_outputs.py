@@ -24,7 +24,7 @@ def held(rng: np.random.Generator, count: int) -> Array:
 def dive(effects: dict[Axis, list[float]], names: str, inputs: Array, seed: int, shown: list[str]) -> Log:
     """Return a log of a vehicle with drag, whose axes accelerate by these effects of the outputs at full command."""
     rng = np.random.default_rng(seed)
-    quantities = {}
+    quantities: dict[str, Array] = {}
     for axis, by in effects.items():
         push = (0.7 * np.abs(inputs) + 0.3) * inputs @ np.array(by)
         drag = 4.0 if axis is YAW else 1.0

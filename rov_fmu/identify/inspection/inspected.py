@@ -25,6 +25,7 @@ from rov_fmu.tank.inspection.draft import (
     completed,
     dives,
     draft,
+    is_open,
     lacking,
     likely_vehicle,
 )
@@ -148,7 +149,8 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     if "thruster" in document:
         likely = replace(likely, base="")
     name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
-    found = NOTHING_MOVED if likely.base else moved(_dives(path, inspections))
+    is_known = likely.base or not is_open(document.get("base", "?")) or not EXTERNAL.isdisjoint(likely.thrusters)
+    found = NOTHING_MOVED if is_known else moved(_dives(path, inspections))
     has_vehicle = is_described or _has_form_of_paper(described, likely)
     for _ in range(2):  # thrusters that are completed tell which axes they drive
         text = draft(name, inspections, headers, likely, _guess(found, described.description, document))

@@ -138,16 +138,21 @@ def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     files = [name for names in dives if isinstance(names, list) for name in names]
     told = tomlkit.document()
     for name, table in more.items():
-        if name == "thruster" and (thrusters := _lacking_thrusters(document.get(name), table)):
-            told.add(name, thrusters)
+        if isinstance(table, AoT) and name in document:
+            if thrusters := _lacking_thrusters(document[name], table):
+                told.add(name, thrusters)
             continue
         if not isinstance(table, AbstractTable) or not isinstance(document.get(name, {}), dict):
             is_missing = name not in document and not (has_vehicle and name in _HARDWARE)
-            if is_missing or _is_told(document.get(name), table):
+            if is_missing or (not isinstance(table, AbstractTable) and _is_told(document.get(name), table)):
                 told.add(name, table)
             continue
         there = tables.get(name, {})
-        keys = {key: value for key, value in table.items() if key not in there or _is_told(there[key], value)}
+        keys = {
+            key: value
+            for key, value in table.items()
+            if key not in there or (not isinstance(value, Table) and _is_told(there[key], value))
+        }
         if has_vehicle and name in _HARDWARE:
             added = {"body": body, "axes": table if "thruster" in document else ()}.get(name, ())
             keys = {key: value for key, value in keys.items() if key in there or key in added}
@@ -177,7 +182,7 @@ def _lacking_thrusters(own: object, draft: AoT) -> AoT | None:
     as long as it leaves others open; None if it lacks nothing."""
     if not isinstance(own, list) or not is_open(own):
         return None
-    by_name = {one.get("name"): one for one in own if isinstance(one, dict)}
+    by_name = _by_name(own)
     told = tomlkit.aot()
     for thruster in draft:
         there = by_name.get(thruster["name"])
@@ -191,6 +196,12 @@ def _lacking_thrusters(own: object, draft: AoT) -> AoT | None:
             for key, value in ({"name": thruster["name"]} | keys).items():
                 rest.add(key, value)
     return told or None
+
+
+def _by_name(thrusters: Iterable[Any]) -> dict[str, Any]:
+    """Return thrusters by their names, without those that have none."""
+    tables = (one for one in thrusters if isinstance(one, Mapping))
+    return {one["name"]: one for one in tables if isinstance(one.get("name"), str)}
 
 
 def completed(own: str, lacks: str) -> str:
@@ -239,7 +250,7 @@ def _put(table: Any, key: str, value: Any) -> None:
 
 def _complete_thrusters(own: Any, more: AoT) -> None:
     """Give thrusters in any form the keys that they lack, and add those that are not there."""
-    by_name = {one.get("name"): one for one in own if isinstance(one, Mapping)}
+    by_name = _by_name(own)
     for thruster in more:
         if there := by_name.get(thruster["name"]):
             for key, value in thruster.items():
