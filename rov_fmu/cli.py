@@ -685,7 +685,9 @@ def _identify(
         _inspect_logs(tests, report, drafts=drafts, force=force)
         return
     with parts() as shown:
-        identification, files = identify_tests(tests, output, report, mcap, base=base, force=force, begin=shown.begin)
+        identification, files = identify_tests(
+            tests, output, report, mcap, base=base, force=force, begin=shown.begin, on_answer=shown.tell
+        )
     print_identification(identification)
     name = identification.vehicle.identifier
     given = ["--base", shipped_name(base) or base] if base else []

@@ -113,7 +113,7 @@ COMMANDS = {key: command for key, command in WRITING.items() if key[0] not in ("
 
 def without_progress(err: str) -> str:
     """Return what a command printed on stderr, without the lines about parts and runs that are done."""
-    is_done = r": done in [\d.]+ s|so far(?:, about .* left)?\)|[\d,]+/[\d,]+ runs, .*"
+    is_done = r": done in [\d.]+ s|so far(?:, about .* left)?\)|so far: .*|[\d,]+/[\d,]+ runs, .*"
     return re.sub(rf"^rov-fmu: .*(?:{is_done})\n", "", err, flags=re.M)
 
 

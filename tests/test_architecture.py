@@ -61,6 +61,7 @@ LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/equation": 13,
     "rov_fmu/fmu": 13,
+    "rov_fmu/identify": 13,
     "rov_fmu/identify/likelihood": 13,
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,

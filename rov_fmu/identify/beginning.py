@@ -33,14 +33,13 @@ from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
+from rov_fmu.vehicle.full_thrust import USUAL_SQUARE
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _QUADRATIC = 0.7
 """The share of the quadratic drag at a large velocity, where nothing else is known."""
 _SAG = 0.03 * 0.9
 """Thrust may depend on a voltage of which nine tenths change by more than this, relatively: 3 % in a steady fall."""
-_SQUARE = 0.8
-"""The usual share of the thrust at full command that grows with the square of the command."""
 _ADDED = 1.5
 """The effective inertia relative to that of the dry vehicle, where no added mass is known."""
 _LEAST_FORCE = 1e-6
@@ -350,9 +349,9 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
         return np.asarray(whole * np.where(is_back, ratio, 1.0) * (share * c * c + (1.0 - share) * c))
 
     def residuals(x: Array) -> Array:
-        return np.array([*(force(x) - F) / largest / 0.003, (x[1] - _SQUARE) / 0.3, x[2] / 0.5])
+        return np.array([*(force(x) - F) / largest / 0.003, (x[1] - USUAL_SQUARE) / 0.3, x[2] / 0.5])
 
-    start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), _SQUARE, 0.0]
+    start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), USUAL_SQUARE, 0.0]
     fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
     values: dict[str, float] = {}
     for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.progress import OnAnswer
 from rov_fmu.identify.result import Identification
 from rov_fmu.interface.arguments import checked_paths
 from rov_fmu.io.file_kinds import PAGE, VEHICLE_FILE, is_mcap
@@ -55,6 +56,7 @@ def identify_tests(
     base: Path | None = None,
     force: bool,
     begin: Callable[[str], Progress],
+    on_answer: OnAnswer | None = None,
 ) -> tuple[Identification, dict[Path, str]]:
     """Identify a vehicle from a folder of tank tests, or from logs in one folder, and write the files that are asked
     for.
@@ -63,7 +65,8 @@ def identify_tests(
     vehicle to begin from that rov.toml names. Without a rov.toml, the vehicle that the logs seem to be of is assumed.
 
     `force` allows replacing files that `identify` did not write, or that were changed since. `begin` is called with the
-    name of each part of the work, and returns the function that takes the progress of this part.
+    name of each part of the work, and returns the function that takes the progress of this part. `on_answer` is called
+    with each axis and what is known about it so far.
 
     Returns the identification, and the files that were written, each with what it replaced. Raises FileError. Raises
     WriteError if a file cannot be written; most such cases are found before the work begins.
@@ -83,7 +86,7 @@ def identify_tests(
     folder, files = folder_and_files(paths)
     draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
     tests = load_tests(folder, check_outputs, base, files, draft)
-    identification = identify(tests, begin("identifying the vehicle"))
+    identification = identify(tests, begin("identifying the vehicle"), on_answer)
     outputs = []
     if vehicle:
         identified = identification.vehicle

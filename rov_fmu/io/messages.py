@@ -6,7 +6,6 @@ import shutil
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
-from math import exp
 from pathlib import Path
 from textwrap import wrap
 
@@ -20,9 +19,6 @@ _MOST_NAMES = 20
 NO_FILE = "there is no such file"
 """The reason if a file is missing."""
 
-_USUAL_STEPS = 5.0
-"""The number of steps with which most of a part of the work is done whose number of steps is not known."""
-
 Progress = Callable[[str, float], None]
 """A function that is called with the name of the next step and the share of the work that is done, from 0 to 1."""
 
@@ -34,14 +30,6 @@ def silent(_step: str, _share: float) -> None:
 def part(on_progress: Progress, low: float, high: float) -> Progress:
     """Return the progress of a part of the work, from the share `low` to the share `high` of all of it."""
     return lambda step, share: on_progress(step, low + (high - low) * share)
-
-
-def moving(on_progress: Progress, step: str, low: float, high: float) -> Callable[[int], None]:
-    """Return the progress of a part of the work whose number of steps is not known: a function of their count.
-
-    The share comes nearer and nearer to `high`: it never stands still.
-    """
-    return lambda count: on_progress(step, high - (high - low) * exp(-count / _USUAL_STEPS))
 
 
 class RovError(Exception):

@@ -27,7 +27,7 @@ from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, SPAN
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed, shown
-from rov_fmu.io.toml_file import Finite, Strict
+from rov_fmu.io.toml_file import AS_TUPLE, Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
 from rov_fmu.tank.channels import Topic, frames_of
@@ -71,6 +71,13 @@ class LogKeys(Strict):
     """The distance from the neutral pulse to full thrust, µs."""
     wrench: bool = False
     """True where the commands are forces and moments on the body, although the vehicle has thrusters."""
+    reversed: Annotated[tuple[str, ...], AS_TUPLE] = ()
+    """The thrusters that push against their directions at a positive command, whatever the parameters of an autopilot
+    tell, by name."""
+
+    def signs(self, thrusters: Sequence[str]) -> Array:
+        """Return -1 for each thruster that is reversed, and 1 for the others."""
+        return np.array([-1.0 if name in self.reversed else 1.0 for name in thrusters])
 
 
 NO_KEYS = LogKeys()

@@ -106,7 +106,7 @@ def _log(
     if series:
         rows, values = in_rows(series)
         thrusters, fractions = thruster_commands(layout, values)
-        commands = Commands.of_rows(thrusters, rows, fractions, source)
+        commands = Commands.of_rows(thrusters, rows, fractions * keys.signs(thrusters), source)
     unread = content.unread | described(topic for topic in piece.topics if topic.source.topic not in used)
     return Log(
         file,

@@ -8,7 +8,8 @@ from pathlib import Path
 from time import sleep
 
 import pytest
-from rich.progress import Progress, TextColumn
+from rich.console import Console
+from rich.progress import TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
@@ -17,7 +18,7 @@ from rov_fmu.prove.claims import CLAIMS, Proof
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_claims, print_end, print_table, table
-from rov_fmu.report.progress import Parts, StudyParts, compiling, parts
+from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -34,7 +35,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     print_table(found, out)
     paragraph(out, FOREIGN)
     out.print(FOREIGN)
-    display = Progress(TextColumn("{task.description}", markup=False), console=out)
+    display = Display(TextColumn("{task.description}", markup=False), console=out)
     shown = Parts(display)
     shown.begin(FOREIGN)(FOREIGN, 0.5)
     shown.print(FOREIGN)
@@ -154,7 +155,7 @@ class Runs:
 
 
 def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
-    display = Progress()
+    display = Display()
     shown = Parts(display)
     assert shown.is_shown
     shown.begin("first")("its step", 0.25)
@@ -197,6 +198,38 @@ def test_a_pipe_gets_a_line_again_and_again(
     assert "what the workers do" not in text
     sleep(0.1)
     assert not capsys.readouterr().err
+
+
+def test_what_is_left_becomes_smaller_until_the_next_step_is_done(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A quarter is done after 10 s, so 30 s are left. A step that takes longer leaves something to the end."""
+    now, left = [0.0], []
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: now[0])
+    shown = Parts(None)
+    show = shown.begin("work")
+    for time, share in ((10.0, 0.25), (10.0, 0.25), (25.0, 0.25), (80.0, 0.25), (90.0, 0.9)):
+        now[0] = time
+        show("a step", share)
+        shown.print_running()
+        left += re.findall(r"about (\d+) s left", capsys.readouterr().err)
+    seconds = [*map(int, left)]
+    assert seconds[:2] == [30, 30]
+    assert 30 > seconds[2] > seconds[3] > 0
+    assert seconds[4] == 10
+
+
+def test_an_answer_takes_the_place_of_the_one_before(capsys: pytest.CaptureFixture[str]) -> None:
+    """In a pipe, each has a line."""
+    answers = ["heave 0.5 m/s at 50%, fits the depth to 9 cm", "heave 0.46 m/s at 50%, fits the depth to 2 cm"]
+    out = io.StringIO()
+    display = Display(console=Console(file=out, width=100))
+    for shown in (Parts(display), Parts(None)):
+        for answer in answers:
+            shown.tell("heave", answer)
+    assert capsys.readouterr().err == "".join(f"rov-fmu: so far: {answer}\n" for answer in answers)
+    display.print(*display.get_renderables())
+    assert re.findall("so far: .*", out.getvalue()) == [f"so far: {answers[-1]}"]
 
 
 def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.CaptureFixture[str]) -> None:

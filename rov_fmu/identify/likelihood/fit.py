@@ -30,9 +30,9 @@ from rov_fmu.identify.likelihood.search import (
     with_shared,
 )
 from rov_fmu.identify.likelihood.solve import MOST_STEPS, QUICK, Minimum, evidence, evidence_at, minimise, scaled
+from rov_fmu.identify.progress import Work
 from rov_fmu.identify.result import KEPT
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
@@ -101,7 +101,7 @@ class Fit:
         return (low, high) if low < high else (max(low - 0.05, 0.0), min(high + 0.05, 1.0))
 
 
-def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], on_progress: Progress = silent) -> Fit:
+def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], work: Work | None = None) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
     A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
@@ -110,10 +110,11 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     model = Model(known, logs, rows)
     quick, full = model.objective(thinned=True), model.objective()
     table = full.table
-    ends, is_enough = _from_starts(quick, on_progress)
-    show = moving(on_progress, "all samples", 0.3, 0.6)
-    near = minimise(full, scaled(full, ends[0].z), show, last=False)
-    tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
+    work = work or Work()
+    ends, is_enough = _from_starts(quick, work)
+    near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), last=False)
+    work.fits(full, near)
+    tried, show_tried = count(), work.steps("hypotheses")
 
     def search(objective: Objective, numbers: Mapping[int, float]) -> Minimum:
         show_tried(next(tried))
@@ -126,20 +127,21 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
     adopted = (*first, *explained.adopted)
     model, full, near = explained.trial.model, explained.trial.objective, explained.trial.minimum
     known = model.known
-    for n, curve in enumerate(known.measured_curves):
+    if adopted:
+        work.fits(full, near)
+    for curve in known.measured_curves:
         other, needed = replace(known, bent=known.bent | {curve}), evidence_at(full, near) + KEPT
         objective = replace(model, known=other).objective()
 
         def bends(value: float, information: Array, objective: Objective = objective, needed: float = needed) -> bool:
             return evidence(objective, value, information) > needed
 
-        low, high = (0.7 + 0.1 * m / len(known.measured_curves) for m in (n, n + 1))
-        show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
+        show = work.steps("shape of the thrust", f"the shape of the thrust of {curve}")
         found = minimise(objective, near.z, show, enough=QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
             known, full, near = other, objective, minimise(objective, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    on_progress("exact derivatives", 0.8)
+    work.steps("exact derivatives")(0)
     best = minimise(full, scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
@@ -152,8 +154,8 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
         difference = 0.0
     measured, told, least = known.bent.intersection(known.measured_curves), full, best
     if measured < known.bent:
-        told, least = _less_bent(model, known, measured, best, on_progress)
-    file = _less_bent(model, known, frozenset(), least, on_progress) if measured else (told, least)
+        told, least = _less_bent(model, known, measured, best, work)
+    file = _less_bent(model, known, frozenset(), least, work) if measured else (told, least)
     misfits = with_shared(known.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
     unseen = unseen_errors(told, least.z, held, misfits)
@@ -174,26 +176,26 @@ def fit_all(known: Prior, logs: Sequence[SampledLog], rows: Sequence[TableRow], 
 
 
 def _less_bent(
-    model: Model, known: Prior, bent: frozenset[str], near: Minimum, on_progress: Progress
+    model: Model, known: Prior, bent: frozenset[str], near: Minimum, work: Work
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
     objective = replace(model, known=replace(known, bent=bent)).objective()
-    show = moving(on_progress, "quadratic thrust", 0.82, 0.88)
+    show = work.steps("quadratic thrust")
     return objective, minimise(objective, near.z, show, near=near.data, enough=QUICK)
 
 
-def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
+def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
         is_enough = len(ends) == n and not any(_is_loud(quick.table, end.z) for end in ends)
         if ends and (words is _STARTS[-1] or is_enough):
             break
-        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
-            ends.append(_least(quick, start_of(quick, n), show))
+            ends.append(_least(quick, start_of(quick, n), work.steps(words)))
         except DivergedError:
             continue
+        work.fits(quick, min(ends, key=lambda end: end.value))
     if not ends:
         raise DivergedError
     return sorted(ends, key=lambda end: end.value), is_enough
