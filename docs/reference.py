@@ -60,9 +60,9 @@ def tables() -> dict[str, Table]:
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
-    kept = gates.stages()
-    found |= {"gates": gates.gates(kept), "strangers": gates.by_kind(kept[-1:])}
-    found["hidden"] = gates.by_kind(kept[-1:], hidden=True)
+    kept = gates.stages()[-1:]
+    by_group = gates.by_kind(kept)[: 1 + len(gates.GROUPS)]
+    found |= {"gates": gates.gates(kept), "strangers": [(name, *cells) for name, _, *cells in by_group]}
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
     plans: dict[str, type[Strict]] = {
         "plan": Plan,

@@ -717,17 +717,13 @@ def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, forc
 
 
 def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, force: bool) -> None:
-    from rov_fmu.interface.inspect_command import inspect_tests
-    from rov_fmu.report.console import print_end, shell_words
+    from rov_fmu.interface.inspect_command import inspect_tests, next_steps
+    from rov_fmu.report.console import print_end
     from rov_fmu.report.console_log import print_inspected
 
     inspected, files = inspect_tests(tests, report, drafts=drafts, force=force)
     print_inspected(inspected, with_draft=not drafts)
-    is_new = inspected.path in files and not inspected.own
-    steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
-    if not (drafts or inspected.is_enough):
-        steps = [shell_words("rov-fmu", "inspect", *tests, "--draft")]
-    print_end(files, ", then ".join(steps))
+    print_end(files, ", then ".join(next_steps(inspected, tests, drafts=drafts)))
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

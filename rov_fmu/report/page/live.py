@@ -150,9 +150,18 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mappin
     Raises DataFileError.
     """
     vehicle = flown[0].vehicle
-    beyond = [*beyond_stated(vehicle)]
-    shown = live(flown, recording)
-    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=shown, beyond=beyond, compact=compact)
+    given = recording["commands"] if recording else {}
+    commands = [abs(value) for name, values in given.items() if name in vehicle.layout.commands for value in values]
+    return page(
+        "fly.html.j2",
+        vehicle=vehicle,
+        layout=vehicle.layout,
+        live=live(flown, recording),
+        beyond=[*beyond_stated(vehicle)],
+        compact=compact,
+        recording=recording,
+        strongest=max(commands, default=0.0),
+    )
 
 
 def _data(flown: Flown) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from rov_fmu.vehicle.uncertainty import NORMAL
 
 MOST_SAMPLES = 400
 """More samples than this would not be visible."""
-_PANEL, _EDGES = 1.1, 1.4
+_PANEL, _EDGES = 1.1, 1.8
 """The height of a panel, and of the commands with the axis of time, inches."""
 _NARROW = 5.0
 """In a figure of at most this width, inches, the legend has a second row."""
@@ -40,8 +40,8 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
     groups = grouped(((p.quantity, p.span), p) for p in predictions).values()
     channels = _unpredicted(log, predictions) if log and measured else []
     commands = log.commands if log else None
-    heights = [1.0] * (len(groups) + len(channels)) + [0.6] * bool(commands)
-    panels = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    count = len(groups) + len(channels) + bool(commands)
+    panels = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     for panel, own in zip(panels, groups, strict=False):
         for n, p in enumerate(own):
             _draw_prediction(panel, p, is_named=not n)
@@ -55,11 +55,11 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
         is_force = any(name.endswith("_ext") for name in values)
         named = {name if name == "command" or is_force else f"u_{name}": own for name, own in values.items()}
         draw_commands(panels[-1], time, named, "N, N.m" if is_force and _is_absolute(log) else "1")
+    panels[-1].set_xlabel("time (s)")
     if predictions:
         panels[-1].set_xlim(min(p.time[0] for p in predictions), max(p.time[-1] for p in predictions))
-    panels[-1].set_xlabel("time (s)")
-    columns = 4 if figure.get_figwidth() > _NARROW else 2
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
+        columns = 4 if figure.get_figwidth() > _NARROW else 2
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
 
 
 def _is_absolute(log: Log | None) -> bool:
