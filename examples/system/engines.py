@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from examples.systems import PARAMETER_SET
+from rov_fmu.bridges.system.ssp import PARAMETER_SET
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle

@@ -20,7 +20,7 @@ from examples.system.system import (
     parameter_sets,
     system_files,
 )
-from examples.systems import PARAMETER_SET
+from rov_fmu.bridges.system.ssp import PARAMETER_SET
 from tests.conftest import Made, without_page
 
 SETS = tuple(parameter_sets())

@@ -18,6 +18,7 @@ from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     AS_TUPLE,
     NOT_BLANK,
+    Beside,
     Finite,
     Name,
     Strict,
@@ -170,19 +171,10 @@ class Signal(Strict):
             last = time, value
 
 
-def _beside(name: str, info: ValidationInfo) -> str:
-    inside(folder_of(info), name)
-    return name
-
-
-_Beside = Annotated[str, AfterValidator(_beside)]
-"""A file in the folder of the plan, or in a folder inside it."""
-
-
 class InputFile(Strict):
     """A CSV file with the column `time` (s) and one for each input."""
 
-    path: _Beside
+    path: Beside
     """A file in the folder of the plan, or in a folder inside it."""
     between: Literal["steps", "ramps"] = "ramps"
     """steps: a row is held until the next one; ramps: there are straight lines between the rows."""
@@ -227,7 +219,7 @@ class Plan(Strict):
     """The heading of the page."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
     """An FMU for Co-Simulation in the folder of the plan. A plan has this or `vehicle`."""
-    vehicle: _Beside | None = None
+    vehicle: Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
     start_time: Finite = 0.0
     """s."""
@@ -246,7 +238,7 @@ class Plan(Strict):
     """The parameters of a run depend only on this and on the run's number."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
     """The method by which the values are drawn. Sobol indices need saltelli."""
-    vary_from: _Beside | None = None
+    vary_from: Beside | None = None
     """A vehicle file or name. Its coefficients vary with their errors and correlations, except for those in [vary] and
     [set]."""
     vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
