@@ -7,6 +7,7 @@ and the result does not depend on the order of the FMUs. Ecos and libcosim do th
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
 from rov_fmu.bridges.system.connections import Connection
@@ -39,15 +40,26 @@ class Master:
         self._wanted = {*read, *(c.start for c in connections)}
         self._fmus: dict[str, Any] = {}
 
-    def begin(self, values: Mapping[str, Mapping[str, Value]], step: float, stop: float) -> list[float]:
-        """Make and initialize the instances, and return the variables at the start. Raises RunError."""
+    def begin(
+        self,
+        values: Mapping[str, Mapping[str, Value]],
+        step: float,
+        stop: float,
+        start: float = 0.0,
+        inputs: Mapping[Name, Sequence[Any]] = MappingProxyType({}),
+    ) -> list[float]:
+        """Make and initialize the instances, and return the variables at the start. Raises RunError.
+
+        `inputs` has the values of inputs that are not connected, one for each step.
+        """
         self.end()
-        self._step, self._done = step, 0
+        self._start, self._step, self._done = start, step, 0
         for name in self._folders:
             with _reasons(name, "the initialization", self._folders):
-                self._initialize(name, values.get(name, {}), stop)
+                self._initialize(name, values.get(name, {}), start, stop)
         self._getters = self._calls("get", self._wanted)
         self._setters = self._calls("set", self._sources)
+        self._inputs, self._given = inputs, self._calls("set", inputs)
         self._now = self._outputs()
         return self._row()
 
@@ -55,7 +67,10 @@ class Master:
         """Take some steps, and return the variables after each one. Raises RunError."""
         rows = []
         for _ in range(count):
-            t = self._done * self._step
+            t = self._start + self._done * self._step
+            for name, names, put in self._given:
+                with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
+                    put([self._inputs[one][self._done] for one in names])
             for name, ends, put in self._setters:
                 with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
                     put(
@@ -85,13 +100,13 @@ class Master:
     def _version(self, name: str) -> int:
         return int(self._descriptions[name].fmiVersion[:1])
 
-    def _initialize(self, name: str, values: Mapping[str, Value], stop: float) -> None:
+    def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
         from fmpy.simulation import instantiate_fmu
 
         forget_message()
         fmu = instantiate_fmu(self._folders[name], self._descriptions[name], "CoSimulation", logger=keep_message)
         self._fmus[name] = fmu
-        times = {"startTime": 0.0, "stopTime": stop}
+        times = {"startTime": start, "stopTime": stop}
         if self._version(name) == 2:
             fmu.setupExperiment(**times)
             times = {}

@@ -118,6 +118,8 @@ class Structure:
     values: Mapping[str, Mapping[str, Value]]
     """The start values of each component."""
     connections: Sequence[Connection]
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """The paths of the FMUs in the archive that was read."""
 
 
 def read_ssp(path: Path) -> Structure:
@@ -139,11 +141,13 @@ def _structure(folder: Path, path: Path) -> Structure:
     root = _root(folder, _STRUCTURE)
     parts: dict[str, Part] = {}
     values: dict[str, dict[str, Value]] = {}
+    sources: dict[str, str] = {}
     for element in root.iterfind("{*}System/{*}Elements/*"):
         name = element.get("name", "")
         if etree.QName(element).localname != "Component":
             raise ValueError(f"{_STRUCTURE}: {shown(name)} is no component: systems in systems are not read")
-        part = parts[name] = read_part(path, _file(folder, element.get("source", "")).read_bytes(), f": {name}")
+        sources[name] = element.get("source", "")
+        part = parts[name] = read_part(path, _file(folder, sources[name]).read_bytes(), f": {name}")
         values[name] = {}
         for binding in element.iterfind("{*}ParameterBindings/{*}ParameterBinding"):
             source = binding.get("source")
@@ -156,7 +160,7 @@ def _structure(folder: Path, path: Path) -> Structure:
     if not parts:
         raise ValueError(f"{_STRUCTURE}: has no component")
     connections = [_connection(one, parts) for one in root.iterfind("{*}System/{*}Connections/{*}Connection")]
-    return Structure(parts, values, connections)
+    return Structure(parts, values, connections, sources)
 
 
 def _file(folder: Path, name: str) -> Path:

@@ -213,14 +213,16 @@ def _expression(text: str) -> str:
 
 
 class Plan(Strict):
-    """A study: many runs of one FMU."""
+    """A study: many runs of one FMU, or of one system of FMUs."""
 
     title: Name | None = None
     """The heading of the page."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
-    """An FMU for Co-Simulation in the folder of the plan. A plan has this or `vehicle`."""
+    """An FMU for Co-Simulation in the folder of the plan. A plan has this, `vehicle` or `system`."""
     vehicle: Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
+    system: Annotated[str, AfterValidator(_file)] | None = None
+    """A system (SSP) in the folder of the plan. Its variables are "component.variable"."""
     start_time: Finite = 0.0
     """s."""
     stop_time: Finite
@@ -298,7 +300,7 @@ class Plan(Strict):
         The number of runs is included only for a Latin hypercube. With other samplers, it does not change the values of
         a run.
         """
-        left_out = {"title", "fmu", "vehicle", "vary_from", "time_limit", "input_file"}
+        left_out = {"title", "fmu", "vehicle", "system", "vary_from", "time_limit", "input_file"}
         if self.sampler != "latin-hypercube":
             left_out.add("runs")
         mark = self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=left_out)
@@ -314,8 +316,9 @@ def load_plan(path: Path) -> Plan:
     """Read a plan. Contradictions between its keys are left to `prepare`. Raises PlanError."""
     check_suffix(path, PLAN, PlanError)
     plan = read_checked(path, PLAN, Plan, PlanError)
-    if (plan.fmu is None) == (plan.vehicle is None):
-        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *check_plan(plan))))
+    if [plan.fmu, plan.vehicle, plan.system].count(None) != 2:
+        words = "must have one of fmu, vehicle and system"
+        raise PlanError(*(f"{path}: {line}" for line in (words, *check_plan(plan))))
     return plan
 
 
