@@ -75,10 +75,10 @@ def table(read: Sequence[Name], step: float, rows: Array) -> bytes:
 
 
 def picture(structure: Structure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
-    """Return the plot of some variables, or of those that pass between the components and change: one panel a unit."""
+    """Return the plot of some variables, or of those that change and pass between the components: one panel a unit."""
     columns = {".".join(name): n for n, name in enumerate(read)}
-    passed = (".".join(one.start) for one in structure.connections)
-    chosen = names or [name for name in dict.fromkeys(passed) if name in columns and np.ptp(rows[:, columns[name]])]
+    passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns
+    chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
     units = {name: structure.parts[read[columns[name]][0]].unit(read[columns[name]][1])[0] for name in chosen}
     panels = grouped((unit, name) for name, unit in units.items())
 

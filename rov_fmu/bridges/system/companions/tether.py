@@ -1,9 +1,8 @@
 """A tether between two points, as a PythonFMU slave: MoorDyn's chain of masses and springs in flowing water.
 
 Each end is a port: place and velocity over ground go in, and the force that the tether exerts there comes out. An end
-that is not connected stays where it starts. The tether hangs at rest between its ends when the first step begins, and
-pulls from the second step on. Positions are north, east and down, with z = 0 at the surface; MoorDyn has x north, y
-west and z up.
+that is not connected stays where it starts. The tether hangs at rest when the first step begins, and pulls from the
+second step on. Positions are north, east and down from the surface; MoorDyn has x north, y west and z up.
 """
 
 from itertools import pairwise
@@ -14,8 +13,7 @@ from typing import Any
 
 from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
-SEGMENTS, SHOWN = 20, 11  # of the line, and the points of its shape
-LEVELS = range(1, 7)  # of the water
+SEGMENTS, SHOWN, LEVELS = 20, 11, range(1, 7)  # of the line, the points of its shape, the levels of the water
 SUBSTEP = 0.2  # of the time in which a wave of tension passes a segment: twice as much can be unstable
 ENDS = {"top": "upper", "bottom": "lower"}
 AXES = (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down"))
@@ -93,8 +91,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
-        # An importer that counts in nanoseconds has steps that differ in their last bits, for which MoorDyn would do
-        # one substep more or less.
+        # Steps of an importer that counts in ns differ in their last bits: MoorDyn would do one substep more or less.
         t, h = round(current_time, 9), round(step_size, 9)
         places = self._of_ends("xyz", "{}_{}")
         try:
@@ -128,14 +125,14 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         import moordyn
 
         self.moordyn = moordyn
-        self.folder = TemporaryDirectory()  # MoorDyn keeps a file open there
-        file = Path(self.folder.name, "tether.txt")
         own = {name: getattr(self, name) for name in VARIABLES}
         substep = h / ceil(h / (SUBSTEP * own["length"] / SEGMENTS * sqrt(own["mass"] / own["EA"])))
-        file.write_text(FILE.format(**own, ends=ends, segments=SEGMENTS, substep=substep), encoding="utf-8")
-        self.system = moordyn.Create(str(file))
-        moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
-        moordyn.Init(self.system, ends, [0.0] * 6)
+        with TemporaryDirectory() as folder:
+            file = Path(folder, "tether.txt")
+            file.write_text(FILE.format(**own, ends=ends, segments=SEGMENTS, substep=substep), encoding="utf-8")
+            self.system = moordyn.Create(str(file))
+            moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
+            moordyn.Init(self.system, ends, [0.0] * 6)
         moordyn.ExternalWaveKinInit(self.system)
 
     def _of_ends(self, axes: str, name: str) -> list[float]:
