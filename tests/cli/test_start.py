@@ -109,6 +109,7 @@ COMMANDS = [
     "simulate",
     "sitl",
     "study",
+    "system",
     "tables",
     "tune",
 ]

@@ -1,5 +1,6 @@
 """examples/system: the ROV with autopilot, current and battery is held, and engines agree on it."""
 
+import re
 import zipfile
 from functools import cache
 from math import degrees
@@ -20,7 +21,11 @@ from examples.system.system import (
     parameter_sets,
     system_files,
 )
+from rov_fmu.bridges.system import system
+from rov_fmu.bridges.system.plan import load_system_plan
 from rov_fmu.bridges.system.ssp import PARAMETER_SET
+from tests.bridges.system.fmus import undescribed_build
+from tests.commands import ROOT
 from tests.conftest import Made, without_page
 
 SETS = tuple(parameter_sets())
@@ -134,3 +139,36 @@ def test_the_command_runs_and_judges(
     monkeypatch.setattr(run, "DEPTH", 1e-9)
     assert run.main([str(tmp_path / "system")]) == 1
     assert "FAILED" in capsys.readouterr().out
+
+
+# ---- docs/system.md --------------------------------------------------------------------------------------------------
+
+PAGE = (ROOT / "docs" / "system.md").read_text(encoding="utf-8")
+
+
+def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every input that hangs on the world is connected."""
+    monkeypatch.setattr(system, "build", undescribed_build)
+    monkeypatch.setattr(system, "lack", lambda _: "")
+    path = tmp_path / "tether.toml"
+    (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    assert len(block.splitlines()) <= 22
+    path.write_text(block, encoding="utf-8")
+    plan = load_system_plan(path)
+    found = system.made(plan, path)
+    assert {start[0] for start, _, _ in found.connections} == {"rov", "tether", "water", "autopilot"}
+    assert [*system.unconnected(plan, found)] == [
+        "rov: nothing is connected to X_ext, Z_ext and N_ext, which keep their start values",
+        "tether: nothing is connected to y_top, z_top, v_N_top, v_E_top and v_D_top, which keep their start values",
+        "autopilot: nothing is connected to heave, yaw and sag, which keep their start values",
+    ]
+
+
+def test_the_controller_of_the_page_holds_the_depth(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (block,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    assert len(block.splitlines()) <= 20
+    monkeypatch.chdir(folder)
+    exec(compile(block, "system.md", "exec"), {})
+    assert capsys.readouterr().out == "2.000 m\n"

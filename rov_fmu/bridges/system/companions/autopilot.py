@@ -126,6 +126,7 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
     description = "Depth hold and heading hold: two PID loops from depth and heading to thruster commands"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
     variables = VARIABLES
+    terminals = (("pose", ("z", "psi")), ("thrusters", ("u_l", "u_r", "u_t")))
 
     u_l: float
     u_r: float

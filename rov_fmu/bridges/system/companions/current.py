@@ -44,7 +44,7 @@ class Current(Fmi2Slave):  # type: ignore[misc]
     variables = VARIABLES
     columns = ("time", "z", "V_N", "V_E")
     """Those of a file, which becomes table.json: for each time the depth and the velocity of each row."""
-    terminals = (("current", ("V_N", "V_E")), ("profile", tuple(PROFILE)))
+    terminals = (("pose", ("z",)), ("current", ("V_N", "V_E")), ("profile", tuple(PROFILE)))
 
     z: float
     speed: float
