@@ -77,7 +77,7 @@ def _description(slave: Any, sources: Mapping[str, str]) -> bytes:
         output.set("dependencies", "")
     content = json.dumps([tostring(root, "unicode"), *sources.items()])
     root.set("guid", f"{{{UUID(bytes=hashlib.sha256(content.encode()).digest()[:16])}}}")
-    return b'<?xml version="1.0" encoding="UTF-8"?>\n' + tostring(root, "utf-8", xml_declaration=False)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}'.encode()
 
 
 def _terminals(slave: Any) -> list[Terminal]:

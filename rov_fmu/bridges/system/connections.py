@@ -31,7 +31,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
     ends = [_end(text, parts) for text in (first, second)]
     is_port = [name not in parts[component].variables for component, name in ends]
     if is_port == [False, False]:
-        return [checked(Connection(*ends, factor), parts)]
+        return [checked(Connection(ends[0], ends[1], factor), parts)]
     if is_port != [True, True]:
         port, variable = (first, second) if is_port[0] else (second, first)
         raise MismatchError(f"{port} is a terminal and {variable} a variable: a terminal joins a terminal")

@@ -73,12 +73,7 @@ class Master:
                     put([self._inputs[one][self._done] for one in names])
             for name, ends, put in self._setters:
                 with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
-                    put(
-                        [
-                            self._now[start] * f if f != 1.0 else self._now[start]
-                            for start, f in map(self._sources.get, ends)
-                        ]
-                    )
+                    put([self._passed(end) for end in ends])
             for name, fmu in self._fmus.items():
                 with _reasons(name, f"the step at {t:.6g} s", self._folders):
                     returned = fmu.doStep(currentCommunicationPoint=t, communicationStepSize=self._step)
@@ -117,12 +112,17 @@ class Master:
 
     def _calls(self, verb: str, names: Iterable[Name]) -> list[tuple[str, list[Name], Callable[..., Any]]]:
         """Return functions that get or set all variables of a type of a component, with what they get or set."""
-        found = []
+        found: list[tuple[str, list[Name], Callable[..., Any]]] = []
         for (component, kind), some in grouped(((name[0], self._variables[name].type), name) for name in names).items():
             function = f"{verb}{_TYPES[self._version(component)].get(kind, kind)}"
             references = [self._variables[name].valueReference for name in some]
             found.append((component, some, partial(getattr(self._fmus[component], function), references)))
         return found
+
+    def _passed(self, end: Name) -> Any:
+        """Return what an input gets."""
+        start, factor = self._sources[end]
+        return self._now[start] if factor == 1.0 else factor * self._now[start]
 
     def _outputs(self) -> _Values:
         now: _Values = {}

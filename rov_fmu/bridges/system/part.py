@@ -38,11 +38,6 @@ class Part:
     terminals: Mapping[str, Mapping[str, str]]
     """The variables by the names of the members, for each terminal."""
 
-    @property
-    def version(self) -> int:
-        """The version of FMI, 2 or 3."""
-        return int(self.description.fmiVersion[:1])
-
     @cached_property
     def variables(self) -> dict[str, Any]:
         """FMPy's variables by name, without arrays."""

@@ -25,6 +25,9 @@ from rov_fmu.report.plots.svg import name_axes, svg_file
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
+_MOST = 100_000_000
+"""The most values of a run, which are in memory."""
+
 
 def recorded(structure: Structure) -> list[Name]:
     """Return all outputs of a system that are numbers."""
@@ -48,23 +51,28 @@ def run_system(
     structure: Structure, path: Path, read: Sequence[Name], step: float, steps: int, on_progress: Progress = silent
 ) -> Array:
     """Return the variables at the start and after each step, a row for each. Raises FileError about the path."""
-    rows: list[list[float]] = []
+    if (count := (steps + 1) * len(read)) > _MOST:
+        raise FileError(
+            f"{path}: {steps} steps of {len(read)} variables give {count:,} values; at most {_MOST:,} are kept"
+        )
+    rows = list[Array]()
     with temporary_folder("system-") as folder, ExitStack() as stack:
         try:
             folders = unpack_parts(structure, folder)
             child = ChildProcess(Master, folders, structure.connections, read, limits=budget(TIME_LIMIT))
             stack.enter_context(closing(child))
-            rows.append(child.call("begin", structure.values, step, step * steps))
-            count = 1
-            while len(rows) <= steps:
+            rows.append(np.array([child.call("begin", structure.values, step, step * steps)]))
+            done, count = 0, 1
+            while done < steps:
                 began = perf_counter()
-                rows += child.call("step", min(count, steps + 1 - len(rows)))
+                rows.append(np.array(child.call("step", min(count, steps - done))))
+                done += len(rows[-1])
                 count = max(1, min(2 * count, int(count * _CALL / (perf_counter() - began + 1e-9))))
-                on_progress("running", (len(rows) - 1) / steps)
+                on_progress("running", done / steps)
             child.call("end")
         except (ChildError, RunError) as error:
             raise FileError(f"{path}: the system cannot be run: {error}") from error
-    return np.array(rows)
+    return np.concatenate(rows)
 
 
 def table(read: Sequence[Name], step: float, rows: Array) -> bytes:

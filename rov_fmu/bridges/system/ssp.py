@@ -140,18 +140,21 @@ def _structure(folder: Path, path: Path) -> Structure:
     """Return the system in a folder. Raises FileError, or ValueError with only the reason."""
     root = _root(folder, _STRUCTURE)
     parts: dict[str, Part] = {}
+    read: dict[str, Part] = {}
     values: dict[str, dict[str, Value]] = {}
     sources: dict[str, str] = {}
     for element in root.iterfind("{*}System/{*}Elements/*"):
         name = element.get("name", "")
         if etree.QName(element).localname != "Component":
             raise ValueError(f"{_STRUCTURE}: {shown(name)} is no component: systems in systems are not read")
-        sources[name] = element.get("source", "")
-        part = parts[name] = read_part(path, _file(folder, sources[name]).read_bytes(), f": {name}")
+        source = sources[name] = element.get("source", "")
+        if source not in read:
+            read[source] = read_part(path, _file(folder, source).read_bytes(), f": {name}")
+        part = parts[name] = read[source]
         values[name] = {}
         for binding in element.iterfind("{*}ParameterBindings/{*}ParameterBinding"):
-            source = binding.get("source")
-            for given in (_root(folder, source) if source else binding).iterfind(".//{*}Parameters/{*}Parameter"):
+            own = binding.get("source")
+            for given in (_root(folder, own) if own else binding).iterfind(".//{*}Parameters/{*}Parameter"):
                 key = given.get("name", "")
                 try:
                     values[name][key] = part.start_value(key, _value(given))

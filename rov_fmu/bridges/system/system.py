@@ -17,6 +17,9 @@ from rov_fmu.io.toml_file import LARGEST, key_line
 from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle, read_vehicle
 
+_MOST_BYTES = 1_000_000_000
+"""The most bytes of all FMUs, which are in memory."""
+
 
 def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda _: None) -> Structure:
     """Return the system of a plan, which was read from a path. `on_part` is called with each component.
@@ -30,13 +33,16 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     ]
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
-    parts, unread = {}, []
+    parts, unread, size = dict[str, Part](), list[str](), 0
     for name, table in plan.component.items():
         on_part(name)
         try:
             parts[name] = _part(name, table, path)
         except FileError as error:
             unread += str(error).split("\n")
+            continue
+        if (size := size + len(parts[name].content)) > _MOST_BYTES:
+            raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
     if unread:
         raise SystemPlanError(*unread)
     values: dict[str, dict[str, Value]] = {}

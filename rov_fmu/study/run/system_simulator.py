@@ -47,4 +47,5 @@ class SystemSimulator:
 
     def _value(self, name: str, value: float) -> Value:
         """Return a value as the type of a variable has it."""
-        return {"Boolean": bool, "Integer": int}.get(self._model.variables[name].type, float)(value)
+        kind = self._model.variables[name].type
+        return bool(value) if kind == "Boolean" else int(value) if kind == "Integer" else float(value)

@@ -18,6 +18,7 @@ from rov_fmu.bridges.system.run import run_system
 from rov_fmu.bridges.system.ssp import Structure
 from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.messages import FileError
 from tests.bridges.system.fmus import foreign
 from tests.commands import without_progress
 
@@ -35,7 +36,7 @@ def test_the_new_companions_are_short() -> None:
 
 def test_a_current_follows_its_profile() -> None:
     water = Current(instance_name="water")
-    vars(water).update(speed=0.4, direction=0.5, seabed=20.0, z=5.0, rise=10.0)
+    water.speed, water.direction, water.seabed, water.z, water.rise = 0.4, 0.5, 20.0, 5.0, 10.0
     water.exit_initialization_mode()
     assert (water.V_N, water.V_E) == (0.0, 0.0)
     water.do_step(2.0, 3.0)
@@ -166,3 +167,9 @@ def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys:
     *_, line = without_progress(capsys.readouterr().err).splitlines()
     assert "the system cannot be run: a: the initialization: " in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["dead.fmu", "plan.toml"]
+
+
+def test_a_run_with_too_many_values_is_refused(tmp_path: Path) -> None:
+    part = read_part(Path("water"), companion("current"), is_ours=True)
+    with pytest.raises(FileError, match="give 300,000,003 values"):
+        run_system(Structure({"a": part}, {}, []), tmp_path, [("a", "V_N")] * 3, 1.0, 10**8)

@@ -10,7 +10,7 @@ from rov_fmu.bridges.system import companion as companions
 from rov_fmu.bridges.system import ssp, system
 from rov_fmu.bridges.system.connections import MismatchError, connected, loop
 from rov_fmu.bridges.system.part import Part, read_part
-from rov_fmu.bridges.system.plan import load_system_plan
+from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
 from rov_fmu.cli import main
 from rov_fmu.fmu.terminals import port_of
@@ -248,13 +248,16 @@ def test_the_list_names_every_companion_with_its_variables(capsys: pytest.Captur
 
 
 @pytest.mark.usefixtures("folder")
-def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     many = "\n".join(f'[component.c{n}]\nfmu = "foreign.fmu"' for n in range(101))
     (line,) = told(f"step = 1.0\nstop_time = 1.0\n{many}", capsys)
     assert "component" in line
     (line,) = told(PLAN.replace("step = 0.1", "step = 1e-9").replace("stop_time = 1.0", "stop_time = 1e9"), capsys)
     assert "at most 10000000" in line
+    monkeypatch.setattr(system, "_MOST_BYTES", 100_000)
+    (line,) = told(PLAN, capsys)
+    assert "the FMUs have more than 100,000 bytes in all" in line
     plan = Path("plan.toml")
     plan.write_text(PLAN.replace("z = 3.0", f"z = {'9' * 400}"), encoding="utf-8")
-    with pytest.raises(system.SystemPlanError, match="must be a finite number"):
+    with pytest.raises(SystemPlanError, match="must be a finite number"):
         load_system_plan(plan)

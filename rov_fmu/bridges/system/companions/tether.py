@@ -2,16 +2,16 @@
 
 Each end is a port: place and velocity over ground go in, and the force that the tether exerts there comes out. An end
 that is not connected stays where it starts. The tether hangs at rest when the first step begins, and pulls from the
-second step on. Positions are north, east and down from the surface; MoorDyn has x north, y west and z up.
+second step on. Places are north, east and down from the surface; in MoorDyn x is north, y west, z up.
 """
 
 from itertools import pairwise
 from math import ceil, hypot, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu import DefaultExperiment, Fmi2Slave, Real
+from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
 
 SEGMENTS, SHOWN, LEVELS = 20, 11, range(1, 7)  # of the line, the points of its shape, the levels of the water
 SUBSTEP = 0.2  # of the time in which a wave of tension passes a segment: twice as much can be unstable
@@ -82,7 +82,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        self.system: Any = None
+        self.system: object = None
         for name, (causality, start, _, text) in VARIABLES.items():
             setattr(self, name, start)
             changes = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
@@ -97,22 +97,22 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         try:
             if self.system is None:
                 self._begin(places, h)
-            moordyn = self.moordyn
+            own, moordyn = self.__dict__, self.moordyn
             nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)
             levels = [[getattr(self, f"{name}_{n}") for name in ("depth", "V_N", "V_E")] for n in LEVELS]
             water = [current(levels, -z) for _, _, z in nodes]
             moordyn.ExternalWaveKinSet(self.system, water, [[0.0, 0.0, 0.0]] * len(nodes), t)
             forces = moordyn.Step(self.system, places, self._of_ends("NED", "v_{}_{}"), t, h)
         except (ImportError, RuntimeError) as error:
-            self.log(f"MoorDyn: {error}")
+            self.log(f"MoorDyn: {error}", Fmi2Status.error)
             return False
         for n, end in enumerate(ENDS):
             x, y, z = forces[3 * n : 3 * n + 3]
-            vars(self).update({f"F_N_{end}": x, f"F_E_{end}": -y, f"F_D_{end}": -z, f"tension_{end}": hypot(x, y, z)})
+            own |= {f"F_N_{end}": x, f"F_E_{end}": -y, f"F_D_{end}": -z, f"tension_{end}": hypot(x, y, z)}
         line = moordyn.GetLine(self.system, 1)
         for n in range(SHOWN):
             x, y, z = moordyn.GetLineNodePos(line, n * SEGMENTS // (SHOWN - 1))
-            vars(self).update({f"x_{n}": x, f"y_{n}": -y, f"z_{n}": -z})
+            own |= {f"x_{n}": x, f"y_{n}": -y, f"z_{n}": -z}
         return True
 
     def terminate(self) -> None:
@@ -125,7 +125,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         import moordyn
 
         self.moordyn = moordyn
-        own = {name: getattr(self, name) for name in VARIABLES}
+        own = self.__dict__
         substep = h / ceil(h / (SUBSTEP * own["length"] / SEGMENTS * sqrt(own["mass"] / own["EA"])))
         with TemporaryDirectory() as folder:
             file = Path(folder, "tether.txt")
