@@ -34,7 +34,8 @@ _StartValue = Annotated[
     ),
 ]
 _Position = Annotated[tuple[Finite, Finite, Finite], AS_TUPLE]
-_SOURCES = ("vehicle", "fmu", "companion")
+SOURCES = ("vehicle", "fmu", "companion")
+"""The keys that say which FMU a component is."""
 
 
 class ComponentTable(Strict):
@@ -57,9 +58,9 @@ class ComponentTable(Strict):
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:
-        given = [key for key in _SOURCES if getattr(self, key) is not None]
+        given = [key for key in SOURCES if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"must have one of {listed(_SOURCES, 'or')}")
+            raise ValueError(f"must have one of {listed(SOURCES, 'or')}")
         for key, needs in (("file", "companion"), ("point", "vehicle")):
             if getattr(self, key) and given != [needs]:
                 raise ValueError(f"{key} needs {needs}")

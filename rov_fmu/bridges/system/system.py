@@ -6,7 +6,7 @@ from pathlib import Path
 from rov_fmu.bridges.system.companion import companion, lack
 from rov_fmu.bridges.system.connections import Connection, MismatchError, connected, loop
 from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
-from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan, SystemPlanError
+from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
 from rov_fmu.build import build
 from rov_fmu.io.interrupts import temporary_folder
@@ -34,10 +34,12 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
     parts, unread, size = dict[str, Part](), list[str](), 0
+    ready: dict[str, Part] = {}
     for name, table in plan.component.items():
         on_part(name)
+        kind = table.model_dump_json(include={*SOURCES, "file", "point"})  # components of one kind have one FMU
         try:
-            parts[name] = _part(name, table, path)
+            ready[kind] = parts[name] = ready.get(kind) or _part(name, table, path)
         except FileError as error:
             unread += str(error).split("\n")
             continue

@@ -188,6 +188,17 @@ def parts(**content: bytes) -> dict[str, Part]:
     return {name: read_part(Path(name), one, is_ours=True) for name, one in content.items()}
 
 
+@pytest.mark.usefixtures("folder")
+def test_components_of_one_kind_share_an_fmu() -> None:
+    text = PLAN.replace(
+        "[component.a]", "[component.copy]\nvehicle = 'videoray'\npoint.bow = [0.2, 0.0, -0.1]\n[component.a]"
+    )
+    Path("plan.toml").write_text(text, encoding="utf-8")
+    found = system.made(load_system_plan(Path("plan.toml")), Path("plan.toml")).parts
+    assert found["copy"] is found["rov"]
+    assert found["a"] is found["b"]
+
+
 def test_units_are_alike_if_they_are_the_same_quantity() -> None:
     has = parts(
         m=foreign(), metre=foreign("metre", m="1"), none=foreign(""), feet=foreign("ft", m="1", factor="0.3048")
