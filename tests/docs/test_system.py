@@ -24,7 +24,8 @@ from examples.system.system import (
 from examples.tether import draw
 from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.plan import load_system_plan
-from rov_fmu.bridges.system.ssp import PARAMETER_SET
+from rov_fmu.bridges.system.run import recorded
+from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
 from rov_fmu.cli import main
 from tests.bridges.system.fmus import undescribed_build
 from tests.commands import ROOT
@@ -179,12 +180,9 @@ def test_engines_agree_on_the_tether_of_the_page(engine: str, tmp_path: Path) ->
     with without_page():
         assert main(["system", str(tmp_path / "tether.toml"), "-o", str(ssp), "--run"]) == 0
     motion = np.genfromtxt(ssp.with_suffix(".csv"), delimiter=",", names=True, deletechars="")
-    direct = ("rov.F_", "rov.tau", "rov.der")  # they follow inputs at once
-    names = [
-        (c, v)
-        for c, _, v in (name.partition(".") for name in motion.dtype.names[1:])
-        if not f"{c}.{v}".startswith(direct)
-    ]
+    structure = read_ssp(ssp)
+    # Those that follow an input at once are of the next step in Ecos.
+    names = [(c, name) for c, name in recorded(structure) if name not in structure.parts[c].direct]
     if engine.startswith("Ecos"):
         found = engines.by_ecos(ssp, names, 1000, 0.02)
     else:
