@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 
 from docs import compared
 from rov_fmu import homes
+from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan
 from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
@@ -37,7 +38,7 @@ from verification.identification.strangers import gates
 
 Table = list[tuple[str, ...]]
 _NAMES = (
-    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "api.md", "vehicles.md"),
+    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "system.md", "cli.md", "api.md", "vehicles.md"),
     *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
@@ -70,6 +71,8 @@ def tables() -> dict[str, Table]:
         "signal": Signal,
         "input_file": InputFile,
         "keep": Keep,
+        "system": SystemPlan,
+        "component": ComponentTable,
     }
     found |= {name: _plan_table(of) for name, of in plans.items()}
     found |= {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
@@ -325,7 +328,9 @@ def _plan_table(of: type[Strict]) -> Table:
         keys = ", ".join(f"{inner} = ..." for inner in found.get("properties", ()))
         parts = ["needed"] if field.is_required() else []
         parts.append(f"`{{ {keys} }}`" if keys else _allowed(found))
-        parts += [f"default `{field.default}`"] if field.default not in (None, {}) and not field.is_required() else []
+        parts += (
+            [f"default `{field.default}`"] if field.default not in (None, {}, ()) and not field.is_required() else []
+        )
         rows.append((f"`{key}`", ", ".join(parts), _words(found)))
     return [_KEYS, *rows]
 

@@ -1,4 +1,5 @@
-"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, study, identify, inspect, tune, schema, tables.
+"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, system, study, identify, inspect, tune, schema,
+tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -591,6 +592,30 @@ def _prove(fmu: Path, **options: Any) -> None:
     from rov_fmu.interface.prove_command import Options, prove_fmu
 
     prove_fmu(fmu, Options(**options))
+
+
+# ---- system ----------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("system")
+@click.argument("plan", type=_FILE, required=False)
+@_output_option(metavar="FILE.ssp", help="System to write.")
+@click.option("--run", "runs", is_flag=True, help="Run it, and write FILE.csv and FILE.svg.")
+@click.option("--list", "lists", is_flag=True, help="List the companions that ship, with their variables.")
+@_force_option()
+def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, force: bool) -> None:
+    """Connect vehicles, their companions and other FMUs to a system (SSP), as PLAN (TOML) says.
+
+    Units, causalities and connections are checked.
+    """
+    from rov_fmu.bridges.system.system_command import list_companions, write_system
+
+    if lists:
+        list_companions()
+    elif plan is None or output is None:
+        raise click.UsageError("system: needs PLAN and -o FILE.ssp, or --list")
+    else:
+        write_system(plan, output, runs=runs, force=force)
 
 
 # ---- study -----------------------------------------------------------------------------------------------------------

@@ -44,16 +44,18 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
+def python_files(identifier: str, sources: Mapping[str, str]) -> dict[str, bytes]:
     """Return the files that FmuBuilder of pythonfmu would pack, by their path, except its modelDescription.xml.
+
+    The slave is the class in <identifier>_slave.py, one of the sources.
 
     FmuBuilder itself would import the slave into this process. On Linux, another library is before that of PythonFMU.
     """
     package = Path(pythonfmu.__file__).parent
     files = {f"resources/{name}": text.encode() for name, text in sources.items()}
     files |= {f"resources/pythonfmu/{path.name}": path.read_bytes() for path in package.glob("*.py")}
-    files["resources/slavemodule.txt"] = f"{vehicle.identifier}_slave".encode()
+    files["resources/slavemodule.txt"] = f"{identifier}_slave".encode()
     for path in (package / "resources" / "binaries").glob("*/*pythonfmu-export.*"):
-        files[f"binaries/{path.parent.name}/{vehicle.identifier}{path.suffix}"] = path.read_bytes()
-    library = f"binaries/linux64/{vehicle.identifier}.so"
+        files[f"binaries/{path.parent.name}/{identifier}{path.suffix}"] = path.read_bytes()
+    library = f"binaries/linux64/{identifier}.so"
     return {**files, library: compile_location(files[library]), f"binaries/linux64/{PYTHONFMU_LIBRARY}": files[library]}

@@ -116,6 +116,7 @@ COMMANDS = [
     "simulate",
     "sitl",
     "study",
+    "system",
     "tables",
     "tune",
 ]

@@ -44,7 +44,7 @@ WHOLE = {
 """Plans and the beginnings of the messages about them."""
 HEADS = {
     'sampler = "soboll"': "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
-    'vehicle = "videoray"': "must have either fmu or vehicle",
+    'vehicle = "videoray"': "must have one of fmu, vehicle and system",
     'vary_from = "mine.toml"': "vary_from = 'mine.toml': there is no such file beside the plan",
     'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     "time_limit = 0": "time_limit = 0: must be greater than 0",

@@ -194,6 +194,8 @@ class _Reader:
                 return _constant(value)
             case ast.Name(id=name):
                 return self._variable(name)
+            case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
+                return self._variable(f"{component}.{name}")
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
                 return self._variable(variable)
             case ast.Subscript(

@@ -95,7 +95,7 @@ def read_model(path: Path) -> Model:
     if description.coSimulation is None:
         raise FileError(f"{path}: is not for Co-Simulation")
     variables = {
-        v.name: _variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
+        v.name: variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
     }
     return Model(path.name, content, version, variables)
 
@@ -112,7 +112,8 @@ def unknown(name: str, names: Mapping[str, object]) -> str:
     return f"the FMU has no variable {shown(name)} that is a number{did_you_mean(name, names, 3)}"
 
 
-def _variable(v: Any) -> Variable:
+def variable(v: Any) -> Variable:
+    """Return a variable of FMPy's."""
     can_be_set = v.causality == "input" or (v.variability != "constant" and v.initial in ("exact", "approx"))
     declared = v.declaredType
     low, high, unit = (getattr(v, key) or getattr(declared, key, None) for key in ("min", "max", "unit"))

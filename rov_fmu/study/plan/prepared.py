@@ -9,7 +9,7 @@ from uuid import uuid4
 import numpy as np
 
 from rov_fmu.io.csv_table import read_series
-from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
+from rov_fmu.io.messages import FileError, lines_on, shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.estimates import Estimates, some_of
 from rov_fmu.study.plan.expression import CONSTANTS
@@ -20,7 +20,7 @@ from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.run.simulator import Job
 from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 _TRIALS = 8
@@ -82,14 +82,7 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
     """Return the vehicle file that a key names: one in the folder of the plan, or one that ships. Raises PlanError."""
-    beside = path.parent / given
-    if beside.is_file():
-        return beside
-    if given not in SHIPPED:
-        ships = ", ".join(SHIPPED)
-        reason = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
-        raise PlanError(f"{path}: {key_line(key, reason, given)}{did_you_mean(given, SHIPPED)}")
-    return SHIPPED[given]
+    return named_in(path, key, given, PlanError)
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal], Sequence[int]]:

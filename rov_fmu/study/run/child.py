@@ -13,7 +13,9 @@ from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.prove.description import budget
 from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.figures import Figures
+from rov_fmu.study.plan.system_model import SystemModel
 from rov_fmu.study.run.simulator import Job, LoadError, Simulator
+from rov_fmu.study.run.system_simulator import SystemSimulator
 
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
@@ -60,7 +62,12 @@ class Child:
             self._process.close()
 
     def _can_be_reset(self) -> bool:
-        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends."""
+        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends.
+
+        A system gets new instances for each run.
+        """
+        if isinstance(self._job.model, SystemModel):
+            return False
         for values in self._job.trials:
             try:
                 return bool(self._call("can_be_reset", values, self._job.trials[-1], time=self._job.plan.time_limit))
@@ -99,7 +106,11 @@ class _Runner:
 
     def __init__(self, folder: str, job: Job) -> None:
         self._job = job
-        self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+        self._simulator: Simulator | SystemSimulator
+        if isinstance(job.model, SystemModel):
+            self._simulator = SystemSimulator(folder, job, job.model)
+        else:
+            self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
         self._figures = Figures(job.plan.figures, job.plan.times)
 
     def can_be_reset(self, values: Array, others: Array) -> bool:

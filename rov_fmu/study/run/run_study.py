@@ -13,6 +13,7 @@ from rov_fmu.io.reading import read_bytes
 from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import prepare, vehicle_file
+from rov_fmu.study.plan.system_model import read_system
 from rov_fmu.study.results.results import Results
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.cluster import Progress, Spent, execute
@@ -95,9 +96,11 @@ def run_study(
 
 
 def _model(plan: Plan, path: Path) -> Model:
-    """Read the FMU that the plan names, or build that of its vehicle."""
+    """Read the FMU or the system that the plan names, or build the FMU of its vehicle."""
     if plan.fmu:
         return read_model(path.parent / plan.fmu)
+    if plan.system:
+        return read_system(path.parent / plan.system)
     assert plan.vehicle
     vehicle = load_vehicle(vehicle_file("vehicle", plan.vehicle, path))
     with temporary_folder("fmu-") as folder:
