@@ -5,6 +5,7 @@ when the work ends or is interrupted. A pipe or a file gets one line as each par
 end the result shows, and one at least every ten seconds.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
@@ -58,14 +59,17 @@ class Parts:
         else:
             self.print(f"{name}: done in {perf_counter() - began:.1f} s")
 
-    def show(self, name: str, step: str, share: float, count: str = "") -> None:
-        """Show the step of a running part, and the share that is done or, if given, a count."""
+    def show(self, name: str, step: str, share: float, count: str = "", *, goes_on: bool = True) -> None:
+        """Show the step of a running part, and the share that is done or, if given, a count.
+
+        `goes_on` is False while nothing is done, so that nobody knows how long it will take.
+        """
         _, task = self._running[name]
         words = count or f"{share:.0%}"
         if self._display and task is not None:
             self._display.update(task, completed=min(share, 0.999), description=one_line(step), count=words)
         with self._lock:
-            self._steps[name] = f"{step}, {words}", share
+            self._steps[name] = f"{step}, {words}", share if goes_on else 0.0
 
     @property
     def is_shown(self) -> bool:
@@ -166,28 +170,41 @@ class StudyProgress(Protocol):
 
 
 class StudyParts:
-    """The parts of a study: the start of the workers, and the runs."""
+    """The parts of a study: its start, and the runs."""
 
     def __init__(self, shown: Parts) -> None:
         self._parts = shown
-        shown.begin("starting the workers")
-        self._began: float | None = None
+        shown.begin("starting the study")
+        self._reports = deque[tuple[float, int]]()
+        """The time of each report of the last ten seconds, and of the one before, with the number of runs done."""
         self._done_before = 0
+        self._result = 0.0
+        """The time of the latest result, or of the first report."""
 
     def update(self, now: StudyProgress) -> None:
         """Show how many runs are done and failed. The first call prints the address of Dask's dashboard, too."""
-        if self._began is None:
+        time, reports = perf_counter(), self._reports
+        if not reports:
             self._parts.begin("runs")
-            self._began, self._done_before = perf_counter(), now.done
+            self._done_before, self._result = now.done, time
             if now.dashboard and self._parts.is_shown:
                 self._parts.print(f"what the workers do: {now.dashboard}")
-        if now.done == self._done_before and now.has_workers:
+        elif now.done > reports[-1][1]:
+            self._result = time
+        reports.append((time, now.done))
+        if len(reports) == 1:
             return
-        rate = (now.done - self._done_before) / max(perf_counter() - self._began, 1e-3)
-        speed = per_second(rate) if now.has_workers else "no worker is there"
+        while reports[1][0] <= time - _EVERY:
+            reports.popleft()
+        began, before = reports[0]
+        goes_on = now.has_workers and now.done > before
+        if goes_on:
+            speed = per_second((now.done - before) / max(time - began, 1e-3))
+        else:
+            speed = f"{'' if now.has_workers else 'no worker is there, '}{time - self._result:.0f} s without a result"
         words = f"{speed}{f', {now.failed:,} failed' if now.failed else ''}"
-        share = (now.done - self._done_before) / (now.total - self._done_before)
-        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs")
+        share = (now.done - self._done_before) / max(now.total - self._done_before, 1)
+        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs", goes_on=goes_on)
 
 
 def per_second(rate: float) -> str:
