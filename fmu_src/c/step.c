@@ -179,8 +179,8 @@ INLINE void motion_begin(motion *m, real unit, series *s)
     }
 }
 
-/* Let the last two coefficients be 0 where the series converged before. So a vehicle does not depend on those in other lanes,
- * which may need a higher order. A single vehicle ends its series there. */
+/* Let the last two coefficients be 0 where the series converged before. So a vehicle does not depend on those in other
+ * lanes, which may need a higher order. A single vehicle ends its series there. */
 INLINE void series_keep(series *s, mask converged)
 {
     for (int n = s->order - 1; LANES > 1 && n <= s->order; n++) {
@@ -218,8 +218,8 @@ INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
     return series_converges(s);
 }
 
-/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. It may already be used
- * where it is `done`. */
+/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. It may
+ * already be used where it is `done`. */
 INLINE mask motion_grow_long(const motion *m, series *s, mask done, mask left_out)
 {
     while (s->order < ORDER) {

@@ -176,7 +176,8 @@ static mask take_piece(block *b, mask started, mask *left)
                 scale[k] = LANE(m->scale[k], i);
             }
             LANE(reach, i) = LANE(whole, i) ? 1.0 : 0.0;
-            LANE(length, i) = single_length(c, scale, order_in_lane(&s, i, LANE(whole, i)), &LANE(reach, i), &reversed[i]);
+            const int order = order_in_lane(&s, i, LANE(whole, i));
+            LANE(length, i) = single_length(c, scale, order, &LANE(reach, i), &reversed[i]);
             LANE(under_way, i) = LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
         }
     }
