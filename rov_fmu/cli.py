@@ -5,6 +5,7 @@ Each command is a short function that imports its modules only when it is called
 fast.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -36,6 +37,8 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_nam
 if TYPE_CHECKING:
     from rov_fmu.build import Built
 
+_MOST_PARTS = 10_000
+"""The largest number of parts of a study."""
 _EXIT_CODES = {
     FileError: 2,
     InputError: 2,
@@ -127,6 +130,15 @@ def _setting(text: str) -> str:
     if "=" not in text:
         raise click.BadParameter(f"{shown(text)} must be NAME=VALUE, such as u_l=0.3")
     return text
+
+
+def _part(text: str) -> tuple[int, int]:
+    """Return the number of a part, and that of all parts."""
+    match = re.fullmatch(r"(\d{1,5})/(\d{1,5})", text)
+    number, count = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= number <= count <= _MOST_PARTS:
+        raise click.BadParameter(f"{shown(text)} must be a part and their number, such as 3/64, at most {_MOST_PARTS}")
+    return number, count
 
 
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
@@ -628,9 +640,18 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
     "--workers",
     type=_number("a whole number from 1 to 1024", 1, 1024, int),
     metavar="N",
-    help="Number of processes. The default is the number of cores.",
+    help="Number of processes, or of threads for a vehicle. The default is the number of cores.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use, tcp://host:8786.")
+@click.option(
+    "--engine",
+    type=_Choice(["lanes", "fmu"]),
+    help="What runs a vehicle: its equations in this process, which is the default, or its FMU on Dask workers.",
+)
+@click.option(
+    "--part", type=_part, metavar="K/N", help="Do part K of N alone, in RESULTS/parts/K-of-N, as in --part 3/64."
+)
+@click.option("--merge", is_flag=True, help="Do no run. Move those of all parts into RESULTS, and write the page.")
 @click.option(
     "--mcap",
     "run",
@@ -640,13 +661,17 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 )
 @_force_option()
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, **options: Any) -> None:
-    """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
+    """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
     same command continues a study that was interrupted.
     """
     if workers and scheduler is not None:
         raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
+    if options["engine"] == "lanes" and scheduler is not None:
+        raise click.UsageError("study: leave --scheduler out, because --engine lanes runs in this process")
+    if options["merge"] and options["part"]:
+        raise click.UsageError("study: leave --part out, because --merge does no run")
     try:
         from rov_fmu.study.study_command import study_plan
     except ModuleNotFoundError as error:

@@ -179,6 +179,17 @@ INLINE void motion_begin(motion *m, real unit, series *s)
     }
 }
 
+/* Let the last two coefficients be 0 where the series converged before. So a vehicle does not depend on those in other
+ * lanes, which may need a higher order. A single vehicle ends its series there. */
+INLINE void series_keep(series *s, mask converged)
+{
+    for (int n = s->order - 1; LANES > 1 && n <= s->order; n++) {
+        for (int i = 0; i < N_SERIES; i++) {
+            s->c[n][i] = converged ? 0.0 : s->c[n][i];
+        }
+    }
+}
+
 /* Compute coefficients up to a low order. Return true when the series may be used up to t = 1. It ends when this holds for
  * all vehicles that are not `left_out`. */
 INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
@@ -195,6 +206,7 @@ INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
     series_terms(m->n, &m->q, s, 5);
     series_terms(m->n, &m->q, s, 6);
     s->order = 7;
+    series_keep(s, done);
     done = series_converges(s);
     if (ALL(done | left_out)) {
         return done;
@@ -202,17 +214,19 @@ INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
     series_terms(m->n, &m->q, s, 7);
     series_terms(m->n, &m->q, s, 8);
     s->order = 9;
+    series_keep(s, done);
     return series_converges(s);
 }
 
-/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. */
-INLINE mask motion_grow_long(const motion *m, series *s, mask left_out)
+/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. It may
+ * already be used where it is `done`. */
+INLINE mask motion_grow_long(const motion *m, series *s, mask done, mask left_out)
 {
-    mask done = NO;
     while (s->order < ORDER) {
         series_terms(m->n, &m->q, s, s->order);
         series_terms(m->n, &m->q, s, s->order + 1);
         s->order += 2;
+        series_keep(s, done);
         done = series_converges(s);
         if (ALL(done | left_out)) {
             break;
@@ -346,7 +360,7 @@ INLINE bool motion_grow(motion *m, series *s)
 /* Compute the coefficients that are left. Return the largest usable t, at most 1; 0 when the series overflows. */
 static double motion_reach(const motion *m, series *s)
 {
-    return motion_grow_long(m, s, NO) ? 1.0 : series_reach(s, m->scale);
+    return motion_grow_long(m, s, NO, NO) ? 1.0 : series_reach(s, m->scale);
 }
 
 /* Put a component to rest when nothing drives it and its states are so small that, in the remaining `rest` seconds, they would

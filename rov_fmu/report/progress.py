@@ -6,6 +6,7 @@ end the result shows, and one at least every ten seconds. First answers stand ab
 each replaces the last one, and get a line each in a pipe.
 """
 
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from datetime import timedelta
@@ -49,10 +50,11 @@ class _Running:
         self.words, self.began = name, perf_counter()
         self.task: TaskID | None = None
         """Its line on a terminal."""
-        self._share, self._at = 0.0, self.began
+        self._share, self._at, self._goes_on = 0.0, self.began, True
 
-    def reach(self, words: str, share: float) -> None:
-        """Take the step that the part is at, and the share that is done."""
+    def reach(self, words: str, share: float, *, goes_on: bool) -> None:
+        """Take the step that the part is at, the share that is done, and whether more is being done."""
+        self._goes_on = goes_on
         if share > self._share:
             self._share, self._at = share, perf_counter()
         self.words = words
@@ -64,12 +66,13 @@ class _Running:
 
     @property
     def left(self) -> float | None:
-        """For how long it will be running, s; None as long as too little is done.
+        """For how long it will be running, s; None as long as too little is done, and while nothing is done.
 
         It follows from the time in which the share was done, and becomes smaller until the next share is done. Even
         where this takes longer than all that was left, something is left.
         """
-        left = (self._at - self.began) * (1.0 / self._share - 1.0) if self._share > _TELLING else 0.0
+        is_known = self._goes_on and self._share > _TELLING
+        left = (self._at - self.began) * (1.0 / self._share - 1.0) if is_known else 0.0
         return left * exp((self._at - perf_counter()) / left) if left else None
 
 
@@ -102,11 +105,14 @@ class Parts:
         else:
             self.print(f"{name}: done in {running.so_far:.1f} s")
 
-    def show(self, name: str, step: str, share: float, count: str = "") -> None:
-        """Show the step of a running part, and the share that is done or, if given, a count."""
+    def show(self, name: str, step: str, share: float, count: str = "", *, goes_on: bool = True) -> None:
+        """Show the step of a running part, and the share that is done or, if given, a count.
+
+        `goes_on` is False while nothing is done, so that nobody knows how long it will take.
+        """
         running, words = self._running[name], count or f"{share:.0%}"
         with self._lock:
-            running.reach(f"{step}, {words}", share)
+            running.reach(f"{step}, {words}", share, goes_on=goes_on)
         if self._display and running.task is not None:
             self._display.update(running.task, completed=min(share, 0.999), description=one_line(step), count=words)
 
@@ -239,28 +245,41 @@ class StudyProgress(Protocol):
 
 
 class StudyParts:
-    """The parts of a study: the start of the workers, and the runs."""
+    """The parts of a study: its start, and the runs."""
 
     def __init__(self, shown: Parts) -> None:
         self._parts = shown
-        shown.begin("starting the workers")
-        self._began: float | None = None
+        shown.begin("starting the study")
+        self._reports = deque[tuple[float, int]]()
+        """The time of each report of the last ten seconds, and of the one before, with the number of runs done."""
         self._done_before = 0
+        self._result = 0.0
+        """The time of the latest result, or of the first report."""
 
     def update(self, now: StudyProgress) -> None:
         """Show how many runs are done and failed. The first call prints the address of Dask's dashboard, too."""
-        if self._began is None:
+        time, reports = perf_counter(), self._reports
+        if not reports:
             self._parts.begin("runs")
-            self._began, self._done_before = perf_counter(), now.done
+            self._done_before, self._result = now.done, time
             if now.dashboard and self._parts.is_shown:
                 self._parts.print(f"what the workers do: {now.dashboard}")
-        if now.done == self._done_before and now.has_workers:
+        elif now.done > reports[-1][1]:
+            self._result = time
+        reports.append((time, now.done))
+        if len(reports) == 1:
             return
-        rate = (now.done - self._done_before) / max(perf_counter() - self._began, 1e-3)
-        speed = per_second(rate) if now.has_workers else "no worker is there"
+        while reports[1][0] <= time - _EVERY:
+            reports.popleft()
+        began, before = reports[0]
+        goes_on = now.has_workers and now.done > before
+        if goes_on:
+            speed = per_second((now.done - before) / max(time - began, 1e-3))
+        else:
+            speed = f"{'' if now.has_workers else 'no worker is there, '}{time - self._result:.0f} s without a result"
         words = f"{speed}{f', {now.failed:,} failed' if now.failed else ''}"
-        share = (now.done - self._done_before) / (now.total - self._done_before)
-        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs")
+        share = (now.done - self._done_before) / max(now.total - self._done_before, 1)
+        self._parts.show("runs", words, share, f"{now.done:,}/{now.total:,} runs", goes_on=goes_on)
 
 
 def per_second(rate: float) -> str:

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
-    from rov_fmu.study.run.cluster import Progress
     from rov_fmu.study.run.run_study import study
+    from rov_fmu.study.run.work import Progress
 
 __all__ = ["Progress", "Results", "study"]
-_MODULES = {"Progress": "run.cluster", "Results": "results.results", "study": "run.run_study"}
+_MODULES = {"Progress": "run.work", "Results": "results.results", "study": "run.run_study"}
 
 
 def __getattr__(name: str) -> Any:

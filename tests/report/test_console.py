@@ -163,15 +163,36 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.Cap
     assert (first.description, first.completed, first.fields["count"]) == ("its step", 0.25, "25%")
     study = StudyParts(shown)
     study.update(Runs(2_000))
-    assert [task.description for task in display.tasks] == ["first", "starting the workers", "runs"]
+    assert [task.description for task in display.tasks] == ["first", "starting the study", "runs"]
     assert [task.completed for task in display.tasks] == [1.0, 1.0, 0.0]
     study.update(Runs(7_000))
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
-    study.update(Runs(7_000, has_workers=False))
-    assert display.tasks[2].description == "no worker is there", "the rate is of before"
     study.update(Runs(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
     assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"
+
+
+def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is shown at each time (s), by what is done then: the rate of the last ten seconds, or that nothing is."""
+    now = [0.0]
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: now[0])
+    display = Progress()
+    shown = Parts(display)
+    study = StudyParts(shown)
+    for now[0], runs, words in (
+        (0.0, Runs(2_000), "runs"),
+        (4.0, Runs(2_000, has_workers=False), "no worker is there, 4 s without a result"),
+        (5.0, Runs(2_100), "20 runs/s"),
+        (11.0, Runs(3_300), "118 runs/s"),
+        (17.0, Runs(3_900), "150 runs/s"),
+        (19.0, Runs(3_900), "129 runs/s"),
+        (19.5, Runs(3_900, has_workers=False), "no worker is there, 2 s without a result"),
+        (627.0, Runs(3_900, failed=7), "610 s without a result, 7 failed"),
+        (637.0, Runs(4_500), "60 runs/s"),
+    ):
+        study.update(runs)
+        assert display.tasks[1].description == words
+    assert shown._steps["runs"][1] > 0.0
 
 
 def test_a_pipe_gets_a_line_again_and_again(
@@ -191,8 +212,8 @@ def test_a_pipe_gets_a_line_again_and_again(
         sleep(0.12)
     sleep(0.12)
     text = capsys.readouterr().err
-    assert "rov-fmu: starting the workers (0 s so far)" in text
-    assert "rov-fmu: starting the workers: done in 2.0 s" in text
+    assert "rov-fmu: starting the study (0 s so far)" in text
+    assert "rov-fmu: starting the study: done in 2.0 s" in text
     line = "rov-fmu: 600 runs/s, 2 failed, 7,200/12,000 runs (2 s so far, about 8 s left)\n"
     assert 1 <= text.count(line) <= 3, "none after the end"
     assert "what the workers do" not in text

@@ -29,6 +29,8 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.study.plan.figures import read_expression
 
+RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
+"""The columns that the results of every study have."""
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
@@ -213,14 +215,14 @@ def _expression(text: str) -> str:
 
 
 class Plan(Strict):
-    """A study: many runs of one FMU, or of one system of FMUs."""
+    """A study: many runs of one vehicle, of one FMU, or of one system of FMUs."""
 
     title: Name | None = None
     """The heading of the page."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
     """An FMU for Co-Simulation in the folder of the plan. A plan has this, `vehicle` or `system`."""
     vehicle: Beside | None = None
-    """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
+    """A vehicle file beside the plan, or the name of a vehicle that ships. It runs without an FMU."""
     system: Annotated[str, AfterValidator(_file)] | None = None
     """A system (SSP) in the folder of the plan. Its variables are "component.variable"."""
     start_time: Finite = 0.0
@@ -232,7 +234,7 @@ class Plan(Strict):
     tolerance: Positive | None = None
     """The relative tolerance, for an FMU whose solver uses one."""
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
-    """The time that a run may take, s; a run that takes longer fails."""
+    """The time that a run of an FMU may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
     """The number of runs. A grid has one for each of its points. saltelli rounds it up to a multiple of (varied
     variables + 2), where correlated ones count as one."""

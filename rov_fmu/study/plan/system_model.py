@@ -15,7 +15,7 @@ from rov_fmu.prove.unpacking import unpack_fmu
 from rov_fmu.study.plan.model import Model, Variable, variable
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SystemModel(Model):
     """A system, whose content is that of the SSP."""
 
@@ -51,7 +51,15 @@ def read_system(path: Path) -> SystemModel:
         if kind_of(part.variables[name]) != "String"
     }
     # The types of variables are those of SSP, which FMI 2.0 has, too.
-    return SystemModel(path.name, read_bytes(path), 2, variables, system.sources, system.values, system.connections)
+    return SystemModel(
+        name=path.name,
+        content=read_bytes(path),
+        version=2,
+        variables=variables,
+        sources=system.sources,
+        values=system.values,
+        connections=system.connections,
+    )
 
 
 def _variable(component: str, part: Part, name: str, values: Mapping[str, Value], connected: bool) -> Variable:

@@ -10,12 +10,10 @@ import pandas as pd
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.plan.figure_units import unit_of
+from rov_fmu.study.plan.plan import REASON, STATUS
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
-from rov_fmu.study.run.worker import REASON, STATUS
 
-PAGE = "study.html"
-"""The mark of a page of a study, by which an existing file is recognised."""
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
 _NUMBERS = 6
