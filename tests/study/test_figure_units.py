@@ -1,5 +1,7 @@
 """A figure has the unit that its expression gives it, and grows with what it is made of as this unit says."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from rov_fmu.study.plan.figures import Figures
 
 UNITS = {"x": "m", "y": "m", "u": "m/s", "psi": "rad", "c": "1", "der(u)": "m/s2", "m": "kg"}
 TIMES = np.linspace(0.0, 10.0, 101)
-VALUES = {
+VALUES: dict[str, Any] = {
     "x": 3.0 + np.sin(TIMES),
     "y": 5.0 - 0.2 * TIMES,
     "u": 0.5 * (1.0 - np.exp(-TIMES)),

@@ -51,8 +51,8 @@ def _unit(node: ast.expr, units: Mapping[str, str]) -> str | None:  # noqa: PLR0
         case ast.BinOp(left=left, op=ast.Mult(), right=right):
             return _scaled(_unit(left, units), _unit(right, units)) or _scaled(_unit(right, units), _unit(left, units))
         case ast.BinOp(left=left, op=ast.Div(), right=right):
-            one, other = _unit(left, units), _unit(right, units)
-            return "1" if one and one == other else _scaled(one, other)
+            above, below = _unit(left, units), _unit(right, units)
+            return "1" if above and above == below else _scaled(above, below)
         case ast.IfExp(body=body, orelse=otherwise):
             return _common(_unit(body, units), _unit(otherwise, units))
         case ast.Compare() | ast.BoolOp() | ast.UnaryOp():
