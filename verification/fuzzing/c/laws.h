@@ -388,10 +388,11 @@ static void check_first_derivative(fmu *f, unsigned state, double derivative)
 /* Check the numbers and the mode of an instance, and that its states and thrusts can be read and are finite. */
 static void check_instance(const slot *s)
 {
-    unsigned vr[N_STATES + N_OTHER];
-    double values[N_STATES + N_OTHER];
-    for (unsigned i = 0; i < N_STATES + N_OTHER; i++) {
-        vr[i] = FIRST_REFERENCE + FIRST_STATE + i + (i < N_STATES ? 0 : N_STATES);
+    enum { ADDED = N_STATES + N_OTHER, ALL = ADDED + N_ADDED };
+    unsigned vr[ALL];
+    double values[ALL];
+    for (unsigned i = 0; i < ALL; i++) {
+        vr[i] = FIRST_REFERENCE + i + (i < N_STATES ? FIRST_STATE : i < ADDED ? FIRST_CALCULATED : FIRST_ADDED - ADDED);
     }
     if (s->f == NULL) {
         return;
@@ -401,7 +402,7 @@ static void check_instance(const slot *s)
     PROPERTY(memcmp(&numbers, &s->f->numbers, sizeof numbers) == 0, "the numbers are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
-    const unsigned n = MAY_OVERFLOW && !is_moderate(s->f) ? N_STATES : N_STATES + N_OTHER; /* a torque may overflow */
+    const unsigned n = is_moderate(s->f) ? ALL : MAY_OVERFLOW ? N_STATES : ADDED; /* others may overflow */
     before_call();
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");
