@@ -47,7 +47,7 @@ static double turning_of(const double v[N_VELOCITIES])
 static bool is_coupled(int a)
 {
     for (int b = 0; b < N_VELOCITIES; b++) {
-        if (b != a && COMPONENT_OF[a] == COMPONENT_OF[b]) {
+        if (b != a && STRUCTURE.component_of[a] == STRUCTURE.component_of[b]) {
             return true;
         }
     }
@@ -79,7 +79,7 @@ static void strongest(const fmu *f, double C[N_VELOCITIES])
 {
     double y[N_SERIES] = {0.0}, size[N_SERIES];
     for (int i = N_VELOCITIES; i < N_USED; i++) { /* the remaining part of a lag has at most the progress 1 */
-        y[i] = COMPONENT_OF[i] < N_DYNAMIC ? 1.0 : 0.0;
+        y[i] = STRUCTURE.component_of[i] < STRUCTURE.dynamic ? 1.0 : 0.0;
     }
     sizes_at(f, y, 0, size);
     memcpy(C, size, sizeof(double[N_VELOCITIES]));
@@ -134,7 +134,7 @@ static double changes_of(const fmu *f, double h)
     rates = turning_of(v) + rates_up_to(f, v);
     sizes_at(f, y, 0, size);
     for (int i = N_VELOCITIES; i < N_USED; i++) {
-        rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* rates of the lags */
+        rates += STRUCTURE.component_of[i] < STRUCTURE.dynamic ? size[i] : 0.0; /* rates of the lags */
     }
     return rates * h;
 }
