@@ -71,7 +71,7 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
 @pytest.mark.parametrize("lanes", [False, True])
 def test_an_output_is_the_same_where_it_is_recorded_alone(lanes: bool) -> None:
     """Outputs are calculated only for those who record them. Some have places behind the parameters."""
-    values, outputs = {"u_1": 0.5, "u_2": -0.3, "V_N": 0.2, "psi_0": 1.0}, [*HEAVY.layout.calculated]
+    values, outputs = {"u_1": 0.5, "u_2": -0.3, "V_N": 0.2, "psi": 1.0}, [*HEAVY.layout.calculated]
     whole = simulate(HEAVY, [0.0, 0.3], values, outputs, lanes=lanes).values[:, 0, 1]
     alone = [simulate(HEAVY, [0.0, 0.3], values, [name], lanes=lanes).values[0, 0, 1] for name in outputs]
     np.testing.assert_array_equal(alone, whole)
