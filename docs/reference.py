@@ -211,7 +211,8 @@ def _current(figure: Figure) -> None:
     rov, ax = DRAWN["bluerov2_heavy"], figure.add_subplot()
     kept = rov["m_rov"] / (rov["m_rov"] + rov["m_a_u"])
     for words, share in (("carried: ν_r stays", 0.0), ("M_RB ν + M_A ν_r stays", kept), ("passes: ν stays", 1.0)):
-        state, north = rov.layout.at_rest | {"u": -0.5 * share}, [0.0]
+        state, north = rov.step(rov.layout.usual_inputs, rov.layout.at_rest, 5.0), [0.0]
+        state["u"] -= 0.5 * share
         for _ in range(10):
             state = rov.step(rov.layout.usual_inputs | {"V_N": 0.5}, state, 0.5)
             north.append(state["x"])

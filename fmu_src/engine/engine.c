@@ -35,15 +35,10 @@ bool single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
     model_begin(v->at, &v->heading);
 #if HAS_DEAD_TIME
     all->line.waiting = 0;
-    for (int i = FIRST_DELAYED; i < FIRST_DELAYED + N_COMMANDS; i++) {
+#endif
+    for (int i = FIRST_COEFFICIENT - N_MEMORY; i < FIRST_COEFFICIENT; i++) {
         v->at[i] = number(&given[i], vehicle, 0);
     }
-#endif
-#ifdef CURRENT_PASSES
-    for (int i = FIRST_BEFORE; i < FIRST_BEFORE + N_CURRENT; i++) {
-        v->at[i] = number(&given[i], vehicle, 0);
-    }
-#endif
     if (HAS_ATTITUDE && model_has_direction(state)) {
         memcpy(v->at + FIRST_STATE, state, sizeof state);
         v->heading = model_heading(v->at, v->heading);

@@ -29,7 +29,7 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
 {
     bool calculates = false;
     for (ptrdiff_t k = 0; k < records; k++) {
-        calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
+        calculates |= recorded[k] >= FIRST_CALCULATED && (recorded[k] < FIRST_COEFFICIENT || recorded[k] >= FIRST_ADDED);
     }
     return calculates;
 }

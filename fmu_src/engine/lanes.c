@@ -65,11 +65,9 @@ static single *follow_lane(block *b, int i)
     for (int k = 0; k < FIRST_CALCULATED; k++) {
         one->at[k] = LANE(b->at[k], i);
     }
-#ifdef CURRENT_PASSES
-    for (int k = FIRST_BEFORE; k < FIRST_BEFORE + N_CURRENT; k++) {
+    for (int k = FIRST_COEFFICIENT - N_MEMORY; k < FIRST_COEFFICIENT; k++) {
         one->at[k] = LANE(b->at[k], i);
     }
-#endif
     one->heading = LANE(b->heading, i);
     return one;
 }

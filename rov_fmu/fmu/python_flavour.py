@@ -10,6 +10,7 @@ import pythonfmu
 from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.equation.python import step
 from rov_fmu.equation.python.printed import printed
+from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -28,7 +29,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
         "log_categories": LOG_CATEGORIES,
         "commands": layout.acting,
         "before": layout.before,
-        "has_only_water": layout.has_only_water,
+        "left_water": [AFLOAT, LEFT_WATER] if layout.has_only_water else None,
         "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }

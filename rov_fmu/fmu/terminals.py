@@ -50,7 +50,7 @@ def terminals(layout: Layout) -> list[Terminal]:
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     actuators = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
-    over_ground = layout.outputs_over_ground
+    over_ground = tuple(layout.over_ground)
     groups = [
         Terminal("thrusters", "input", "bus", f"Commands to the {actuators}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
@@ -61,6 +61,7 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
+        Terminal("electric", "output", "bus", "Electric current and power of the thrusters", tuple(layout.electric)),
         Terminal(
             "validity", "output", "plug", "How far the motion is beyond what was identified", tuple(layout.outside)
         ),

@@ -18,7 +18,7 @@ from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
 from rov_fmu.equation.python.printed import model_of
-from rov_fmu.equation.python.step import DelayLine, formula_name, heading, step
+from rov_fmu.equation.python.step import Memory, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
@@ -67,7 +67,7 @@ class _Formulas:
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
 _thrust_of = cache(
-    lambda curve: compiled(curve_formulas(curve), {table.function: table.force for table in curve.tables})
+    lambda curve: compiled(curve_formulas(curve), {table.function: table.value for table in curve.tables})
 )
 
 
@@ -345,7 +345,7 @@ class Vehicle:
         values = self._outputs(inputs, state)
         for name in self.layout.continued:
             values[name] = heading(values, state.get(name, values[name]))
-        return {name: values[formula_name(name)] for name in self.layout.calculated}
+        return {name: values[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
@@ -384,9 +384,9 @@ class Vehicle:
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
 
-    def delay_line(self) -> DelayLine:
-        """Return the commands that act before the first one, and nothing that waits for the dead time."""
-        return DelayLine(self.layout.usual_inputs, self.layout.acting, self.layout.before)
+    def memory(self) -> Memory:
+        """Return what is kept before the first step: no command acts or waits, and there was no other current."""
+        return Memory(self.layout.usual_inputs, self.layout.acting, self.layout.before)
 
     # ---- One axis alone ----
 
