@@ -12,6 +12,7 @@ from rov_fmu.io.messages import InputError, Progress
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
 
@@ -50,8 +51,9 @@ def identify_tests(
 
     begin("reading the tests")
     folder, files = folder_and_files(paths)
-    draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
-    tests = load_tests(folder, check_outputs, base, files, draft)
+    with one_parser():
+        draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
+        tests = load_tests(folder, check_outputs, base, files, draft)
     identification = identify(tests, begin("identifying the vehicle"))
     outputs = []
     if vehicle:

@@ -10,8 +10,10 @@ from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.tank.readers.parsers import one_parser
 
 
+@one_parser()
 def inspect_tests(
     paths: Sequence[Path], report: Path | None, *, drafts: bool, force: bool
 ) -> tuple[Inspected, dict[Path, str]]:

@@ -11,7 +11,7 @@ from datetime import datetime, timezone
 import numpy as np
 from pydantic import TypeAdapter
 
-from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, EXTERNAL, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.columns import (
     COMMANDS,
@@ -96,10 +96,14 @@ SLIPS = (
 def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
     """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
     names = [name for name in commands if name in table.values]
+
+    def largest(name: str) -> float:
+        numbers = table.numbers.get(name) or [FRACTION.units["%"] * value for value in table.values[name]]
+        return float(np.nanmax(np.abs(numbers), initial=0.0))
+
     for units, most, mistake in SLIPS:
         columns = [name for name in names if table.units[name] in units]
-        rows = table.texts(*columns) if columns else ()
-        if 0.0 < max((abs(float(text)) for row in rows for text in row if text), default=0.0) <= most:
+        if 0.0 < max(map(largest, columns), default=0.0) <= most:
             titles = ", ".join(shown(table.headers[name]) for name in columns)
             raise DataFileError(f"{table.path}, column {titles}: {mistake}")
 
@@ -145,14 +149,14 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
     """
     command = logged_command(keys)
     columns = {"time": LogColumn(TIME)}
-    if axis and not layout.has_wrench:
-        columns[COMMAND] = LogColumn(command, Entry(COMMAND), AXIS)
-    for axis_of_force in AXES.values() if layout.has_wrench else ():  # a vehicle need not have them all
-        name = axis_of_force.external
-        columns[name] = LogColumn(_force_column(axis_of_force), Entry(name), THRUSTERS)
-    for name in (thruster.name for thruster in layout.thrusters if not layout.has_wrench):
-        title = f"thruster {name}" if layout.mix else f"u_{name}"
-        columns[title] = LogColumn(replace(command, also=(name,)), Entry(name), THRUSTERS)
+    if layout.has_wrench:  # a vehicle need not have all forces
+        forces = {one.external: _force_column(one) for one in AXES.values()}
+        columns |= {name: LogColumn(column, Entry(name), THRUSTERS) for name, column in forces.items()}
+    else:
+        columns |= {COMMAND: LogColumn(command, Entry(COMMAND), AXIS)} if axis else {}
+        for name in (thruster.name for thruster in layout.thrusters):
+            title = f"thruster {name}" if layout.mix else f"u_{name}"
+            columns[title] = LogColumn(replace(command, also=(name,)), Entry(name), THRUSTERS)
     for name in layout.commands if layout.mix else ():
         columns[name] = LogColumn(command, Entry(name), INPUTS)
     for name, quantity in QUANTITIES.items():
@@ -241,4 +245,4 @@ def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list
         for name in named or values
     }
     commands = np.column_stack([*mixed.values()])
-    return [*mixed], commands if layout.has_wrench else np.clip(commands, -1.0, 1.0)
+    return [*mixed], np.clip(commands, -1.0, 1.0) if EXTERNAL.isdisjoint(mixed) else commands

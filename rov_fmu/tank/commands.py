@@ -23,7 +23,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from pydantic import Field
 
-from rov_fmu.equation.parts import BodyForce
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, SPAN
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed, shown
@@ -213,8 +213,8 @@ def commands_of(
     return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
 
 
-def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
-    """Return the forces of the wrench that a log has, forward, starboard and down, N or N.m. Raises DataFileError.
+def wrench_of(path: Path, topics: Sequence[Topic], axes: Sequence[Axis], keys: LogKeys) -> Commanded:
+    """Return the forces along some axes of the wrench that a log has, N, or N.m about them. Raises DataFileError.
 
     Of several wrenches, the one that changes most is used, unless [logs] names one.
     """
@@ -225,11 +225,10 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
                 _, body = frames_of(message, topic.source)
                 nothing = np.zeros(len(topic.time))
                 values = np.column_stack([topic.fields.get(field, nothing) for field in message.fields]) @ body.T
-                for force in forces:
-                    is_told = message.fields[force.axis.place]
-                    if is_told and force.axis.is_rotation == (message.gives != FORCE):
-                        series = topic.time, np.nan_to_num(values[:, force.axis.place])
-                        found.setdefault(topic.source, {})[force.name] = series
+                for axis in axes:
+                    if message.fields[axis.place] and axis.is_rotation == (message.gives != FORCE):
+                        series = topic.time, np.nan_to_num(values[:, axis.place])
+                        found.setdefault(topic.source, {})[axis.external] = series
     own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)
     if not own:
         return Commanded()

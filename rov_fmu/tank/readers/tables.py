@@ -144,7 +144,7 @@ def read_table(
     table = replace(table, headers=headers)
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
-    pulses = _pulses(table, commanding)
+    pulses = {name: np.frombuffer(table.numbers[name]) for name in commanding if table.units[name].split()[0] in PULSES}
     unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
     values = {name: np.frombuffer(table.values[name]) for name in table.headers}
     if (times := times_of_day(table)) is not None:
@@ -305,15 +305,6 @@ def _tell_cells(content: Content, table: Columns, pulses: Mapping[str, Array], n
         _, *numbers = table.units[name].split()
         is_none &= values != (float(numbers[0]) if numbers else neutral)
         content.count("no pulse", int(is_none.sum()), column=table.headers[name])
-
-
-def _pulses(table: Columns, commanding: Sequence[str]) -> dict[str, Array]:
-    """Return the pulses of each column that has pulses, as they stand in the file, µs; NaN for blank cells."""
-    names = [name for name in commanding if table.units[name].split()[0] in PULSES]
-    rows = np.fromiter(
-        (float(text or "nan") for texts in (table.texts(*names) if names else ()) for text in texts), float
-    )
-    return dict(zip(names, rows.reshape(-1, max(len(names), 1)).T, strict=False))
 
 
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
