@@ -204,10 +204,11 @@ def commands_of(
     vehicles = {outputs.source.vehicle for outputs in candidates} | _alike(vehicle, topics)
     findings = [*_choice(path, best, own, sorted(vehicles))]
     by_name = dict(zip(names, numbers, strict=True))
-    series, meanings = _fractions(path, best, by_name, parameters, keys)
+    are_pulses = _are_pulses(path, best)
+    series, meanings = _fractions(path, best, by_name, parameters, keys, are_pulses=are_pulses)
     known = {topic for outputs in candidates for topic in outputs.topics}
-    used = {n for n, (_, values) in best.series.items() if np.isfinite(values).any()}
-    used = {*best.used} if _are_pulses(path, best) else used
+    finite = (n for n, (_, values) in best.series.items() if np.isfinite(values).any())
+    used = {*(best.used if are_pulses else finite)}
     without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
     extra = _without_thruster(best, numbers, functions)
     return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
@@ -405,11 +406,17 @@ def _changes_of(values: Array) -> int:
 
 
 def _fractions(
-    path: Path, outputs: _Outputs, numbers: Mapping[str, int], parameters: Parameters, keys: LogKeys
+    path: Path,
+    outputs: _Outputs,
+    numbers: Mapping[str, int],
+    parameters: Parameters,
+    keys: LogKeys,
+    *,
+    are_pulses: bool,
 ) -> tuple[dict[str, Series], list[Finding]]:
     """Return the fractions of the full command of each thruster, not yet limited to ±1, and what had to be decided.
 
-    `numbers` has the number of the output of each thruster, in the order of the motors, or 0. Raises DataFileError.
+    `numbers` has the number of the output of each thruster, in the order of the motors, or 0.
     """
     time, _ = next(iter(outputs.series.values()))
     nothing = time, np.zeros(len(time))
@@ -418,7 +425,7 @@ def _fractions(
     findings = []
     if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
         findings.append(about(path.name, "unknown direction"))
-    if not series or not _are_pulses(path, outputs):
+    if not (series and are_pulses):
         return series, findings
     turned, without_pulse = [], 0
     is_open = keys.neutral is None and parameters.last("MOT_PWM_TYPE") not in _BY_SERVO

@@ -162,9 +162,10 @@ class Folder:
                 instead = "those of the logs are forces on the body, by `wrench` in [logs]: move it to another folder"
             reason = f"its commands are of thrusters, and {instead}"
             self.mistakes.append(f"{self.path / name}: {reason}")
-        largest = [log.commands.largest for log in self.logs if log.commands]
-        names = [curve.name for curve in description.layout.curves]
-        full = {name: max((one.get(name, 0.0) for one in largest), default=0.0) or 1.0 for name in names}
+        largest = dict.fromkeys(description.layout.curves_by_name, 0.0)
+        for name, most in (pair for log in self.logs if log.commands for pair in log.commands.largest.items()):
+            largest[name] = max(most, largest.get(name, 0.0))
+        full = {name: largest[name] or 1.0 for name in description.layout.curves_by_name}
         self.logs = [replace(log, commands=log.commands and log.commands.relative_to(full)) for log in self.logs]
         source = "The largest force in the logs"
         known = {
@@ -174,9 +175,8 @@ class Folder:
         }
         self.rov_file = replace(self.rov_file, description=replace(description, known={**description.known, **known}))
         if self.logs:
-            loads = {form.axis.external: form.axis.load for form in description.layout.axes}
-            commanded = {name for one in largest for name, most in one.items() if most}
-            told = [f"{name} = {full[name]:.3g} {loads[name]}" for name in full if name in loads.keys() & commanded]
+            forces = ((axis.external, axis.load) for axis in description.layout.bare_axes)
+            told = [f"{name} = {largest[name]:.3g} {unit}" for name, unit in forces if largest.get(name)]
             inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
             self.findings.append(Finding("wrench", words={"full": listed(told) or "there is none", "inputs": inputs}))
 
