@@ -23,7 +23,7 @@ from rov_fmu.tank.columns import (
     COMMAND,
     INPUTS,
     THRUSTERS,
-    Entry,
+    LogColumn,
     Names,
     columns_of_log,
     is_of_inputs,
@@ -68,7 +68,7 @@ def _log(
     content: Content,
     piece: Piece,
     layout: Layout,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, LogColumn],
     names: Names,
     axis: Axis | None,
 ) -> Log:
@@ -121,7 +121,7 @@ def _log(
     )
 
 
-def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
+def _move_to_neutral(content: Content, entries: Mapping[str, LogColumn]) -> None:
     """Move the pulses of outputs that rest elsewhere than at the usual neutral pulse to this one, and tell it."""
     fields = (pair for piece in content.pieces for topic in piece.topics for pair in topic.full_fields())
     pulses = grouped((field, values) for field, values in fields if field in entries and entries[field].is_pulse)
@@ -133,7 +133,7 @@ def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
 
 
 def _meant(
-    path: Path, piece: Piece, entries: Mapping[str, Entry]
+    path: Path, piece: Piece, entries: Mapping[str, LogColumn]
 ) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
 
@@ -187,5 +187,5 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
     missing = {*layout.commands, *layout.curve_of} - series.keys()
     for title, column in columns_of_log(layout, None).items() if series and COMMAND not in series else ():
-        if column.commands == expected and column.entry and column.entry.name in missing:
+        if column.commands == expected and column.name in missing:
             yield about(file, "missing column", column=title)

@@ -441,12 +441,12 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
     for name, column in known.items():
         beside = f"{command} [%]" if not column.commands else "depth [m]"
         units = [
-            *column.column.units,
-            *(f"{unit} 2000" for unit in column.column.conversions if unit not in PULSES),
+            *column.units,
+            *(f"{unit} 2000" for unit in column.conversions if unit not in PULSES),
             "us",
             "us 0 2000",
         ]
-        for title in (name, *column.column.also):
+        for title in (name, *column.also):
             for unit in units:
                 header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if column.commands else ",voltage [V]")
                 rows = [f"{n},{n},{1000 + n}{'' if column.commands else ',12'}" for n in range(30)]

@@ -32,7 +32,7 @@ from rov_fmu.tank.catalogue import (
     unit_names,
     words_in,
 )
-from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
+from rov_fmu.tank.columns import columns_of, columns_of_log, has_column
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
@@ -164,7 +164,7 @@ def guessed(
     else:
         layout = fitting(names, layouts) or layout_of(names)
     known = [thruster.name for thruster in layout.thrusters]
-    is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
+    is_column = KnownColumns(columns_of_log(layout, axis)).has
     columns = {title: f"{of.external} [{of.load}]" for title, of in forces.items() if not is_column(title)}
     if not forces and not all(map(is_column, commanding)):
         for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):

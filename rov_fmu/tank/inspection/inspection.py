@@ -18,7 +18,7 @@ from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.clocks import gaps
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import kind_of_table
@@ -110,17 +110,18 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         guess, columns = guessed([*own], own, axis, [described] if described else layouts)
         layout = described or guess
         known = columns_of_log(layout, axis)
-        name_of = partial(_known_name, KnownColumns(known_columns(known)))
+        named = KnownColumns(known)
+        name_of = partial(_known_name, named)
         told = {*map(name_of, own), ""}
         columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
         columns |= renamed
         names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
-        is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
+        flags = {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {
             title: ", ".join(filter(None, (ranges[title], one_of_several(title, numbers[title]))))
             for title in titles
-            if not (is_column(meant[title]) or title in flags)
+            if not (named.has(meant[title]) or title in flags)
         }
         count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
