@@ -21,7 +21,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import has_wrench
-from rov_fmu.tank.inspection.one_log import description_beside, one_log
+from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.readers.parsers import one_parser, read_topics
 from rov_fmu.vehicle.vehicle import Vehicle

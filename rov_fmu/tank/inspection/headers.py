@@ -34,7 +34,7 @@ from rov_fmu.tank.catalogue import (
 )
 from rov_fmu.tank.columns import columns_of, columns_of_log, has_column
 from rov_fmu.tank.commands import PULSE_RANGE
-from rov_fmu.tank.folder import kind_of_table, parts_of_name
+from rov_fmu.tank.folder import axis_in_name, kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
 from rov_fmu.tank.readers.parsers import header_of
 
@@ -116,11 +116,6 @@ def name_and_unit(title: str, units: Collection[str]) -> tuple[list[str], str | 
             if own in names and end - start < len(words) and (len(own) > 1 or end == len(words)):
                 return words[:start] + words[end:], names[own]
     return words, None if len(words) > 1 and words[-1] in _UNKNOWN_UNITS else ""
-
-
-def axis_in_name(path: Path) -> Axis | None:
-    """Return the axis that the name of a file contains."""
-    return next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
 
 
 def layout_of(thrusters: Iterable[str]) -> Layout:

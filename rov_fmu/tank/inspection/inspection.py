@@ -21,8 +21,8 @@ from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.folder import kind_of_table
-from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table, one_of_several
+from rov_fmu.tank.folder import axis_in_name, kind_of_table
+from rov_fmu.tank.inspection.headers import guessed, guessed_of_table, one_of_several
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import checked, rate
 from rov_fmu.tank.read_log import read_logs
