@@ -14,6 +14,7 @@ from rov_fmu.io.messages import InputError, Progress, silent
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import find_vehicle
 from rov_fmu.vehicle.writer import check_report, vehicle_output
 
@@ -84,8 +85,9 @@ def identify_tests(
 
     begin("reading the tests")
     folder, files = folder_and_files(paths)
-    draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
-    tests = load_tests(folder, check_outputs, base, files, draft)
+    with one_parser():
+        draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
+        tests = load_tests(folder, check_outputs, base, files, draft)
     identification = identify(tests, begin("identifying the vehicle"), on_answer)
     outputs = []
     if vehicle:

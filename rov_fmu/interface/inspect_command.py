@@ -14,6 +14,7 @@ from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import shell_words
 from rov_fmu.tank.description import Draft
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.tank.readers.parsers import one_parser
 
 
 def inspect_logs(logs: str | Path | Sequence[str | Path]) -> Inspected:
@@ -29,6 +30,7 @@ def inspect_logs(logs: str | Path | Sequence[str | Path]) -> Inspected:
     return inspection.inspect_logs(checked_paths("logs", logs))
 
 
+@one_parser()
 def inspect_tests(
     paths: Sequence[Path], report: Path | None, *, drafts: bool, force: bool
 ) -> tuple[Inspected, dict[Path, str]]:

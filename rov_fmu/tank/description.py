@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -283,7 +284,7 @@ class Description:
         """True if the file itself describes the thrusters; otherwise they are those of the base or of the paper."""
         return not self.base_name and bool(self.tables.thruster)
 
-    @property
+    @cached_property
     def logged(self) -> Layout:
         """The layout with the axes of which a log of several axes may have recordings.
 

@@ -12,8 +12,8 @@ from rov_fmu.identify.result import Prediction
 from rov_fmu.io.groups import grouped
 from rov_fmu.report.plots.svg import LIGHT, draw_commands, name_axes
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.log import Channel, Log
-from rov_fmu.tank.quality import gaps, unwrapped
 from rov_fmu.vehicle.uncertainty import NORMAL
 
 MOST_SAMPLES = 400
@@ -76,10 +76,10 @@ def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:
 
 def _draw_channel(ax: Axes, channel: Channel) -> None:
     factor, unit = in_degrees(channel.quantity.unit)
-    time, values = unwrapped(channel).samples
+    time, values = channel.unwrapped
     some = slice(None, None, max(1, len(time) // (5 * MOST_SAMPLES)))
     time, values = time[some], factor * values[some]
-    breaks = np.searchsorted(time, [start for start, _ in gaps(channel.time, channel.values)], side="right")
+    breaks = np.searchsorted(time, [start for start, _ in gaps(*channel.samples)], side="right")
     ax.plot(np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan), color=LIGHT["orange"], label="measured")
     ax.margins(x=0.0, y=0.12)
     name_axes(ax, channel.quantity.name, unit)
