@@ -60,7 +60,7 @@ def _power(vehicle: Vehicle, held: Mapping[str, float]) -> float | None:
     for thruster, table in curves.items():
         assert table
         given = sum(gain * fractions[name] for name, gain in layout.gains[thruster].items())
-        power += table.voltage * table.current(given)
+        power += table.voltage * table.value(given)
     return power
 
 

@@ -176,7 +176,7 @@ def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.Monk
     """What is shown at each time (s), by what is done then: the rate of the last ten seconds, or that nothing is."""
     now = [0.0]
     monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: now[0])
-    display = Progress()
+    display = Display()
     shown = Parts(display)
     study = StudyParts(shown)
     for now[0], runs, words in (
@@ -192,7 +192,7 @@ def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.Monk
     ):
         study.update(runs)
         assert display.tasks[1].description == words
-    assert shown._steps["runs"][1] > 0.0
+    assert shown._running["runs"].left is not None
 
 
 def test_a_pipe_gets_a_line_again_and_again(

@@ -16,7 +16,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import WriteError
 from rov_fmu.study import Progress, Results, study
-from rov_fmu.study.plan.model import _variable, vehicle_model
+from rov_fmu.study.plan.model import variable, vehicle_model
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.prepared import Prepared, prepare
 from rov_fmu.study.results.store import Store
@@ -97,7 +97,7 @@ def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
 def test_a_vehicle_has_the_variables_of_its_fmu(kind: str, request: pytest.FixtureRequest) -> None:
     folder = request.getfixturevalue(f"{kind}_dir")
     description = fmpy.read_model_description(str(folder), validate=False)
-    own = {v.name: _variable(v) for v in description.modelVariables}
+    own = {v.name: variable(v) for v in description.modelVariables}
     computed = {name: replace(own[name], can_be_set=False) for name in QUATERNION if name in own}
     assert vehicle_model(KINDS[kind]).variables == own | computed
 

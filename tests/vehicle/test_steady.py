@@ -57,7 +57,7 @@ def test_the_engine_reaches_the_speed_that_was_found() -> None:
     assert found.thrust == pytest.approx(22.21, rel=1e-9)
     (curve,) = rov.layout.curves
     assert curve.electric_current
-    ahead, astern = (curve.electric_current.current(sign * found.command) for sign in (1.0, -1.0))
+    ahead, astern = (curve.electric_current.value(sign * found.command) for sign in (1.0, -1.0))
     assert found.power == pytest.approx(16.0 * 2.0 * (ahead + astern))
     assert rov.find("surge", 1.0, {"X_ext": -20.0}).thrust == pytest.approx(42.21)
     assert rov.find("heave", 0.0).thrust == pytest.approx(2.0), "against its buoyancy"

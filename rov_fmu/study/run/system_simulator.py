@@ -8,8 +8,8 @@ import numpy.typing as npt
 
 from rov_fmu.bridges.system.master import Master
 from rov_fmu.bridges.system.part import Value
-from rov_fmu.study.plan.system_model import SystemModel, split
 from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.plan.system_model import SystemModel, split
 
 
 class SystemSimulator:
