@@ -81,7 +81,7 @@ def _fill(_app: Sphinx, _page: str, source: list[str]) -> None:
     def text(match: re.Match[str]) -> str:
         whole = (ROOT / match[1]).read_text(encoding="utf-8").replace("](docs/", "](")
         whole = re.sub(r"\]\((CHANGELOG|CONTRIBUTING)\.md\)", lambda name: f"]({name[1].lower()}.md)", whole)
-        return re.sub(r"\[([^\]]+)\]\((CITATION\.cff|SECURITY\.md)\)", r"\1 (`\2`)", whole)
+        return re.sub(r"\[([^\]]+)\]\((CITATION\.cff|SECURITY\.md|CODE_OF_CONDUCT\.md)\)", r"\1 (`\2`)", whole)
 
     source[0] = SHOWN_HERE.sub(text, source[0]).replace("](../README.md", "](index.md")
     source[0] = MOVING_PICTURE.sub(lambda _: COCKPIT, source[0])

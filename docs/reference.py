@@ -15,6 +15,8 @@ import click
 from matplotlib.figure import Figure
 
 from docs import compared
+from rov_fmu import homes
+from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan
 from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
 from rov_fmu.fmu.terminals import terminals
@@ -37,7 +39,7 @@ from verification.identification.strangers import gates
 
 Table = list[tuple[str, ...]]
 _NAMES = (
-    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "cli.md", "api.md", "vehicles.md"),
+    *("model.md", "vehicle-file.md", "variables.md", "studies.md", "system.md", "cli.md", "api.md", "vehicles.md"),
     *("identify-formats.md", "identify-method.md", "identification-benchmark.md", "ardusub.md"),
 )
 PAGES = [Path(__file__).with_name(name) for name in _NAMES]
@@ -60,9 +62,9 @@ def tables() -> dict[str, Table]:
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
     found |= {"axis": _axis(), "columns": _columns(), "messages": _messages(), "priors": _priors(), "frames": _frames()}
-    kept = gates.stages()
-    found |= {"gates": gates.gates(kept), "strangers": gates.by_kind(kept[-1:])}
-    found["hidden"] = gates.by_kind(kept[-1:], hidden=True)
+    kept = gates.stages()[-1:]
+    by_group = gates.by_kind(kept)[: 1 + len(gates.GROUPS)]
+    found |= {"gates": gates.gates(kept), "strangers": [(name, *cells) for name, _, *cells in by_group]}
     chosen = ((f"{one.value:g}", one.words, one.seen) for one in CONSTANTS.values())
     found["chosen"] = [("number", "of", "what was seen"), *chosen]
     found["verdict"] = [("", "*usable*", "*do not use*"), *(rule.row for rule in RULES)]
@@ -72,6 +74,8 @@ def tables() -> dict[str, Table]:
         "signal": Signal,
         "input_file": InputFile,
         "keep": Keep,
+        "system": SystemPlan,
+        "component": ComponentTable,
     }
     found |= {name: _plan_table(of) for name, of in plans.items()}
     found |= {name: _table(schema["$defs"][of], schema) for name, of in named.items()}
@@ -210,7 +214,8 @@ def _current(figure: Figure) -> None:
     rov, ax = DRAWN["bluerov2_heavy"], figure.add_subplot()
     kept = rov["m_rov"] / (rov["m_rov"] + rov["m_a_u"])
     for words, share in (("carried: ν_r stays", 0.0), ("M_RB ν + M_A ν_r stays", kept), ("passes: ν stays", 1.0)):
-        state, north = rov.layout.at_rest | {"u": -0.5 * share}, [0.0]
+        state, north = rov.step(rov.layout.usual_inputs, rov.layout.at_rest, 5.0), [0.0]
+        state["u"] -= 0.5 * share
         for _ in range(10):
             state = rov.step(rov.layout.usual_inputs | {"V_N": 0.5}, state, 0.5)
             north.append(state["x"])
@@ -251,10 +256,10 @@ def _interface() -> str:
             if kind == "class" and not members:
                 types.append(f"`{name}`")
                 continue
-            rows.append(_described(path, value) if kind != "data" else (f"`{path}`", _said_of_data(module, name)))
+            rows.append(_described(path, value) if kind != "data" else (f"`rov_fmu.{name}`", _said_of_data(name)))
             rows += [_described(f"{name}.{of}", getattr(value, of)) for of in members.split(", ") if members]
-        also = f"\n\nTypes: {', '.join(types)}." if types else ""
-        found.append(f"## {heading}\n\n{markdown(rows)}{also}")
+        parts = [f"## {heading}", markdown(rows) if rows[1:] else "", f"Types: {', '.join(types)}." if types else ""]
+        found.append("\n\n".join(filter(None, parts)))
     return "\n\n".join(found)
 
 
@@ -273,8 +278,9 @@ def _described(name: str, value: Any) -> tuple[str, str]:
     return f"`{name}{arguments}`", _first_sentence(getdoc(value) or "")
 
 
-def _said_of_data(module: str, name: str) -> str:
-    """The first sentence of the text below an assignment of a module."""
+def _said_of_data(name: str) -> str:
+    """The first sentence of the text below an assignment of a public name."""
+    module, _ = homes()[name]
     (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(module)), re.MULTILINE | re.DOTALL)
     return _first_sentence(words)
 
@@ -326,7 +332,9 @@ def _plan_table(of: type[Strict]) -> Table:
         keys = ", ".join(f"{inner} = ..." for inner in found.get("properties", ()))
         parts = ["needed"] if field.is_required() else []
         parts.append(f"`{{ {keys} }}`" if keys else _allowed(found))
-        parts += [f"default `{field.default}`"] if field.default not in (None, {}) and not field.is_required() else []
+        parts += (
+            [f"default `{field.default}`"] if field.default not in (None, {}, ()) and not field.is_required() else []
+        )
         rows.append((f"`{key}`", ", ".join(parts), _words(found)))
     return [_KEYS, *rows]
 

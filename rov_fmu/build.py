@@ -1,5 +1,6 @@
 """Build the FMU of a vehicle: make its content, compile, write, validate and run it."""
 
+import warnings
 import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +15,9 @@ from rov_fmu.c.compile import (
     BuildError,
     OptionError,
     compile_all,
+    compiler,
     host_platform,
+    is_zig,
 )
 from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive
@@ -71,7 +74,7 @@ def build(
     sign: Path | None = None,
     force: bool = False,
     inputs: Sequence[Path] = (),
-    on_content: Callable[[], None] = lambda: None,
+    on_content: Callable[[Sequence[str]], None] = lambda _: None,
     on_compiled: Callable[[str], None] = lambda _: None,
 ) -> Built:
     """Build the FMU of a vehicle, validate it and run it. After a failure no file is written.
@@ -87,10 +90,10 @@ def build(
     - `sign`: the file of a private key of OpenSSH, with which ssh-keygen signs the FMU in <output>.sig.
     - `force`: True to replace files that this program did not write, or that have changed since.
     - `inputs`: further files that must not be overwritten, like those that the vehicle names.
-    - `on_content`: called once the content is made and the compilers begin.
+    - `on_content`: called with the platforms once the content is made and the compilers begin.
     - `on_compiled`: called with the name of each platform that has been compiled.
 
-        build(load_vehicle(find_vehicle("videoray")), "videoray.fmu", platforms="host").path
+        rov_fmu.build_fmu(rov_fmu.load("videoray"), "videoray.fmu", platforms="host").path
 
     Raises InputError if `vehicle` is not a vehicle, if its coefficients are invalid or if the extra is missing;
     OptionError if another argument is invalid; BuildError if the build fails; FileError if the key or a file of the
@@ -122,7 +125,11 @@ def build(
         raise FileError(f"{signature}: signs the FMU that this one replaces: sign again, or remove the signature")
     chosen = chosen_platforms(platforms, fmi) if native else None
     content = _content(vehicle, chosen, fmi=fmi, interface=interface)
-    on_content()
+    binaries = prebuilt_binaries(content.identifier, content.guid, chosen or [])
+    if chosen == chosen_platforms(None, fmi) and not binaries and (here := _only_here(fmi)):
+        chosen = [here]
+        content = _content(vehicle, chosen, fmi=fmi, interface=interface)
+    on_content(chosen or [])
     start = perf_counter()
     seconds: dict[str, float] = {}
 
@@ -130,7 +137,6 @@ def build(
         seconds[name] = perf_counter() - start
         on_compiled(name)
 
-    binaries = prebuilt_binaries(content.identifier, content.guid, chosen or [])
     missing = [name for name in chosen or [] if name not in binaries]
     binaries |= compile_all(missing, content.sources, content.identifier, done, fmi)
     files = dict(content.files)
@@ -150,11 +156,32 @@ def build(
 def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> Content:
     """Return the content of the FMU, with its expected results and its pages; in pure Python without platforms."""
     native = platforms is not None
-    results, module = reference_results(vehicle), web_module(vehicle.layout)
+    results, module = reference_results(vehicle), _module(vehicle)
     pages = {**documentation(vehicle, native=native, fmi=fmi, interface=interface, module=module), **results}
     if platforms is None:
         return python_content(vehicle, pages)
     return native_content(vehicle, pages, fmi, interface, platforms)
+
+
+def _module(vehicle: Vehicle) -> bytes | None:
+    """Return the module of the page that flies, or None with a warning if the compiler cannot compile it."""
+    try:
+        return web_module(vehicle.layout)
+    except BuildError as error:
+        if is_zig(compiler()):
+            raise
+        warnings.warn(f"{error}. The page in the FMU does not fly", UserWarning, stacklevel=2)
+        return None
+
+
+def _only_here(fmi: int) -> str | None:
+    """Return the platform of this machine, with a warning, if the compiler compiles for no other; or else None."""
+    host, command = host_platform(fmi), compiler()
+    if not host or is_zig(command):
+        return None
+    words = f"{Path(command[0]).name} compiles only for this machine, {host}: pip install ziglang for others"
+    warnings.warn(words, UserWarning, stacklevel=2)
+    return host
 
 
 def _check_options(vehicle: object, backend: str, fmi: int, interface: str | None, *, osp: bool) -> None:

@@ -1,9 +1,11 @@
-"""The command rov-fmu: build, simulate, fly, sitl, export, prove, study, identify, inspect, tune, schema, tables.
+"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, system, study, identify, inspect, tune, schema,
+tables.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
 """
 
+import re
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -35,6 +37,8 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, find_vehicle, shipped_nam
 if TYPE_CHECKING:
     from rov_fmu.build import Built
 
+_MOST_PARTS = 10_000
+"""The largest number of parts of a study."""
 _EXIT_CODES = {
     FileError: 2,
     InputError: 2,
@@ -128,6 +132,15 @@ def _setting(text: str) -> str:
     return text
 
 
+def _part(text: str) -> tuple[int, int]:
+    """Return the number of a part, and that of all parts."""
+    match = re.fullmatch(r"(\d{1,5})/(\d{1,5})", text)
+    number, count = map(int, match.groups()) if match else (0, 0)
+    if not 1 <= number <= count <= _MOST_PARTS:
+        raise click.BadParameter(f"{shown(text)} must be a part and their number, such as 3/64, at most {_MOST_PARTS}")
+    return number, count
+
+
 _FILE = click.Path(path_type=Path, readable=False)  # whether it can be read is checked by the code that reads it
 _file_option = partial(click.option, type=_FILE)
 _output_option = partial(_file_option, "-o", "--output")
@@ -161,7 +174,7 @@ class _Commands(click.Group):
 def _commands(context: click.Context) -> None:
     """Make an FMU of an identified underwater vehicle (ROV).
 
-    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships.
+    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships, which `rov-fmu list` lists.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -225,7 +238,7 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     started = perf_counter()
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
-    with compiling(chosen) as (begin, done):
+    with compiling() as (begin, done):
         built = build(
             loaded,
             platforms=chosen,
@@ -256,6 +269,21 @@ def _print_built(built: "Built", seconds: float) -> None:
     paragraph(out, built.note)
     following = shell_words("rov-fmu", "prove", built.path) if built.was_run else ""
     print_end(built.written, following)
+
+
+# ---- list ------------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("list")
+def _list() -> None:
+    """List the vehicles that ship."""
+    from rov_fmu.report.console import print_table, table
+    from rov_fmu.vehicle.vehicle import load_vehicle
+
+    found = table("", "VEHICLE", [], ["what it is"])
+    for name, path in SHIPPED.items():
+        found.add_row(name, load_vehicle(path).description)
+    print_table(found)
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
@@ -295,16 +323,30 @@ def _print_built(built: "Built", seconds: float) -> None:
     metavar="[FILE.png]",
     help=("Plot to write (.png, .svg, .pdf). Put this option after VEHICLE. Without FILE, a browser shows the plot."),
 )
+@click.option(
+    "--find",
+    "wanted",
+    multiple=True,
+    metavar="AXIS=SPEED",
+    help="Print the command, thrust and electric power that hold a speed (m/s, rad/s) along an axis, such as "
+    "surge=1.0, in place of a simulation. It may be repeated.",
+)
 @_force_option()
-def _simulate(vehicle: Path, **options: Any) -> None:
-    """Simulate a vehicle without an FMU. The default is the VideoRay Pro 4.
+def _simulate(vehicle: Path, wanted: tuple[str, ...], **options: Any) -> None:
+    """Simulate a vehicle without an FMU, or find the thrust for a speed. The default is the VideoRay Pro 4.
 
     Inputs that are not set have their usual values, and states start at 0. Without -o and --plot the values at the end
     are printed.
     """
-    from rov_fmu.interface.simulate_command import Options, simulate_vehicle
+    from rov_fmu.interface.simulate_command import Options, find_speeds, simulate_vehicle
 
-    simulate_vehicle(vehicle, Options(**options))
+    if not wanted:
+        simulate_vehicle(vehicle, Options(**options))
+        return
+    if others := [name for name, value in options.items() if value not in (None, False) and name != "settings"]:
+        option = {"commands": "input"}.get(others[0], others[0])
+        raise click.UsageError(f"simulate: --find simulates nothing: leave --{option} out")
+    find_speeds(vehicle, wanted, options["settings"])
 
 
 @contextmanager
@@ -564,6 +606,30 @@ def _prove(fmu: Path, **options: Any) -> None:
     prove_fmu(fmu, Options(**options))
 
 
+# ---- system ----------------------------------------------------------------------------------------------------------
+
+
+@_commands.command("system")
+@click.argument("plan", type=_FILE, required=False)
+@_output_option(metavar="FILE.ssp", help="System to write.")
+@click.option("--run", "runs", is_flag=True, help="Run it, and write FILE.csv and FILE.svg.")
+@click.option("--list", "lists", is_flag=True, help="List the companions that ship, with their variables.")
+@_force_option()
+def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, force: bool) -> None:
+    """Connect vehicles, their companions and other FMUs to a system (SSP), as PLAN (TOML) says.
+
+    Units, causalities and connections are checked.
+    """
+    from rov_fmu.bridges.system.system_command import list_companions, write_system
+
+    if lists:
+        list_companions()
+    elif plan is None or output is None:
+        raise click.UsageError("system: needs PLAN and -o FILE.ssp, or --list")
+    else:
+        write_system(plan, output, runs=runs, force=force)
+
+
 # ---- study -----------------------------------------------------------------------------------------------------------
 
 
@@ -574,9 +640,18 @@ def _prove(fmu: Path, **options: Any) -> None:
     "--workers",
     type=_number("a whole number from 1 to 1024", 1, 1024, int),
     metavar="N",
-    help="Number of processes. The default is the number of cores.",
+    help="Number of processes, or of threads for a vehicle. The default is the number of cores.",
 )
 @click.option("--scheduler", metavar="ADDRESS", help="Dask scheduler to use, tcp://host:8786.")
+@click.option(
+    "--engine",
+    type=_Choice(["lanes", "fmu"]),
+    help="What runs a vehicle: its equations in this process, which is the default, or its FMU on Dask workers.",
+)
+@click.option(
+    "--part", type=_part, metavar="K/N", help="Do part K of N alone, in RESULTS/parts/K-of-N, as in --part 3/64."
+)
+@click.option("--merge", is_flag=True, help="Do no run. Move those of all parts into RESULTS, and write the page.")
 @click.option(
     "--mcap",
     "run",
@@ -586,13 +661,17 @@ def _prove(fmu: Path, **options: Any) -> None:
 )
 @_force_option()
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, **options: Any) -> None:
-    """Run any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of uncertain parameters.
+    """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.
 
     RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
     same command continues a study that was interrupted.
     """
     if workers and scheduler is not None:
         raise click.UsageError("study: leave --workers out, because the scheduler already has its workers")
+    if options["engine"] == "lanes" and scheduler is not None:
+        raise click.UsageError("study: leave --scheduler out, because --engine lanes runs in this process")
+    if options["merge"] and options["part"]:
+        raise click.UsageError("study: leave --part out, because --merge does no run")
     try:
         from rov_fmu.study.study_command import study_plan
     except ModuleNotFoundError as error:
@@ -656,7 +735,9 @@ def _identify(
         _inspect_logs(tests, report, drafts=drafts, force=force)
         return
     with parts() as shown:
-        identification, files = identify_tests(tests, output, report, mcap, base=base, force=force, begin=shown.begin)
+        identification, files = identify_tests(
+            tests, output, report, mcap, base=base, force=force, begin=shown.begin, on_answer=shown.tell
+        )
     print_identification(identification)
     name = identification.vehicle.identifier
     given = ["--base", shipped_name(base) or base] if base else []
@@ -686,17 +767,13 @@ def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, forc
 
 
 def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, force: bool) -> None:
-    from rov_fmu.interface.inspect_command import inspect_tests
-    from rov_fmu.report.console import print_end, shell_words
+    from rov_fmu.interface.inspect_command import inspect_tests, next_steps
+    from rov_fmu.report.console import print_end
     from rov_fmu.report.console_log import print_inspected
 
     inspected, files = inspect_tests(tests, report, drafts=drafts, force=force)
     print_inspected(inspected, with_draft=not drafts)
-    is_new = inspected.path in files and not inspected.own
-    steps = ["edit this draft"] * is_new + inspected.missing + [shell_words("rov-fmu", "identify", *tests)]
-    if not (drafts or inspected.is_enough):
-        steps = [shell_words("rov-fmu", "inspect", *tests, "--draft")]
-    print_end(files, ", then ".join(steps))
+    print_end(files, ", then ".join(next_steps(inspected, tests, drafts=drafts)))
 
 
 # ---- tune ------------------------------------------------------------------------------------------------------------

@@ -62,6 +62,7 @@ FILES = {
 }
 """The longest form of each argument and option of the command line that names a file."""
 _BARE, _FEW = quote(str(BARE)), quote(str(FEW_TESTS))
+_SYSTEM = quote(str(ROOT / "tests" / "bridges" / "system" / "current.toml"))
 _TUNE = f"tune {quote(str(VIDEORAY))} --axis heave --command 0.3 --v-ss 0.2"
 WRITING = {
     ("build", "output"): Command("rov.fmu", f"build {_BARE} --platform host -o {{f}}/rov.fmu"),
@@ -74,6 +75,7 @@ WRITING = {
     ("export", "output"): Command("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
     ("export", "folder"): Command("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
     ("prove", "report"): Command("proof.html", "prove {fmu} --report {f}/proof.html"),
+    ("system", "output"): Command("my.ssp", f"system {_SYSTEM} -o {{f}}/my.ssp"),
     ("study", "output"): Command("study.html", "study {f}/plan.toml -o {f}"),
     ("study", "run"): Command("run-0.mcap", "study {f}/plan.toml -o {f} --mcap 0"),
     ("identify", "output"): Command("rov.toml", f"identify {_FEW} -o {{f}}/rov.toml"),
@@ -98,6 +100,7 @@ READING = {
     ("export", "gains"): "export videoray --to ardusub-gains --gains points.csv",
     ("prove", "fmu"): "prove videoray.fmu",
     ("prove", "key"): "prove videoray.fmu --key key.pub",
+    ("system", "plan"): "system current.toml",
     ("study", "plan"): "study study.json",
     ("identify", "tests"): "identify tests/steady_surge.csv",
     ("identify", "base"): "identify tests --base videoray.toml",
@@ -113,7 +116,7 @@ COMMANDS = {key: command for key, command in WRITING.items() if key[0] not in ("
 
 def without_progress(err: str) -> str:
     """Return what a command printed on stderr, without the lines about parts and runs that are done."""
-    is_done = r": done in [\d.]+ s|so far(?:, about .* left)?\)|[\d,]+/[\d,]+ runs, .*"
+    is_done = r": done in [\d.]+ s|so far(?:, about .* left)?\)|so far: .*|[\d,]+/[\d,]+ runs, .*"
     return re.sub(rf"^rov-fmu: .*(?:{is_done})\n", "", err, flags=re.M)
 
 

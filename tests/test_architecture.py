@@ -6,6 +6,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from graphlib import CycleError, TopologicalSorter
+from importlib import import_module
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import tomlkit
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+import rov_fmu
 from tests.commands import ROOT
 
 # From the top down. A part imports from itself and from parts below it.
@@ -59,6 +61,7 @@ LARGEST_FOLDER = 12
 LARGER_FOLDERS = {
     "rov_fmu/equation": 13,
     "rov_fmu/fmu": 13,
+    "rov_fmu/identify": 13,
     "rov_fmu/identify/likelihood": 13,
     "rov_fmu/io": 13,
     "rov_fmu/interface": 13,
@@ -131,7 +134,8 @@ def _part(module: str) -> str:
 
 
 def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
-    assert imports["rov_fmu"] == {"rov_fmu.interface.model"}, "which rov_fmu.load imports when it is called"
+    public = {module for module, _ in rov_fmu.homes().values()}
+    assert imports["rov_fmu"] == public, "which are imported when they are used"
     try:
         TopologicalSorter(imports | {"rov_fmu": set()}).prepare()
     except CycleError as circle:
@@ -140,7 +144,7 @@ def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:
 
 def test_the_package_imports_downwards(imports: dict[str, set[str]]) -> None:
     below = {part: {*PARTS[n:], ""} for n, part in enumerate(PARTS)}
-    below |= {"__main__": {"cli", "process"}, "": {"interface"}}
+    below |= {"__main__": {"cli", "process"}, "": {*PARTS} - {"cli"}}
     upward = {
         f"{module} imports {name}"
         for module in FILES
@@ -197,6 +201,42 @@ def test_a_folder_has_at_most_a_dozen_modules() -> None:
             counts[folder] = counts.get(folder, 0) + 1
     counts = {folder: count for folder, count in counts.items() if folder != "verification/interoperability/runners"}
     assert {folder: count for folder, count in counts.items() if count > LARGEST_FOLDER} == LARGER_FOLDERS
+
+
+def _exceptions(module: str) -> Iterator[type[Exception]]:
+    """The classes of a module that are exceptions, by their names, which ruff checks."""
+    tree = ast.walk(ast.parse(FILES[module].read_text(encoding="utf-8")))
+    yield from (
+        getattr(import_module(module), node.name)
+        for node in tree
+        if isinstance(node, ast.ClassDef) and node.name.endswith("Error")
+    )
+
+
+def test_all_exceptions_are_in_the_tree_that_the_first_one_prints() -> None:
+    """Those that a caller can meet are public; those with a star are not, and private ones are left out."""
+    own = {one for module in FILES if module.startswith("rov_fmu.") for one in _exceptions(module)}
+    lines = re.findall(r"^ {8}( *)(\w+)( \*)?$", rov_fmu.RovError.__doc__ or "", re.MULTILINE)
+    above: list[str] = []
+    printed = dict[str, str]()
+    for indent, name, star in lines:
+        del above[len(indent) // 4 :]
+        printed[name] = above[-1] if above else ""
+        above.append(name)
+        assert (name in rov_fmu.__all__) == (not star), name
+    real = {
+        one.__name__: next((kind.__name__ for kind in one.__mro__[1:] if kind in own and kind.__name__[0] != "_"), "")
+        for one in own
+        if not one.__name__.startswith("_")
+    }
+    assert all(issubclass(one, rov_fmu.RovError) for one in own)
+    assert printed == real
+    assert [*printed] == sorted(printed, key=lambda name: _path(name, printed))
+
+
+def _path(name: str, above: dict[str, str]) -> list[str]:
+    """The names from the top of a tree down to one in it."""
+    return [*(_path(above[name], above) if above[name] else []), name]
 
 
 def _installed_without_extras() -> set[str]:

@@ -179,9 +179,8 @@ def sources_of(driven: Actuator) -> dict[str, str]:
 def carried(vehicle: Vehicle) -> tuple[object, ...]:
     """What the parts of a vehicle carry along and `==` does not compare."""
     layout = vehicle.layout
-    tables = {curve.name: [table.path for table in curve.tables] for curve in layout.curves}
-    currents = {curve.name: curve.electric_current for curve in layout.curves}
-    return tables, currents, layout.voltage_source
+    measured = {curve.name: (*curve.tables, curve.electric_current) for curve in layout.curves}
+    return {name: [table and table.path for table in own] for name, own in measured.items()}, layout.voltage_source
 
 
 def four_axes(vehicle: Vehicle) -> Vehicle:

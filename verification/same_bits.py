@@ -108,8 +108,7 @@ class Flight:
     """An unzipped FMU that makes runs. `columns` are its variables and the unknowns of its directional derivatives."""
 
     def __init__(self, folder: Path, description: Any) -> None:
-        both = (unknown.variable.name for unknown in (*description.outputs, *description.derivatives))
-        unknowns = [*dict.fromkeys(both)]  # the velocity over ground is both
+        unknowns = [unknown.variable.name for unknown in (*description.outputs, *description.derivatives)]
         self.slave = Slave(folder)
         self.names = [v.name for v in description.modelVariables]
         self.columns = [*self.names, *(f"change of {name}" for name in unknowns)]

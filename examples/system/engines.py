@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from examples.systems import PARAMETER_SET
+from rov_fmu.bridges.system.ssp import PARAMETER_SET
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -94,7 +94,12 @@ def in_30_lines(folder: Path, parameters: str) -> Trajectory:
 
 
 def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
-    """libcosim from the SSP archive, or from the OSP configuration, connected by variable groups.
+    """libcosim from the SSP archive, or from the OSP configuration, connected by variable groups."""
+    return by_libcosim(system_files(folder, parameters)[osp], NAMES, STEPS, osp=osp)
+
+
+def by_libcosim(file: Path, names: Sequence[tuple[str, str]], steps: int, *, osp: bool = False) -> Trajectory:
+    """Return some outputs of a system by libcosim, which knows the step.
 
     It counts time in nanoseconds, so its steps are off by the last bits, and with them the results.
     """
@@ -104,34 +109,39 @@ def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
 
     log_output_level(CosimLogLevel.WARNING)
     open_file = CosimExecution.from_osp_config_file if osp else CosimExecution.from_ssp_file
-    execution = open_file(str(system_files(folder, parameters)[osp]))
-    index = {component: execution.slave_index_from_instance_name(component) for component in OUTPUTS}
+    execution = open_file(str(file))
+    index = {component: execution.slave_index_from_instance_name(component) for component, _ in names}
     reference = {c: {v.name.decode(): v.reference for v in execution.slave_variables(i)} for c, i in index.items()}
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
     rows = []
-    for _ in range(STEPS):
+    for _ in range(steps):
         assert execution.step()
-        rows.append([observer.last_real_values(index[c], [reference[c][name]])[0] for c, name in NAMES])
-    return _trajectory(rows)
+        rows.append([observer.last_real_values(index[c], [reference[c][name]])[0] for c, name in names])
+    return _trajectory(rows, names)
 
 
 def ecos(folder: Path, parameters: str) -> Trajectory:
-    """Run Ecos from the SSP archive. It uses the parameter sets of the given name."""
+    """Run Ecos from the SSP archive."""
+    return by_ecos(system_files(folder, parameters)[0], NAMES, STEPS, STEP)
+
+
+def by_ecos(file: Path, names: Sequence[tuple[str, str]], steps: int, step: float) -> Trajectory:
+    """Return some outputs of a system by Ecos, with the parameter sets of the name that all have."""
     from ecospy import EcosSimulation
 
-    with EcosSimulation(ssp_path=str(system_files(folder, parameters)[0]), step_size=STEP) as simulation:
+    with EcosSimulation(ssp_path=str(file), step_size=step) as simulation:
         assert simulation.init(parameter_set=PARAMETER_SET)
         rows = []
-        for _ in range(STEPS):
+        for _ in range(steps):
             simulation.step()
-            rows.append([simulation.get_real(f"{component}::{name}") for component, name in NAMES])
+            rows.append([simulation.get_real(f"{component}::{name}") for component, name in names])
         simulation.terminate()
-    return _trajectory(rows)
+    return _trajectory(rows, names)
 
 
-def _trajectory(rows: Sequence[Sequence[float]]) -> Trajectory:
-    return {f"{component}.{name}": column for (component, name), column in zip(NAMES, np.array(rows).T, strict=True)}
+def _trajectory(rows: Sequence[Sequence[float]], names: Sequence[tuple[str, str]] = NAMES) -> Trajectory:
+    return {f"{component}.{name}": column for (component, name), column in zip(names, np.array(rows).T, strict=True)}
 
 
 class Engine(NamedTuple):

@@ -7,13 +7,15 @@ from collections.abc import Mapping
 from math import pi
 from pathlib import Path
 
-from examples.systems import Component, System, write_osp, write_ssp
+from rov_fmu.bridges.system.companion import companion
+from rov_fmu.bridges.system.companions.autopilot import Autopilot
+from rov_fmu.bridges.system.companions.battery import Battery
+from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.ssp import Component, System, ssp_content, write_osp
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
-from .autopilot import Autopilot
-from .battery import Battery
 from .current import Current
 
 HERE = Path(__file__).parent
@@ -79,19 +81,25 @@ def build_system(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     if main(["build", "--platform", "host", "--osp", "-o", str(folder / "videoray.fmu")]):
         raise RuntimeError("videoray.fmu was not built")
-    for name in SLAVES:
-        build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / f"{name}.py"), "-d", str(folder)]
-        subprocess.run(build, check=True)
+    build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "current.py"), "-d", str(folder)]
+    subprocess.run(build, check=True)
+    for name in ("battery", "autopilot"):
+        (folder / FMUS[name]).write_bytes(companion(name))
     shutil.copy(HERE / "Autopilot_OspModelDescription.xml", folder)
     for parameters, values in parameter_sets().items():
         # Only connected inputs are connectors, for FMPy sets every one of them at every step.
         components = {
             name: Component(
-                folder / fmu, values[name], [v for c, v in CONNECTIONS.values() if c == name], OUTPUTS[name]
+                fmu,
+                (folder / fmu).read_bytes(),
+                values[name],
+                [v for c, v in CONNECTIONS.values() if c == name],
+                OUTPUTS[name],
             )
             for name, fmu in FMUS.items()
         }
-        system = System("dive", components, STEP, STOP, CONNECTIONS, GROUPS)
+        connections = [Connection(*ends) for ends in CONNECTIONS.items()]
+        system = System("dive", components, STEP, STOP, connections, GROUPS)
         ssp, osp = system_files(folder, parameters)
-        write_ssp(ssp, system)
+        ssp.write_bytes(ssp_content(system))
         write_osp(osp, system)

@@ -619,9 +619,8 @@ static void follow_jump(fmu *f, double time, double t, double h)
 /* Warn when a vehicle is above the surface, which its model does not have. */
 static void check_depth(fmu *f)
 {
-    if ((int)DEPTH < N_VARIABLES && f->now.values[DEPTH] < -1e-9) {
-        WARN_ONCE(f, OUT_OF_WATER, "the vehicle has left the water, and this model has no surface: it goes on as under water. "
-                  "Logged once.");
+    if ((int)DEPTH < N_VARIABLES && f->now.values[DEPTH] < -AFLOAT) {
+        WARN_ONCE(f, OUT_OF_WATER, LEFT_WATER "; logged once.", f->now.time);
     }
 }
 
@@ -642,10 +641,10 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
         FAIL(f, "the motion over %g s from t = %g overflows; the state from before is kept.", h, t);
     }
     memcpy(&f->now.values[FIRST_STATE], next, sizeof next);
-    check_depth(f);
     delay_commit(f->now.values, &f->now.line, f->now.time, h);
     f->now.heading = heading;
     f->now.time = t + h; /* the model is autonomous: whatever t says, h seconds have passed */
+    check_depth(f);
     return DONE;
 }
 

@@ -20,11 +20,9 @@
 #define MOST_AT_ONCE 1000
 
 #if defined HAS_POINTS && LANES == 1
-#define STRUCTURE(m, table) ((m)->loaded ? table : FREE_##table)
-#define SIZE_OF(m, what) ((m)->loaded ? N_##what : N_FREE_##what)
+#define STRUCTURE_OF(m) ((m)->loaded ? &STRUCTURE : &FREE_STRUCTURE)
 #else
-#define STRUCTURE(m, table) table
-#define SIZE_OF(m, what) N_##what
+#define STRUCTURE_OF(m) (&STRUCTURE)
 #endif
 
 typedef struct {
@@ -99,7 +97,7 @@ INLINE mask motion_waits(const motion *m, const series *s)
 {
     mask waits = NO;
     for (int i = 0; i < N_MONITORED; i++) {
-        if (s->moving >> STRUCTURE(m, COMPONENT_OF)[i] & 1U) {
+        if (s->moving >> STRUCTURE_OF(m)->component_of[i] & 1U) {
             waits |= s->c[0][i] == 0.0 && s->c[1][i] == 0.0;
         }
     }
@@ -110,8 +108,8 @@ INLINE mask motion_waits(const motion *m, const series *s)
 /* Find the components that move, and set the first coefficients of the others to 0. */
 INLINE void motion_find_moving(const motion *m, series *s)
 {
-    const int *const component_of = STRUCTURE(m, COMPONENT_OF);
-    const int components = SIZE_OF(m, COMPONENTS), dynamic = SIZE_OF(m, DYNAMIC);
+    const int *const component_of = STRUCTURE_OF(m)->component_of;
+    const int components = STRUCTURE_OF(m)->components, dynamic = STRUCTURE_OF(m)->dynamic;
     s->moving = s->blocks = 0;
     for (int i = 0; i < N_SERIES; i++) {
         const uint64_t bit = UINT64_C(1) << component_of[i];
@@ -119,7 +117,7 @@ INLINE void motion_find_moving(const motion *m, series *s)
         s->moving |= s->c[1][i] != 0.0 ? bit : 0U;
     }
     for (int k = 0; k < components; k++) {
-        s->moving |= STRUCTURE(m, COMPONENT_INPUTS)[k] & s->moving ? UINT64_C(1) << k : 0U;
+        s->moving |= STRUCTURE_OF(m)->inputs[k] & s->moving ? UINT64_C(1) << k : 0U;
     }
     if (dynamic < components) { /* a component without an effect need not be computed */
         uint64_t still = 0U; /* one bit for each velocity that stays 0 */
@@ -127,7 +125,7 @@ INLINE void motion_find_moving(const motion *m, series *s)
             still |= m->y[i] == 0.0 && !(s->moving >> component_of[i] & 1U) ? UINT64_C(1) << i : 0U;
         }
         for (int k = dynamic; k < components; k++) {
-            s->moving &= STRUCTURE(m, NEEDED_WITH)[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
+            s->moving &= STRUCTURE_OF(m)->needed_with[k] & ~still ? ~UINT64_C(0) : ~(UINT64_C(1) << k);
         }
     }
     for (int i = 0; i < N_SERIES; i++) {
@@ -179,6 +177,17 @@ INLINE void motion_begin(motion *m, real unit, series *s)
     }
 }
 
+/* Let the last two coefficients be 0 where the series converged before. So a vehicle does not depend on those in other
+ * lanes, which may need a higher order. A single vehicle ends its series there. */
+INLINE void series_keep(series *s, mask converged)
+{
+    for (int n = s->order - 1; LANES > 1 && n <= s->order; n++) {
+        for (int i = 0; i < N_SERIES; i++) {
+            s->c[n][i] = converged ? 0.0 : s->c[n][i];
+        }
+    }
+}
+
 /* Compute coefficients up to a low order. Return true when the series may be used up to t = 1. It ends when this holds for
  * all vehicles that are not `left_out`. */
 INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
@@ -195,6 +204,7 @@ INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
     series_terms(m->n, &m->q, s, 5);
     series_terms(m->n, &m->q, s, 6);
     s->order = 7;
+    series_keep(s, done);
     done = series_converges(s);
     if (ALL(done | left_out)) {
         return done;
@@ -202,17 +212,19 @@ INLINE mask motion_grow_short(const motion *m, series *s, mask left_out)
     series_terms(m->n, &m->q, s, 7);
     series_terms(m->n, &m->q, s, 8);
     s->order = 9;
+    series_keep(s, done);
     return series_converges(s);
 }
 
-/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. */
-INLINE mask motion_grow_long(const motion *m, series *s, mask left_out)
+/* Compute coefficients until the series may be used up to t = 1, or up to ORDER. Return true when it may. It may
+ * already be used where it is `done`. */
+INLINE mask motion_grow_long(const motion *m, series *s, mask done, mask left_out)
 {
-    mask done = NO;
     while (s->order < ORDER) {
         series_terms(m->n, &m->q, s, s->order);
         series_terms(m->n, &m->q, s, s->order + 1);
         s->order += 2;
+        series_keep(s, done);
         done = series_converges(s);
         if (ALL(done | left_out)) {
             break;
@@ -346,7 +358,7 @@ INLINE bool motion_grow(motion *m, series *s)
 /* Compute the coefficients that are left. Return the largest usable t, at most 1; 0 when the series overflows. */
 static double motion_reach(const motion *m, series *s)
 {
-    return motion_grow_long(m, s, NO) ? 1.0 : series_reach(s, m->scale);
+    return motion_grow_long(m, s, NO, NO) ? 1.0 : series_reach(s, m->scale);
 }
 
 /* Put a component to rest when nothing drives it and its states are so small that, in the remaining `rest` seconds, they would
@@ -355,7 +367,7 @@ static bool motion_fades(motion *m, int component, double rest)
 {
     double y[N_SERIES], lost[N_SERIES], rate[N_SERIES];
     for (int i = 0; i < N_SERIES; i++) {
-        const bool own = STRUCTURE(m, COMPONENT_OF)[i] == component;
+        const bool own = STRUCTURE_OF(m)->component_of[i] == component;
         if (own && fmax(fabs(m->y[i]) / m->largest[GROUP[i]], fabs(m->y[i]) * rest / m->covered[i]) > 0.0625 * DBL_EPSILON) {
             return false;
         }
@@ -364,7 +376,7 @@ static bool motion_fades(motion *m, int component, double rest)
     }
     model_rates(m->n, &m->q, y, rate);
     for (int i = 0; i < N_SERIES; i++) {
-        if (STRUCTURE(m, COMPONENT_OF)[i] == component && rate[i] != 0.0) {
+        if (STRUCTURE_OF(m)->component_of[i] == component && rate[i] != 0.0) {
             return false;
         }
     }
@@ -385,13 +397,13 @@ static void motion_settle(motion *m, double rest)
     model_direct(m->n, m->reverse, &m->q);
     model_rates(m->n, &m->q, m->y, rate);
     model_sizes(m->n, &m->q, m->y, size);
-    for (int k = 0; k < SIZE_OF(m, DYNAMIC); k++) {
-        if ((STRUCTURE(m, COMPONENT_INPUTS)[k] & ~m->settled) != 0) {
+    for (int k = 0; k < STRUCTURE_OF(m)->dynamic; k++) {
+        if ((STRUCTURE_OF(m)->inputs[k] & ~m->settled) != 0) {
             continue;
         }
         bool still = true;
         for (int i = 0; i < N_SERIES; i++) {
-            still &= STRUCTURE(m, COMPONENT_OF)[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
+            still &= STRUCTURE_OF(m)->component_of[i] != k || fabs(rate[i]) <= 8.0 * DBL_EPSILON * size[i] + DBL_MIN;
         }
         m->settled |= still || motion_fades(m, k, rest) ? UINT64_C(1) << k : 0U;
     }
@@ -402,9 +414,9 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 {
     bool moves[N_SERIES] = {false}; /* by component */
     for (int i = 0; i < N_SERIES; i++) {
-        moves[STRUCTURE(m, COMPONENT_OF)[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
+        moves[STRUCTURE_OF(m)->component_of[i]] |= fabs(change[i]) > 0.001 * m->largest[GROUP[i]];
     }
-    for (int k = 0; k < SIZE_OF(m, DYNAMIC); k++) {
+    for (int k = 0; k < STRUCTURE_OF(m)->dynamic; k++) {
         if (s->moving >> k & 1U && !moves[k]) {
             return true;
         }
@@ -417,7 +429,7 @@ static bool motion_is_slow(const motion *m, const series *s, const double change
 /* Finish the step with straight or circular motion when all dynamic components have settled. Return true when that was done. */
 static bool motion_coasts(motion *m)
 {
-    if (m->settled != (UINT64_C(1) << SIZE_OF(m, DYNAMIC)) - 1U) {
+    if (m->settled != (UINT64_C(1) << STRUCTURE_OF(m)->dynamic) - 1U) {
         return false;
     }
     motion_coast(m, m->rest, m->state, &m->heading);

@@ -17,8 +17,9 @@ size_t single_size(void)
 }
 
 /* Begin at the attitude that the parameters give, or at the given quaternion if it is not 0. Of the headings that
- * differ by whole turns, the one nearest to psi_0 is taken. The given delayed commands act, and nothing waits. */
-void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
+ * differ by whole turns, the one nearest to psi_0 is taken. The given delayed commands act, and nothing waits. Return
+ * false when the mass matrix is not positive definite, which an FMU refuses, too. */
+bool single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
 {
     whole *const all = (whole *)v;
     double state[N_STATES];
@@ -34,19 +35,15 @@ void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle)
     model_begin(v->at, &v->heading);
 #if HAS_DEAD_TIME
     all->line.waiting = 0;
-    for (int i = FIRST_DELAYED; i < FIRST_DELAYED + N_COMMANDS; i++) {
+#endif
+    for (int i = FIRST_COEFFICIENT - N_MEMORY; i < FIRST_COEFFICIENT; i++) {
         v->at[i] = number(&given[i], vehicle, 0);
     }
-#endif
-#ifdef CURRENT_PASSES
-    for (int i = FIRST_BEFORE; i < FIRST_BEFORE + N_CURRENT; i++) {
-        v->at[i] = number(&given[i], vehicle, 0);
-    }
-#endif
     if (HAS_ATTITUDE && model_has_direction(state)) {
         memcpy(v->at + FIRST_STATE, state, sizeof state);
         v->heading = model_heading(v->at, v->heading);
     }
+    return model_is_definite(&all->numbers);
 }
 
 /* Before the first step, the current before is the present one, unless it was given. */
@@ -112,18 +109,24 @@ double single_length(const double c[], const double scale[], int order, double *
     return length;
 }
 
+/* Give a vehicle the inputs of the step that begins at a time. */
+static void single_set_inputs(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle, ptrdiff_t n)
+{
+    for (int i = 0; i < N_INPUTS; i++) {
+        v->at[i] = number(&given[i], vehicle, n);
+    }
+}
+
 void simulate(SIMULATION)
 {
     const bool calculates = is_calculated(recorded, records);
     whole all;
     single *const v = &all.own;
     for (ptrdiff_t vehicle = first; vehicle < last; vehicle++) {
-        single_begin(v, given, vehicle);
-        failed[vehicle] = times;
-        for (ptrdiff_t n = 0; n < times && *stop == 0; n++) {
-            for (int i = 0; i < N_INPUTS; i++) {
-                v->at[i] = number(&given[i], vehicle, n);
-            }
+        const bool exists = single_begin(v, given, vehicle);
+        failed[vehicle] = exists ? times : 0;
+        for (ptrdiff_t n = 0; n < failed[vehicle] && *stop == 0; n++) {
+            single_set_inputs(v, given, vehicle, ended && n > 0 ? n - 1 : n);
             single_begin_current(v);
             if (calculates) {
                 single_calculate(v);
@@ -132,9 +135,11 @@ void simulate(SIMULATION)
             for (ptrdiff_t k = 0; k < records; k++) {
                 to[k * vehicles * times] = v->at[recorded[k]];
             }
+            if (ended) {
+                single_set_inputs(v, given, vehicle, n);
+            }
             if (n + 1 < times && !single_step(v, time[n], length[n])) {
                 failed[vehicle] = n + 1;
-                break;
             }
         }
     }

@@ -29,7 +29,7 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
 {
     bool calculates = false;
     for (ptrdiff_t k = 0; k < records; k++) {
-        calculates |= recorded[k] >= FIRST_CALCULATED && recorded[k] < FIRST_COEFFICIENT;
+        calculates |= recorded[k] >= FIRST_CALCULATED && (recorded[k] < FIRST_COEFFICIENT || recorded[k] >= FIRST_ADDED);
     }
     return calculates;
 }
@@ -40,12 +40,13 @@ static inline bool is_calculated(const int *recorded, ptrdiff_t records)
  * `given` has one table for each variable, at its place. Inputs are held from each time to the next. Of states, delayed
  * commands and parameters, only the number at the first time counts. length[n] is the time from time[n] to the next one, which
  * the difference of two late times would tell less exactly. `recorded` has the places of the variables to record. They are
- * written to result[record][vehicle][time]. failed[vehicle] becomes the index of the first time that cannot be
- * computed, or `times`. From that time on, nothing is recorded. */
+ * written to result[record][vehicle][time]. They follow from the inputs that begin at that time, or, if `ended` is 1,
+ * from those of the step that ends there, which is what an importer of an FMU reads. failed[vehicle] becomes the index of
+ * the first time that cannot be computed, or `times`. From that time on, nothing is recorded. */
 #define SIMULATION                                                                                                         \
     const table given[N_VARIABLES], const double *time, const double *length, const int *recorded, double *result,        \
         ptrdiff_t *failed, ptrdiff_t times, ptrdiff_t vehicles, ptrdiff_t first, ptrdiff_t last, ptrdiff_t records,        \
-        const volatile int *stop
+        int ended, const volatile int *stop
 
 /* A single vehicle, stepped by itself, which goes on from where it was. Its memory, of single_size() bytes, belongs to the caller, who may
  * change inputs and states there between steps, and may copy it. engine.c knows more of it than these numbers, which would be
@@ -55,7 +56,7 @@ typedef struct {
 } single;
 
 EXPORT size_t single_size(void);
-EXPORT void single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
+EXPORT bool single_begin(single *v, const table given[N_VARIABLES], ptrdiff_t vehicle);
 EXPORT bool single_step(single *v, double t, double h);
 EXPORT void single_calculate(single *v);
 bool single_waits(const single *v);

@@ -29,22 +29,33 @@ typedef struct {
     lane lanes[LANES];
 } block;
 
-/* Let a vehicle enter a lane where it begins, or where it was. */
-static void enter_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_t vehicle, void *going)
+/* Let a vehicle enter a lane where it begins, or where it was. Return false when it cannot begin. */
+static bool enter_lane(block *b, int i, const table given[N_VARIABLES], ptrdiff_t vehicle, void *going)
 {
     lane *const own = &b->lanes[i];
-    own->vehicle = vehicle;
-    own->n = own->pieces = 0;
     if (going) {
         own->single = single_of(going, vehicle);
-    } else {
-        single_begin(own->single, given, vehicle);
+    } else if (!single_begin(own->single, given, vehicle)) {
+        return false;
     }
+    own->vehicle = vehicle;
+    own->n = own->pieces = 0;
     single_begin_current(own->single);
     for (int k = 0; k < N_VARIABLES; k++) {
         LANE(b->at[k], i) = own->single->at[k];
     }
     LANE(b->heading, i) = own->single->heading;
+    return true;
+}
+
+/* Give a lane that is about to begin a step the inputs of the step that begins at a time. */
+static void set_inputs(block *b, int i, const table given[N_VARIABLES], ptrdiff_t n, void *going)
+{
+    for (int k = 0; k < N_INPUTS; k++) {
+        if (!going && given[k].per_time != 0) {
+            LANE(b->at[k], i) = number(&given[k], b->lanes[i].vehicle, n);
+        }
+    }
 }
 
 /* Let the vehicle of its single steps be where the lane is. */
@@ -54,11 +65,9 @@ static single *follow_lane(block *b, int i)
     for (int k = 0; k < FIRST_CALCULATED; k++) {
         one->at[k] = LANE(b->at[k], i);
     }
-#ifdef CURRENT_PASSES
-    for (int k = FIRST_BEFORE; k < FIRST_BEFORE + N_CURRENT; k++) {
+    for (int k = FIRST_COEFFICIENT - N_MEMORY; k < FIRST_COEFFICIENT; k++) {
         one->at[k] = LANE(b->at[k], i);
     }
-#endif
     one->heading = LANE(b->heading, i);
     return one;
 }
@@ -123,6 +132,21 @@ static mask end_steps(block *b, mask ends)
     return ends;
 }
 
+/* Return the order at which the series of a lane ended, which is ORDER unless it may be used up to t = 1. */
+static int order_in_lane(const series *s, int i, bool whole)
+{
+    int order = s->order;
+    while (whole && order > 5) {
+        for (int k = 0; k < N_SERIES; k++) {
+            if (LANE(s->c[order][k], i) != 0.0 || LANE(s->c[order - 1][k], i) != 0.0) {
+                return order;
+            }
+        }
+        order -= 2;
+    }
+    return order;
+}
+
 /* Take a piece in all lanes whose steps have `started`. Return true for those whose steps end with it. *left becomes true for those
  * whose steps must be taken singly. */
 static mask take_piece(block *b, mask started, mask *left)
@@ -137,7 +161,7 @@ static mask take_piece(block *b, mask started, mask *left)
     mask under_way = started & ~motion_waits(m, &s);
     mask whole = motion_grow_short(m, &s, ~under_way);
     if (!ALL(whole | ~under_way)) {
-        whole = motion_grow_long(m, &s, ~under_way);
+        whole = motion_grow_long(m, &s, whole, ~under_way);
     }
     const mask plain = whole & series_keeps_directions(&s);
     for (int i = 0; i < LANES; i++) {
@@ -150,7 +174,8 @@ static mask take_piece(block *b, mask started, mask *left)
                 scale[k] = LANE(m->scale[k], i);
             }
             LANE(reach, i) = LANE(whole, i) ? 1.0 : 0.0;
-            LANE(length, i) = single_length(c, scale, s.order, &LANE(reach, i), &reversed[i]);
+            const int order = order_in_lane(&s, i, LANE(whole, i));
+            LANE(length, i) = single_length(c, scale, order, &LANE(reach, i), &reversed[i]);
             LANE(under_way, i) = LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
         }
     }
@@ -188,38 +213,22 @@ int simulate_in_lanes(SIMULATION, void *going)
         busy = 0;
         for (int i = 0; i < LANES; i++) {
             lane *const own = &b.lanes[i];
-            if (own->vehicle < 0 && waiting < last) {
-                failed[waiting] = times;
-                enter_lane(&b, i, given, waiting++, going);
+            while (own->vehicle < 0 && waiting < last) {
+                failed[waiting] = enter_lane(&b, i, given, waiting, going) ? times : 0;
+                waiting++;
             }
-            if (own->vehicle < 0) {
-                continue;
+            busy += own->vehicle >= 0;
+            if (own->vehicle >= 0 && own->pieces == 0) {
+                set_inputs(&b, i, given, ended && own->n > 0 ? own->n - 1 : own->n, going);
             }
-            busy++;
-            if (own->pieces == 0) {
-                for (int k = 0; k < N_INPUTS; k++) {
-                    if (!going && given[k].per_time != 0) {
-                        LANE(b.at[k], i) = number(&given[k], own->vehicle, own->n);
-                    }
-                }
-                if (own->n + 1 < times) {
-                    LANE(h, i) = length[own->n];
-                    LANE(left, i) = waits_in_lane(&b, i) ? YES : NO;
-                    LANE(begins, i) = ~LANE(left, i);
-                }
-            }
-            LANE(started, i) = own->pieces > 0 ? YES : LANE(begins, i);
         }
         if (waiting > before) {
             model_prepare(b.at, &b.numbers);
         }
-        if (ANY(begins)) {
-            begin_steps(&b, h, begins, started);
-        }
         if (calculates) {
             model_calculate(b.at, &b.numbers, b.heading);
         }
-        for (int i = 0; i < LANES; i++) { /* here, because a piece does not wait for the memory of the results */
+        for (int i = 0; i < LANES; i++) { /* before a piece, which so does not wait for the memory of the results */
             lane *const own = &b.lanes[i];
             if (own->vehicle >= 0 && own->pieces == 0) {
                 double *to = result + own->vehicle * times + own->n;
@@ -229,8 +238,19 @@ int simulate_in_lanes(SIMULATION, void *going)
                 if (own->n + 1 == times) {
                     (void)follow_lane(&b, i);
                     own->vehicle = -1;
+                    continue;
                 }
+                if (ended) {
+                    set_inputs(&b, i, given, own->n, going);
+                }
+                LANE(h, i) = length[own->n];
+                LANE(left, i) = waits_in_lane(&b, i) ? YES : NO;
+                LANE(begins, i) = ~LANE(left, i);
             }
+            LANE(started, i) = own->vehicle >= 0 && own->pieces > 0 ? YES : LANE(begins, i);
+        }
+        if (ANY(begins)) {
+            begin_steps(&b, h, begins, started);
         }
         if (ANY(started)) {
             ends = take_piece(&b, started, &left);

@@ -4,7 +4,9 @@
  * @typedef {{kind: "own" | "ghost" | "measured", times: number[], value: (n: number) => number, band?: (n: number) => number}} Trace */
 /** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, the axis whose V_ss and Tau
  * it marks, the number of the recording's signal that the second line is, and the commands that act on it, if any.
- * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis?: number, signal?: number, commands?: string[]}} Graph */
+ * `more` follows where it fits.
+ * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis?: number, signal?: number, commands?: string[],
+ *   more?: string}} Graph */
 
 /** The choices of charts, which are empty without what they show, by the words of the list. @type {Record<string, (flight: Flight) => Graph[]>} */
 const PANELS = {
@@ -67,7 +69,8 @@ function axisPanels({ pilot, ghost, times, replay }, ofPosition) {
       traces,
       commands: Object.keys(axis.signs),
     };
-    return { ...graph, ...(isPosition ? {} : { axis: a }), ...(isMeasured ? { signal } : {}) };
+    const more = !isPosition && axis.unit === "m/s" ? { more: "through the water" } : {};
+    return { ...graph, ...more, ...(isPosition ? {} : { axis: a }), ...(isMeasured ? { signal } : {}) };
   });
 }
 
@@ -218,13 +221,17 @@ class Chart {
       );
     this.words = this.marks(flight, traces, at, isPointed, hasSteady ? V : null, fromRest ? Tau : null).join(" · ");
     this.title = `${this.panel.title} ${this.reading(traces[0], at, time)} ${this.panel.unit}`;
-    board.text(this.title, 2, 12, { colour: ink, isBold: true });
+    const all = [this.title, this.panel.more].filter(Boolean).join(" ");
+    const fits = board.measure(all, true) + (isSecondLine ? 0 : board.measure(this.words, false)) + 12 < right;
+    board.text(fits ? all : this.title, 2, 12, { colour: ink, isBold: true });
     board.text(this.words, right, board.width < 300 ? 26 : 12, { align: "right" });
   }
 
   /** Tells what it says to who cannot see it. */
   tell() {
-    place(this.board.canvas, { "aria-label": [`Over time: ${this.title}`, this.words].filter(Boolean).join(", ") });
+    place(this.board.canvas, {
+      "aria-label": [`Over time: ${this.title}`, this.panel.more, this.words].filter(Boolean).join(", "),
+    });
   }
 
   /** Returns what a line shows at a time, as text. @param {Trace} trace @param {number} at @param {number} time */

@@ -23,6 +23,11 @@ function shared(one, other) {
   return Math.max(0, wide) * Math.max(0, Math.min(one.bottom, other.bottom) - Math.max(one.top, other.top));
 }
 
+/** Returns the distance between a rectangle and a point. @param {DOMRect} box @param {number[]} point */
+function gap({ left, right, top, bottom }, [x, y]) {
+  return Math.hypot(Math.max(left - x, 0, x - right), Math.max(top - y, 0, y - bottom));
+}
+
 /** The directions in which a label may lie beside its thruster. */
 const SIDES = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
 /** The distances from its thruster at which a label may lie, in radii of the thruster. */
@@ -153,21 +158,21 @@ class Figure {
     });
   }
 
-  /** Puts each label at the end of the jet of its thruster: away from the vehicle's middle, or where it covers less. Labels that would
-   * cover each other are left out. @param {Board} board @param {View} view @param {Model} model @param {DOMRect[]} taken */
+  /** Puts each label at the end of the jet of its thruster: away from the vehicle's middle, or where it covers less, and nearest to its own
+   * thruster. Labels without such a place, and those that would cover each other, are left out. @param {Board} board @param {View} view @param {Model} model @param {DOMRect[]} taken */
   label(board, view, model, taken) {
     const { thrusters } = this.vehicle;
     const [x, y] = view.origin;
     this.boxes = [];
     if (view.scale * this.vehicle.size < (thrusters.length > 4 ? 45 : 24)) return;
     const r = this.shape.radius * view.scale;
-    const covered = this.shape.thrusters.map(({ at }) => {
-      const [u, v] = seen(view, at);
-      return new DOMRect(u - r, v - r, 2 * r, 2 * r);
+    const ends = this.shape.thrusters.map(({ at, along }, n) => {
+      const jet = jetOf(this.share(n, model), this.shape.radius, this.vehicle.size);
+      return [at, plus(at, [jet, along])].map((p) => seen(view, p));
     });
-    this.shape.thrusters.forEach(({ at, along }, n) => {
+    const covered = ends.map(([[u, v]]) => new DOMRect(u - r, v - r, 2 * r, 2 * r));
+    ends.forEach(([, [u, v]], n) => {
       const { label } = thrusters[n];
-      const [u, v] = seen(view, plus(at, [jetOf(this.share(n, model), this.shape.radius, this.vehicle.size), along]));
       const far = Math.hypot(u - x, v - y);
       const away = far < 2 ? [1, 0] : [(u - x) / far, (v - y) / far];
       const width = board.measure(label, true);
@@ -179,7 +184,12 @@ class Figure {
           return { box, cost: [...covered, ...taken].reduce((sum, other) => sum + shared(box, other), turned) };
         }),
       );
-      const { box } = places.reduce((one, other) => (other.cost < one.cost ? other : one));
+      const own = places.filter(({ box }) => {
+        const [mine, ...others] = [ends[n], ...ends].map((points) => Math.min(...points.map((p) => gap(box, p))));
+        return mine <= Math.min(...others) + 1;
+      });
+      if (!own.length) return;
+      const { box } = own.reduce((one, other) => (other.cost < one.cost ? other : one));
       if ([...taken, ...this.boxes].some((other) => shared(box, other) > 0)) return;
       this.boxes.push(box);
       covered.push(box);

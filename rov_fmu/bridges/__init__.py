@@ -1,1 +1,1 @@
-"""Connections to ArduPilot, MuJoCo, Gazebo, CasADi, JAX, Gymnasium, MCAP and thruster managers."""
+"""Systems of FMUs, and connections to ArduPilot, MuJoCo, Gazebo, CasADi, JAX, Gymnasium, MCAP and thruster managers."""

@@ -17,7 +17,6 @@ from rov_fmu.io.file_kinds import IDENTIFIED
 from rov_fmu.io.groups import grouped
 from rov_fmu.report.page.recording import topic_name
 from rov_fmu.tank.log import Channel, Commands, Log
-from rov_fmu.tank.quality import unwrapped
 from rov_fmu.vehicle.uncertainty import NORMAL
 
 
@@ -77,7 +76,7 @@ def _pose(log: Log) -> tuple[Array, dict[str, Array]]:
         channel = log.used(name)
         if channel is None or not channel.count:
             return np.zeros(len(time))
-        return np.interp(time, *unwrapped(channel).samples)
+        return np.interp(time, *channel.unwrapped)
 
     psi, theta, phi = (at_times(axis.position) for axis in (YAW, PITCH, ROLL))
     attitude = Rotation.from_euler("ZYX", np.column_stack([psi, theta, phi])).as_quat(scalar_first=True)
@@ -114,9 +113,9 @@ def _prediction(parts: Sequence[Prediction], channel: Channel | None) -> _Series
     time, measured = (np.concatenate([getattr(part, key) for part in parts]) for key in ("time", "measured"))
     predicted = np.concatenate([part.predicted for part in parts])
     if channel:
-        left = np.all([(channel.time < p.time[0]) | (channel.time > p.time[-1]) for p in parts], axis=0) & channel.there
-        time = np.append(time, channel.time[left])
-        measured = np.append(measured, unwrapped(channel).values[left])
+        times, values = channel.unwrapped
+        left = np.all([(times < p.time[0]) | (times > p.time[-1]) for p in parts], axis=0)
+        time, measured = np.append(time, times[left]), np.append(measured, values[left])
     ends = _band(predicted, np.concatenate([part.deviation for part in parts]))
     none, order = np.full(len(time) - len(predicted), nan), np.argsort(time, kind="stable")
     columns = {"measured": measured} | {

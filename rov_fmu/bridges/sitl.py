@@ -49,6 +49,7 @@ _usual_fraction = pulses()
 _MOTION = ("u", "v", "w", "p", "q", "r", "x", "y", "z", "phi", "theta", "psi")
 _RATES = ("u", "v", "w", "x", "y", "z")
 """The variables whose derivatives the reply contains. Those of the position are the velocity over ground."""
+_CURRENT = "electric_current"
 _LOGGED = {
     "surge velocity [m/s]": SURGE,
     "sway velocity [m/s]": SWAY,
@@ -197,6 +198,7 @@ class Flight:
         self._setup, layout = setup, setup.vehicle.layout
         self._names = [name for name in _MOTION if name in layout.state or name in layout.angles]
         self._names += [f"der({name})" for name in _RATES if name in layout.state]
+        self._names += [_CURRENT] if _CURRENT in layout.electric else []
         if is_mcap(setup.log):
             self._names += [name for name in (*layout.state, *layout.calculated) if name not in self._names]
         self._stepper = Stepper(setup.vehicle, setup.start, self._names)
@@ -205,11 +207,6 @@ class Flight:
         """True when the vehicle is above the surface, which its model does not have."""
         self.outputs = Outputs(setup.servos, motors_of(layout))
         self._held = {**layout.usual_inputs, **setup.start}
-        self._draws = [
-            (current, layout.gains[thruster])
-            for thruster, curve in layout.curve_of.items()
-            if (current := curve.electric_current)
-        ]
         self.log = Log(setup, most_rows) if setup.log and most_rows else None
 
     @property
@@ -236,7 +233,7 @@ class Flight:
         self.is_above = layout.has_only_water and at["z"] < -AFLOAT
         self.outputs.add(h, packet.pulses)
         values, motion = self._measured(at)
-        if battery := self._battery(dict(zip(self._commands, fractions, strict=True))):
+        if battery := self._battery(at):
             values["battery"] = battery
         if self.log:
             self.log.add(h, fractions, self.time, at | motion)
@@ -249,21 +246,12 @@ class Flight:
             return layout.fraction_of(pulse)
         return max(-1.0, min(1.0, _usual_fraction(pulse)))
 
-    def _battery(self, fractions: Mapping[str, float]) -> dict[str, float]:
-        """Return the voltage and the electric current of the battery, as far as the vehicle has them.
-
-        `fractions` has all commands from -1 to 1.
-        """
-        battery = {}
-        if self._draws:
-            battery["voltage"] = self._draws[0][0].voltage
-            battery["current"] = sum(
-                table.current(sum(gain * fractions[name] for name, gain in gains.items()))
-                for table, gains in self._draws
-            )
-        if "voltage" in self._held:
-            battery["voltage"] = self._held["voltage"]
-        return battery
+    def _battery(self, at: Mapping[str, float]) -> dict[str, float]:
+        """Return the voltage and the electric current of the battery, as far as the vehicle has them."""
+        voltages = [table.voltage for curve in self._setup.vehicle.layout.curves if (table := curve.electric_current)]
+        voltage = self._held.get("voltage", next(iter(voltages), None))
+        battery = {} if voltage is None else {"voltage": voltage}
+        return battery | ({"current": at[_CURRENT]} if voltages else {})
 
     def _measured(self, at: Mapping[str, float]) -> tuple[dict[str, Any], dict[str, float]]:
         """Return the values of the reply, and those of the log, from the variables of the vehicle."""

@@ -1,9 +1,15 @@
-"""Compile C with the compiler of the ziglang package: the FMU's libraries, the page's module, and the engine."""
+"""Compile C: the FMU's libraries, the page's module, and the engine.
+
+The compiler is that of the ziglang package, or else a `zig`, `clang` or `cc` on the PATH. Only the one that
+constraints.txt pins promises the same bytes, and only zig compiles for other machines than this one.
+"""
 
 import atexit
 import importlib.util
 import os
 import platform
+import re
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -13,6 +19,7 @@ from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 
 from fat_macho import FatWriter
@@ -21,7 +28,7 @@ from platformdirs import user_cache_path
 from rov_fmu.c.own_files import own_folder
 from rov_fmu.io.child_process import cause, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
-from rov_fmu.io.messages import MOST, listed
+from rov_fmu.io.messages import MOST, RovError, listed
 from rov_fmu.io.paths import FMU_SRC
 
 C_SOURCES = FMU_SRC / "c"
@@ -56,7 +63,7 @@ _NO_SPACE = ("No space left on device", "NoSpaceLeft", "FileTooBig", "File too l
 """What the compiler prints about a file that it could not write completely."""
 
 
-class BuildError(Exception):
+class BuildError(RovError):
     """An error that ends a build. Its text is one line, possibly followed by the compiler's own output."""
 
 
@@ -147,26 +154,82 @@ def host_platform(fmi: int = 2) -> str | None:
 
 
 def compiler() -> list[str]:
-    """Return the C compiler's command. Raises BuildError when it is not installed."""
-    return [str(_compiler_folder() / ("zig.exe" if os.name == "nt" else "zig")), "cc"]
+    """Return the C compiler's command: zig of the ziglang package, or zig, clang or cc on the PATH.
+
+    Raises BuildError when there is none. On Windows, only zig is looked for.
+    """
+    if package := _package_folder("ziglang"):
+        return [str(package / ("zig.exe" if os.name == "nt" else "zig")), "cc"]
+    if zig := shutil.which("zig"):
+        return [zig, "cc"]
+    others = [] if os.name == "nt" else ["clang", "cc"]
+    if other := next(filter(None, map(shutil.which, others)), None):
+        return [other]
+    raise BuildError(
+        f"the C compiler is missing: pip install ziglang, or put {listed(['zig', *others], 'or')} on the PATH"
+    )
 
 
-def _compiler_folder() -> Path:
-    """Return the folder of the C compiler. Raises BuildError when it is not installed."""
-    return _package_folder("ziglang", "the C compiler is missing: pip install ziglang")
+def is_zig(command: Sequence[str]) -> bool:
+    """Return True for the command of zig, which compiles for all platforms."""
+    return [*command[1:]] == ["cc"]
+
+
+def compiler_identity() -> str:
+    """Return what tells a compiler from others: its version, or an empty text without a compiler."""
+    try:
+        command = compiler()
+    except BuildError:
+        return ""
+    if _package_folder("ziglang"):
+        return version("ziglang")
+    return _version(command)
+
+
+def _version(command: Sequence[str]) -> str:
+    """Return what a compiler says of itself."""
+    return subprocess.run([*command, "--version"], capture_output=True, text=True, check=False).stdout
+
+
+def _zig_library(zig: str) -> Path:
+    """Return the folder in which zig has the headers of other systems."""
+    said = subprocess.run([zig, "env"], capture_output=True, text=True, check=False).stdout
+    found = re.search(r'\blib_dir"?\s*[:=]\s*"([^"]+)"', said)
+    return Path(found[1] if found else Path(zig).parent / "lib")
+
+
+def _of_other(command: Sequence[str], arguments: Sequence[str], failed: str) -> list[str]:
+    """Return arguments of zig as those of clang or gcc, which compile for this machine. Raises BuildError for others.
+
+    The warnings are left out: another version has others, which are not about the vehicle.
+    """
+    found, rest = list[str](), iter(arguments)
+    host, name = host_platform(fmi=3), Path(command[0]).name
+    if {LANES_FILE.name, FILTER_LANES_FILE.name} & {*arguments} and "clang" not in _version(command):
+        raise BuildError(f"{failed}: {name} lacks the vectors of clang, which is missing: pip install ziglang")
+    for argument in rest:
+        if argument == "-target":
+            if (target := next(rest)) != (host and PLATFORMS[host].target):
+                where = f"only for this machine, and not for {target}: pip install ziglang"
+                raise BuildError(f"{failed}: {name} compiles {where}")
+        elif argument == "-mcpu=native" and platform.machine().lower() in ("x86_64", "amd64"):
+            found.append("-march=native")
+        elif argument not in ("-mcpu=baseline", *WARNINGS):
+            found.append(argument.replace("-fno-slp", "-fno-tree-slp"))  # which clang understands, too
+    return [*found, "-w"]
 
 
 def fmi_headers() -> Path:
     """Return the folder with the FMI headers, which come with FMPy. Raises BuildError when it is not installed."""
-    return _package_folder("fmpy", "the package fmpy, which has the FMI headers, is not installed") / "c-code"
+    if not (folder := _package_folder("fmpy")):
+        raise BuildError("the package fmpy, which has the FMI headers, is not installed")
+    return folder / "c-code"
 
 
-def _package_folder(package: str, missing: str) -> Path:
-    """Return the folder of a package without importing it. Raises BuildError with the text `missing`."""
+def _package_folder(package: str) -> Path | None:
+    """Return the folder of a package without importing it, or None if it is not installed."""
     spec = importlib.util.find_spec(package)
-    if spec is None or spec.origin is None:
-        raise BuildError(missing)
-    return Path(spec.origin).parent
+    return Path(spec.origin).parent if spec and spec.origin else None
 
 
 def compile_all(
@@ -201,9 +264,9 @@ def _library(name: str, target: str, sources: Mapping[str, str], identifier: str
 
 def _platform_flags(platform: Platform) -> Sequence[str]:
     """Return the arguments for any library of a platform. On Windows, they include a file with its entry point."""
-    if platform.suffix != ".dll":
+    if platform.suffix != ".dll" or not is_zig(command := compiler()):
         return platform.flags
-    headers = _compiler_folder() / "lib" / "libc" / "include" / "any-windows-any"  # which -nostdlib leaves out
+    headers = _zig_library(command[0]) / "libc" / "include" / "any-windows-any"  # which -nostdlib leaves out
     return ["-isystem", str(headers), str(_WINDOWS_FILE), *platform.flags]
 
 
@@ -288,7 +351,9 @@ class _Library:
         with temporary_folder("fmu-") as folder:
             for file, content in self.files.items():
                 Path(folder, file).write_bytes(content.encode() if isinstance(content, str) else content)
-            command = [*compiler(), *self.arguments, "-o", self.name]
+            command = compiler()
+            own = self.arguments if is_zig(command) else _of_other(command, self.arguments, self.failed)
+            command += [*own, "-o", self.name]
             compilers.run(command, folder, self.failed, self.most_lines)
             return Path(folder, self.name).read_bytes()
 

@@ -8,7 +8,6 @@ import sys
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from threading import Lock
 
@@ -23,6 +22,7 @@ from rov_fmu.c.compile import (
     VECTORS_HEADER,
     BuildError,
     compile_engine,
+    compiler_identity,
     engine_flags,
     host_platform,
 )
@@ -96,14 +96,10 @@ def _load(texts: dict[str, str]) -> ctypes.CDLL:
 
 def _key(texts: dict[str, str]) -> str:
     """Return a digest of everything that the library depends on."""
-    try:
-        compiler = version("ziglang")
-    except PackageNotFoundError:
-        compiler = ""  # the compiler is not installed as a package
     *_, file = texts
     machine = sys.platform, platform.machine(), ctypes.sizeof(ctypes.c_void_p)
     processor = _processor() if file in (LANES_FILE.name, FILTER_LANES_FILE.name) else ""
-    inputs = json.dumps([texts, engine_flags(file), compiler, machine, processor], sort_keys=True)
+    inputs = json.dumps([texts, engine_flags(file), compiler_identity(), machine, processor], sort_keys=True)
     return hashlib.sha256(inputs.encode()).hexdigest()[:32]
 
 

@@ -86,6 +86,7 @@ def simulate(
     vehicles: int = 1,
     workers: int | None = None,
     lanes: bool = False,
+    ended: bool = False,
 ) -> Trajectories:
     """Simulate vehicles over the same rising times (s), with all inputs held from each time to the next.
 
@@ -110,6 +111,9 @@ def simulate(
     With `lanes`, the processor's vectors step several vehicles at once, each in a lane of its own. The states then
     differ from those of the FMU by rounding errors, and a vehicle does not depend on the others.
 
+    What is recorded at a time follows from the inputs that begin there. With `ended`, it follows from those of the step
+    that ends there, as an importer reads the outputs of an FMU.
+
     Raises BuildError when the engine cannot be compiled. The arguments are not checked.
     """
     record = list(vehicle.layout.state) if record is None else record
@@ -126,7 +130,7 @@ def simulate(
 
     def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
         sizes = map(ctypes.c_ssize_t, (len(times), vehicles, first, last, len(record)))
-        if run(*pointers, *sizes, ctypes.byref(stop), *([None] if lanes else [])) == 0:
+        if run(*pointers, *sizes, ctypes.c_int(ended), ctypes.byref(stop), *([None] if lanes else [])) == 0:
             raise MemoryError
 
     on_cores(run_part, vehicles, len(times), workers, lanes=lanes)

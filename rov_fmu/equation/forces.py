@@ -264,25 +264,22 @@ def advance(
                 yield Force(ADVANCE, axis.velocity, -(lost * Name(other.velocity)))  # T_|n|v |n| v_a
 
 
-def faded(force: Expression, names: Names) -> list[Expression]:
-    """Return what changes of a buoyancy or a thrust above the surface.
+ABOVE = {"z": 1, OUT_OF_WATER: -1}
+"""The states that are negative above the surface, with the sign of the force that each adds there, times its size / H.
 
-    The share that is left is 1 below, 1 + z/H up to the height H, and 0 above it. Each part is 0 where its state is not
-    negative, so that the force below is exactly that without a surface.
-    """
-    parts = ((sign, Name(state)) for sign, state in ((1, "z"), (-1, OUT_OF_WATER)))
-    return [sign * product(force, names("per_height"), directed(x, 0.0, 1.0), x) for sign, x in parts]
+The share of buoyancy and thrust that is left is 1 below, 1 + z/H up to the height H, and 0 above it."""
 
 
 def _surface(layout: Layout, names: Names) -> Iterator[Force]:
-    """Yield what is lost of the buoyancy and the thrust above the surface."""
+    """Yield the buoyancy and the thrust, once for each state of ABOVE. The table divides them by H."""
     lifting: list[tuple[str, Expression]] = []
     for axis in layout.bare_axes:
         if thrust := _total_thrust(layout, axis, names):
             lifting.append((axis.velocity, Name(axis.coefficient("alpha")) * total(thrust)))
     lifting += [(force.axis, force.formula) for force in advance(layout, names)]
     lifting += [(v, force) for v, force in _buoyancy(layout, names) if v in layout.by_velocity]
-    yield from (Force(AT_SURFACE, v, part) for v, force in lifting for part in faded(force, names))
+    for v, force in lifting:
+        yield from (Force(AT_SURFACE, v, product(force, directed(x, 0.0, 1.0), x)) for x in map(Name, ABOVE))
 
 
 def _buoyancy(layout: Layout, names: Names) -> Iterator[tuple[str, Expression]]:

@@ -27,6 +27,7 @@ from .catalogue import (
     CURRENT,
     CURRENT_DOWN,
     CURVE,
+    EARTH,
     FIN,
     HEADING,
     HEAVE,
@@ -53,6 +54,8 @@ from .catalogue import (
     delayed_declaration,
     delayed_name,
     load_declaration,
+    over_ground_declaration,
+    over_ground_name,
     rate_name,
     velocity_declaration,
     voltage_declaration,
@@ -62,6 +65,7 @@ from .words import (
     actuator_words,
     command_words,
     curve_words,
+    electric_declarations,
     point_declarations,
     point_words,
     rotor_declaration,
@@ -430,17 +434,10 @@ class Layout:
         return position | (HEADING if self.has(YAW) else {})
 
     @cached_property
-    def over_ground(self) -> tuple[str, ...]:
+    def over_ground(self) -> dict[str, Declaration]:
         """The velocity over ground north, east and down: the derivatives of the position."""
-        return tuple(rate_name(name) for name in POSITION if name in self.pose)
-
-    @cached_property
-    def outputs_over_ground(self) -> tuple[str, ...]:
-        """The velocity over ground of a vehicle with points, which is tied to others by it.
-
-        Of other vehicles, it is no output: CasADi, Jaxonomy and PathSim-FMI refuse an output with the name der(x).
-        """
-        return self.over_ground if self.points else ()
+        axes = (axis for x, axis in EARTH.items() if x in self.pose)
+        return {over_ground_name(letter): over_ground_declaration(letter, words) for letter, words in axes}
 
     @cached_property
     def lagging(self) -> dict[str, Declaration]:
@@ -460,7 +457,17 @@ class Layout:
     @cached_property
     def calculated(self) -> dict[str, Declaration]:
         """The calculated variables that are neither states nor rates."""
-        return self.thrust | self.angles | self.outside | self.motion_of_points
+        return self.thrust | self.angles | self.outside | self.motion_of_points | self.added
+
+    @cached_property
+    def electric(self) -> dict[str, Declaration]:
+        """The electric current and the power of the thrusters, if the curves have tables of the current."""
+        return electric_declarations(self.thrusters) if any(curve.electric_current for curve in self.curves) else {}
+
+    @cached_property
+    def added(self) -> dict[str, Declaration]:
+        """The calculated variables that came later than others: they are the last of all, so that no place changed."""
+        return self.over_ground | self.electric
 
     @cached_property
     def thrust(self) -> dict[str, Declaration]:
@@ -496,8 +503,9 @@ class Layout:
     def variables(self) -> tuple[str, ...]:
         """All variables in their one order: that of modelDescription.xml, the arrays of the C code, and the groups."""
         rates, last = map(rate_name, self.state), [*self.health.values(), *(SURFACE if self.surface else ())]
+        calculated = (name for name in self.calculated if name not in self.added)
         parameters = (name for name in (*self.coefficients, *self.initial) if name not in last)
-        return (*self.inputs, *self.state, *rates, *self.calculated, *self.memory, *parameters, *last)
+        return (*self.inputs, *self.state, *rates, *calculated, *self.memory, *parameters, *last, *self.added)
 
     @cached_property
     def places(self) -> dict[str, int]:

@@ -10,51 +10,37 @@ from .python.step import interpolated
 
 
 @dataclass(frozen=True)
-class ThrustTable:
-    """Measured forces of one thruster, with a monotone cubic between the commands."""
+class Table:
+    """Measured thrust or electric current of one thruster over its command, with a cubic between the commands.
+
+    The cubics of a thrust are monotone, and those of a current are straight lines. Of two equal commands, the first
+    one ends an interval, and the second one begins the next.
+    """
 
     name: str
     commands: tuple[float, ...]
     """The commands, from -1 to 1 in rising order."""
-    forces: tuple[float, ...]
-    """The force at each command, N."""
+    values: tuple[float, ...]
+    """The force (N) or the current (A) at each command."""
     slopes: tuple[float, ...]
-    """The derivative of the force with respect to the command, at each command, N."""
+    """The derivative with respect to the command, at each command."""
     voltage: float = 0.0
-    """The voltage at which the table was measured, V; 0 if the curve has only this table."""
+    """The voltage at which the table was measured, V; 0 if the curve has only this table of thrust."""
     path: Path | None = field(default=None, compare=False)
     """The file with the table."""
+    kind: Literal["thrust", "current"] = "thrust"
 
     @property
     def function(self) -> str:
         """The name of the function that formulas call."""
-        return f"thrust_{self.name}"
+        return f"{self.kind}_{self.name}"
 
-    def force(self, command: float) -> float:
-        """Return the force at a command between -1 and 1.
+    def value(self, command: float) -> float:
+        """Return the force or the current at a command between -1 and 1.
 
-        It is the cubic that has the forces and the slopes at the ends of the interval of the command.
+        It is the cubic that has the values and the slopes at the ends of the interval of the command.
         """
-        return float(interpolated(command, (self.commands, self.forces, self.slopes)))
-
-
-@dataclass(frozen=True)
-class CurrentTable:
-    """The electric current of one thruster over its command, measured at one voltage."""
-
-    path: Path
-    commands: tuple[float, ...]
-    """The commands, from -1 to 1 in rising order."""
-    currents: tuple[float, ...]
-    """The current at each command, A."""
-    voltage: float = 0.0
-    """The voltage at which the currents were measured, V."""
-
-    def current(self, command: float) -> float:
-        """Return the current (A) at a command: linear between the points, and that of the last point beyond them."""
-        from numpy import interp  # few vehicles have such tables
-
-        return float(interp(command, self.commands, self.currents))
+        return float(interpolated(command, (self.commands, self.values, self.slopes)))
 
 
 class Part:
@@ -92,11 +78,11 @@ class Curve(Part):
     description: str = ""
     equation: str = ""
     """Where the curve is published: the number of an equation of the paper, or another source."""
-    tables: tuple[ThrustTable, ...] = ()
+    tables: tuple[Table, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
     lag: Lag = "force"
     """What lags with the time constant T: the force, T F' = F(c) - F, or the rotor's speed, T n' = n_c - n."""
-    electric_current: CurrentTable | None = field(default=None, compare=False)
+    electric_current: Table | None = None
     """The current of one thruster. All curves of a vehicle have it, or none."""
 
     @property
@@ -218,7 +204,7 @@ class Point(Part):
         return f"F_{direction}_{self.name}"
 
     def coordinate(self, name: str) -> str:
-        """Return the name of a coordinate of the point: north x, east y or down z."""
+        """Return the name of a coordinate of the point, x, y or z, or of a component of its velocity, vg_N ..."""
         return f"{name}_{self.name}"
 
 

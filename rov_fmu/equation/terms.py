@@ -39,23 +39,22 @@ from .attitude import (
     rotation_terms,
 )
 from .catalogue import (
+    EARTH,
     GRAVITY,
     HEAVE,
     OUT_OF_WATER,
     POINT,
-    POSITION,
     SURGE,
     SWAY,
     YAW,
     cross_name,
-    rate_name,
+    over_ground_name,
 )
 from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
-from .forces import AT_SURFACE, COUPLING, POINTS, Effect, Force, advance, faded, forces_of, rotation, thrusts
+from .forces import ABOVE, AT_SURFACE, COUPLING, POINTS, Effect, Force, advance, forces_of, rotation, thrusts
 from .layout import Layout
 from .mass import MassMatrix
-from .parts import EVERY_COMMAND, Curve, Range, ThrustTable
-from .python.step import formula_name
+from .parts import EVERY_COMMAND, Curve, Range, Table
 from .thrust import Lag, add_rotor, lags_of, steady_name, thrust_formulas
 
 
@@ -99,15 +98,20 @@ class Equation:
     what they need."""
     ends: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
-    tables: Mapping[str, ThrustTable] = field(default_factory=dict)
-    """The thrust tables that the formulas call, by their names."""
+    tables: Mapping[str, Table] = field(default_factory=dict)
+    """The tables that the formulas call, by their names."""
     names: Names = field(default_factory=Names)
     """The names of the quantities of the equation."""
 
     @cached_property
     def measured(self) -> dict[str, Callable[[float], float]]:
-        """The functions of the thrust tables, from a command to the force (N), by their names."""
-        return {name: table.force for name, table in self.tables.items()}
+        """The functions of all tables, from a command to the force (N) or the current (A), by their names."""
+        return {name: table.value for name, table in self.tables.items()}
+
+    @property
+    def thrust_tables(self) -> dict[str, Table]:
+        """The tables of thrust. Those of electric current are for `outputs` alone."""
+        return {name: table for name, table in self.tables.items() if table.kind == "thrust"}
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -243,7 +247,7 @@ def rate_formula(terms: Iterable[Term]) -> Expression:
 def equation_of(layout: Layout) -> Equation:
     """Return the equation of motion of a vehicle: (18) with the coupling, the lags and the kinematics.
 
-    Raises ValueError when two thrust tables have the same name.
+    Raises ValueError when two tables have the same name.
     """
     rotation, quaternion, angles = (
         (rotation_formulas(), quaternion_formulas(), angle_formulas()) if layout.has_attitude else ({}, {}, {})
@@ -274,19 +278,25 @@ def equation_of(layout: Layout) -> Equation:
         {name: rows[name] for name in sorted(rows, key=lambda name: name not in used | starts.keys())},
         starts,
         table.lags,
-        outputs=angles | _outside(layout, table.names) | _motion_of_points(layout, rows),
+        outputs={
+            **angles,
+            **_outside(layout, table.names),
+            **_over_ground(layout, rows),
+            **_motion_of_points(layout),
+            **_electric(layout, table.names),
+        },
         ends=quaternion,
         tables=_tables(layout),
         names=table.names,
     )
 
 
-def _tables(layout: Layout) -> dict[str, ThrustTable]:
-    """Return the thrust tables by the functions that formulas call. Raises ValueError when two have the same name."""
-    measured = [table for curve in layout.curves for table in curve.tables]
+def _tables(layout: Layout) -> dict[str, Table]:
+    """Return the tables by the functions that formulas call. Raises ValueError when two have the same name."""
+    measured = [table for curve in layout.curves for table in (*curve.tables, curve.electric_current) if table]
     tables = {table.function: table for table in measured}
     if len(tables) < len(measured):
-        raise ValueError("two thrust tables have the same name")
+        raise ValueError("two tables have the same name")
     return tables
 
 
@@ -368,12 +378,10 @@ class _Table:
                     if arriving := thrusts(self.layout, axis, self.names, curve, of_thruster):
                         changes.append(gain * (Name(axis.coefficient("alpha")) * total(arriving)))
                 if changes:
-                    yield Term(self._named(total(changes), kind, v, curve.name), (arrived,) * power)
-                for part in faded(total(changes), self.names) if changes and self.layout.surface else ():
-                    force = Force(AT_SURFACE, v, part)
-                    (state,) = force.factors
-                    name = self._named(force.along(reverse=True), kind, v, curve.name, state)
-                    yield Term(self._beyond(Name(state)) * name, (arrived, state), AT_SURFACE)
+                    name = self._named(total(changes), kind, v, curve.name)
+                    yield Term(name, (arrived,) * power)
+                    for state in ABOVE if self.layout.surface else ():
+                        yield Term(self._above(Name(state)) * name, (arrived, state), AT_SURFACE)
             rising = advance(self.layout, self.names, curve, of_rotor("loss_rise")) if curve.has_rotors else ()
             along = [(force.factors[0], force.along(inverse[force.axis])) for force in rising if force.axis in inverse]
             for other, parts in grouped(along).items():
@@ -394,23 +402,26 @@ class _Table:
         velocity, *others = map(Name, directions)
         if others:
             raise ValueError("a force with the direction of another velocity needs an effect of its own")
-        if self._is_constant(ahead) and self._is_constant(astern):
-            coefficient: Expression = self.names(*own)
+        if first.effect is AT_SURFACE:  # equal for both states
+            rest = (state for state in first.factors if state != velocity.identifier)
+            coefficient: Expression = self._above(velocity) * self._named(astern, first.effect.name, v, *rest)
+        elif self._is_constant(ahead) and self._is_constant(astern):
+            coefficient = self.names(*own)
             self.directed[self.names(*own).identifier] = Operation("directed", (velocity, ahead, astern))
         elif all(force.along() == -force.along(reverse=True) for force in forces):
             direction = self.names("direction", velocity.identifier)
             self.directed[direction.identifier] = Operation("directed", (velocity, ONE, -ONE))
             coefficient = direction * self._named(ahead, *own)
-        elif ahead == ZERO:
-            coefficient = self._beyond(velocity) * self._named(astern, *own)
         else:
             raise ValueError("a force whose size depends on a direction may contain coefficients alone")
         return Term(coefficient, first.factors, first.effect)
 
-    def _beyond(self, state: Name) -> Name:
-        """Return a coefficient that is 1 while a state is negative, and 0 otherwise."""
+    def _above(self, state: Name) -> Name:
+        """Return a coefficient that is 1/H with its sign while a state is negative, and 0 otherwise."""
         side = self.names("beyond", state.identifier)
-        self.directed[side.identifier] = Operation("directed", (state, ZERO, ONE))
+        self.directed[side.identifier] = Operation(
+            "directed", (state, ZERO, ABOVE[state.identifier] * self.names("per_height"))
+        )
         return side
 
     def pose(self) -> dict[str, tuple[Term, ...]]:
@@ -553,18 +564,41 @@ def _outside(layout: Layout, names: Names) -> dict[str, Expression]:
     return {**formulas, "outside": largest}
 
 
-def _motion_of_points(layout: Layout, rows: Mapping[str, Sequence[Term]]) -> dict[str, Expression]:
+def _over_ground(layout: Layout, rows: Mapping[str, Sequence[Term]]) -> dict[str, Expression]:
+    """Return formulas for the velocity of the vehicle over ground."""
+    return {over_ground_name(letter): rate_formula(rows[x]) for x, (letter, _) in EARTH.items() if x in layout.pose}
+
+
+def _electric(layout: Layout, names: Names) -> dict[str, Expression]:
+    """Return formulas for the electric current and the power of the thrusters, which follow the commands without lag.
+
+    The current is that of its table, at any voltage of the battery.
+    """
+    formulas: dict[str, Expression] = {}
+    for name, curve in layout.curve_of.items():
+        if table := curve.electric_current:
+            current, voltage = f"electric_current_{name}", of(table.voltage)
+            formulas[current] = call(table.function, names("command", name))
+            formulas[f"electric_power_{name}"] = (voltage if layout.voltage is None else names("battery")) * Name(
+                current
+            )
+    for total_of in ("electric_current", "electric_power") if formulas else ():
+        formulas[total_of] = total(Name(f"{total_of}_{thruster.name}") for thruster in layout.thrusters)
+    return formulas
+
+
+def _motion_of_points(layout: Layout) -> dict[str, Expression]:
     """Return formulas for the position of each point, that of the vehicle and R r, and for the velocity over ground."""
     formulas: dict[str, Expression] = {}
     omega = [Name(v) if v in layout.velocities else of(0.0) for v in "pqr"]
     for point in layout.points:
         r = [Name(point.coefficient(key)) for key in POINT]
         turning = [omega[n - 2] * r[n - 1] - omega[n - 1] * r[n - 2] for n in range(3)]  # omega x r
-        for x, row in zip(POSITION, rotation(layout), strict=True):
-            name, at = point.coordinate(x), Name(x) if x in layout.pose else of(0.0)
-            moving = rate_formula(rows[x]) if x in layout.pose else of(0.0)
-            formulas[name] = at + total(map(mul, row, r))
-            formulas[formula_name(rate_name(name))] = moving + total(map(mul, row, turning))
+        for (x, (letter, _)), row in zip(EARTH.items(), rotation(layout), strict=True):
+            velocity = over_ground_name(letter)
+            at, moving = (Name(name) if x in layout.pose else of(0.0) for name in (x, velocity))
+            formulas[point.coordinate(x)] = at + total(map(mul, row, r))
+            formulas[point.coordinate(velocity)] = moving + total(map(mul, row, turning))
     return formulas
 
 

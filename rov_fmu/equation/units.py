@@ -35,6 +35,8 @@ UNITS = {  # the elements in the order of the schema of OSP-IS
     "1": Unit("Number", "command", display="%", factor=100.0),
     "us": Unit("Pulse width", "command", {"s": 1}, size=1e-6),
     "V": Unit("Voltage", exponents={"kg": 1, "m": 2, "s": -3, "A": -1}),
+    "A": Unit("Electric current", "electric current", {"A": 1}),
+    "W": Unit("Power", "power", {"kg": 1, "m": 2, "s": -3}),
     "N": Unit("Force", "force", {"kg": 1, "m": 1, "s": -2}, element="Force"),
     "N.m": Unit("Torque", "torque", element="Torque"),
     "m/s": Unit("Velocity", "velocity", display="knot", factor=1.0 / (1852.0 / 3600.0), element="LinearVelocity"),

@@ -1,14 +1,16 @@
 """What people read about variables."""
 
+from collections.abc import Sequence
+
 from rov_fmu.io.messages import listed
 
-from .catalogue import HEAVE, LAGS, SURGE, SWAY, Declaration, cited, rate_name
+from .catalogue import EARTH, HEAVE, LAGS, SURGE, SWAY, Declaration, cited, over_ground_name
 from .parts import FAINT, Actuator, Curve, Fin, Point, Thruster
 
 AFLOAT = 1e-9
 """A height above the surface that is no rounding error, m."""
 LEFT_WATER = "the vehicle has left the water at {} s, and goes on as under water, because its file has no [surface]"
-"""What commands say about a vehicle with `Layout.has_only_water`, with the time."""
+"""What commands and FMUs say about a vehicle with `Layout.has_only_water`, with the time."""
 
 
 def curve_words(curve: Curve) -> dict[str, str]:
@@ -32,13 +34,14 @@ def point_declarations(point: Point) -> tuple[dict[str, Declaration], dict[str, 
     """Return the declarations of the force at a point, and of its position and velocity."""
     of = point_words(point)["point"]
     forces, coordinates, velocities = {}, {}, {}
-    for direction, x, words in (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down")):
+    for x, (direction, words) in EARTH.items():
         forces[point.force(direction)] = Declaration(
             "N", f"Force on the vehicle at the {of}, positive {words}", nominal=10.0
         )
-        name = point.coordinate(x)
-        coordinates[name] = Declaration("m", f"Position of the {of}, {words}", nominal=10.0)
-        velocities[rate_name(name)] = Declaration("m/s", f"Velocity over ground of the {of}, {words}")
+        coordinates[point.coordinate(x)] = Declaration("m", f"Position of the {of}, {words}", nominal=10.0)
+        velocities[point.coordinate(over_ground_name(direction))] = Declaration(
+            "m/s", f"Velocity over ground of the {of}, {words}"
+        )
     return forces, coordinates | velocities
 
 
@@ -74,6 +77,17 @@ def rotor_declaration(thruster: Thruster) -> Declaration:
     words = f"Speed n_{thruster.name} of the rotor of {thruster.description or f'thruster {thruster.name}'}"
     rest = "the part beyond the dead band of the command that holds it"
     return Declaration("1", f"{words}: {rest}, positive {_pushes(thruster.direction.value)}", is_share=True)
+
+
+def electric_declarations(thrusters: Sequence[Thruster]) -> dict[str, Declaration]:
+    """Return the declarations of the electric current and the power of each thruster, and of all together."""
+    named = {f"_{t.name}": name_in_words(t) for t in thrusters} | {"": "all thrusters"}
+    kinds = {"current": "A", "power": "W"}
+    return {
+        f"electric_{kind}{suffix}": Declaration(unit, f"Electric {kind} of {words}", nominal=10.0)
+        for kind, unit in kinds.items()
+        for suffix, words in named.items()
+    }
 
 
 def torque_declaration(curve: Curve) -> Declaration:

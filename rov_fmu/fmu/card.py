@@ -1,7 +1,8 @@
 """The model card of a vehicle: what it is, from which data, where it holds, how far to trust it, what it leaves out.
 
 It is made from the vehicle file alone, and is the same in the FMU's page, in the report of an identification, in the
-file documentation/model_card.txt, and in the annotations of modelDescription.xml.
+file documentation/model_card.txt, and in the annotations of modelDescription.xml. What a speed takes is a table of its
+own in the pages; the text has it in words.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,6 +16,7 @@ from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import significant
 from rov_fmu.vehicle.description import UNIT_OF_RANGE, VERDICT
+from rov_fmu.vehicle.steady import beyond_stated, speed_table
 from rov_fmu.vehicle.vehicle import TUNED, Vehicle
 
 _AXES = ("surge", "sway", "heave", "yaw", "pitch", "roll")
@@ -33,6 +35,7 @@ def card(vehicle: Vehicle) -> dict[str, list[str]]:
         holds = [f"Commands of {low:.0%} to {high:.0%}; beyond them the thrust curves extrapolate."]
         tested = [f"{name} from {ends[0]:.0%} to {ends[1]:.0%}" for name, ends in vehicle.tested.items()]
         holds += [f"Tests of each axis had commands of {listed(tested)}."] if tested else []
+    holds += beyond_stated(vehicle)
     holds += [
         f"The {thrust} is negative below {c:.0%}." for thrust, c in reversing(vehicle.layout, vehicle.coefficients)
     ]
@@ -89,12 +92,29 @@ def _in_words(known: Range) -> str:
 def card_text(vehicle: Vehicle) -> str:
     """Return the card as plain text."""
     lines = [f"Model card of {vehicle.name}"]
-    for heading, paragraphs in card(vehicle).items():
+    for heading, paragraphs in with_speeds(vehicle).items():
         lines += ["", heading]
         lines += [
             fill(one, _WIDTH, initial_indent="- ", subsequent_indent="  ", break_long_words=False) for one in paragraphs
         ]
     return "\n".join(lines) + "\n"
+
+
+def with_speeds(vehicle: Vehicle) -> dict[str, list[str]]:
+    """Return the card with what speeds take in words, which is a table in the pages."""
+    speeds = [*_speeds(vehicle)]
+    return card(vehicle) | ({"What a speed takes": speeds} if speeds else {})
+
+
+def _speeds(vehicle: Vehicle) -> Iterator[str]:
+    """Yield a line for each motion with the command, thrust and electric power of some speeds."""
+    for motion, rows in speed_table(vehicle):
+        parts = []
+        for one in rows:
+            thrust = f"{significant(one.thrust, 3)} {one.axis.load}"
+            power = "" if one.power is None else f" and {significant(one.power, 3)} W"
+            parts.append(f"{one.velocity:.3g} {one.axis.unit} at {one.command:.0%} with {thrust}{power}")
+        yield f"{motion.capitalize()}: {'; '.join(parts)}."
 
 
 def read_card(text: str) -> dict[str, list[str]]:

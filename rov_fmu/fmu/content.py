@@ -87,7 +87,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     sources = python_sources(vehicle, declared)
     describe = partial(model_description, vehicle, declared, interfaces=INTERFACES["cs"], native=False)
     guid = _guid(describe(guid=""), sources)
-    files = python_files(vehicle, sources)
+    files = python_files(vehicle.identifier, sources)
     return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
 
 

@@ -9,7 +9,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from rov_fmu.equation.attitude import QUATERNION
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, rate_name
+from rov_fmu.equation.catalogue import EARTH, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, over_ground_name
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Point
 from rov_fmu.equation.units import UNITS, unit_of
@@ -44,7 +44,7 @@ def _groups(layout: Layout) -> Iterator[tuple[str, Members]]:
     for curve in layout.turning_curves:
         yield f"{curve.name}_torque", {f"tau_{curve.name}": "z"}
     yield "current", {"V_N": "x", "V_E": "y", "V_D": "z"}
-    yield "velocity", {rate_name(letter): letter for letter in "xyz"}
+    yield "velocity", {over_ground_name(direction): letter for letter, (direction, _) in EARTH.items()}
     yield "velocity_through_water", {axis.velocity: letter for axis, letter in along}
     yield "angular_velocity" if layout.has_attitude else "yaw_rate", {axis.velocity: letter for axis, letter in about}
     yield "position", {"x": "x", "y": "y"}
@@ -70,12 +70,8 @@ class _Group(NamedTuple):
 
 def _port(point: Point) -> _Group:
     """Return the port of a point: a force that acts there goes in, and the velocity over ground comes out."""
-    directions, coordinates = (
-        zip("NED", "xyz", strict=True),
-        dict(zip(map(point.coordinate, "xyz"), "xyz", strict=True)),
-    )
-    force = {point.force(direction): axis for direction, axis in directions}
-    velocity = {rate_name(name): axis for name, axis in coordinates.items()}
+    force = {point.force(direction): axis for axis, (direction, _) in EARTH.items()}
+    velocity = {point.coordinate(over_ground_name(direction)): axis for axis, (direction, _) in EARTH.items()}
     parts = _Group("Force", "force", force, "N"), _Group("LinearVelocity", "linear_velocity", velocity, "m/s")
     return _Group(_PORT, f"point_{point.name}", parts=parts)
 
@@ -83,7 +79,7 @@ def _port(point: Point) -> _Group:
 def osp_model_description(layout: Layout) -> bytes:
     """Return the XML document. Every input and output is in one group; those that `_groups` lacks have their own."""
     declared = layout.inputs | layout.state | layout.calculated
-    units = {name: one.unit for name, one in declared.items()} | dict.fromkeys(layout.outputs_over_ground, "m/s")
+    units = {name: one.unit for name, one in declared.items()}
     ports = [*map(_port, layout.points)]
     groups = [*ports]
     in_ports = {variable for port in ports for part in port.parts for variable in part.members}

@@ -10,6 +10,7 @@ import pythonfmu
 from rov_fmu.c.compile import PYTHONFMU_LIBRARY, compile_location
 from rov_fmu.equation.python import step
 from rov_fmu.equation.python.printed import printed
+from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -28,7 +29,7 @@ def python_sources(vehicle: Vehicle, variables: tuple[Variable, ...]) -> Mapping
         "log_categories": LOG_CATEGORIES,
         "commands": layout.acting,
         "before": layout.before,
-        "has_only_water": layout.has_only_water,
+        "left_water": [AFLOAT, LEFT_WATER] if layout.has_only_water else None,
         "voltage_ranges": [[*bounds, curves] for bounds, curves in layout.voltage_ranges.items()],
         "variables": [asdict(v) for v in variables],
     }
@@ -44,16 +45,18 @@ def _text(path: Path) -> str:
     return path.read_text(encoding="utf-8")
 
 
-def python_files(vehicle: Vehicle, sources: Mapping[str, str]) -> dict[str, bytes]:
+def python_files(identifier: str, sources: Mapping[str, str]) -> dict[str, bytes]:
     """Return the files that FmuBuilder of pythonfmu would pack, by their path, except its modelDescription.xml.
+
+    The slave is the class in <identifier>_slave.py, one of the sources.
 
     FmuBuilder itself would import the slave into this process. On Linux, another library is before that of PythonFMU.
     """
     package = Path(pythonfmu.__file__).parent
     files = {f"resources/{name}": text.encode() for name, text in sources.items()}
     files |= {f"resources/pythonfmu/{path.name}": path.read_bytes() for path in package.glob("*.py")}
-    files["resources/slavemodule.txt"] = f"{vehicle.identifier}_slave".encode()
+    files["resources/slavemodule.txt"] = f"{identifier}_slave".encode()
     for path in (package / "resources" / "binaries").glob("*/*pythonfmu-export.*"):
-        files[f"binaries/{path.parent.name}/{vehicle.identifier}{path.suffix}"] = path.read_bytes()
-    library = f"binaries/linux64/{vehicle.identifier}.so"
+        files[f"binaries/{path.parent.name}/{identifier}{path.suffix}"] = path.read_bytes()
+    library = f"binaries/linux64/{identifier}.so"
     return {**files, library: compile_location(files[library]), f"binaries/linux64/{PYTHONFMU_LIBRARY}": files[library]}

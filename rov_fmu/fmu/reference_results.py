@@ -84,7 +84,7 @@ class _Experiment:
 
     def references(self) -> list[_Row]:
         """Return the states and the Euler angles from the start to the end."""
-        vehicle, line = self.vehicle, self.vehicle.delay_line()
+        vehicle, memory = self.vehicle, self.vehicle.memory()
         state = vehicle.layout.at_rest
         if vehicle.layout.has_attitude:
             angles = {**dict.fromkeys(vehicle.layout.initial, 0.0), **(self.parameters[1] if self.parameters else {})}
@@ -94,8 +94,8 @@ class _Experiment:
         rows: list[_Row] = [(before, {**state, **vehicle.calculated(self.phases[0][0], state)})]
         for inputs, times in self.phases:
             for t in times:
-                state = line.step(vehicle, inputs, state, before, t - before)
-                rows.append((t, {**state, **vehicle.calculated({**inputs, **line.delayed}, state)}))
+                state = memory.step(vehicle, inputs, state, before, t - before)
+                rows.append((t, {**state, **vehicle.calculated({**inputs, **memory.delayed}, state)}))
                 before = t
         return rows
 

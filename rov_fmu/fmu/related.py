@@ -81,11 +81,10 @@ def _vehicle_file(vehicle: Vehicle, folder: Path) -> bytes:
 def _tables(vehicle: Vehicle) -> Iterator[tuple[Path, str, str]]:
     """Yield the tables that the vehicle file names, with their roles and in words."""
     for curve in vehicle.layout.curves:
-        for table in curve.tables:
-            if table.path:
-                yield table.path, "model", f"Measured thrust, curve {curve.name}"
-        if curve.electric_current:
-            yield curve.electric_current.path, "model", f"Measured electric current, curve {curve.name}"
+        for table in (*curve.tables, curve.electric_current):
+            if table and table.path:
+                quantity = {"thrust": "thrust", "current": "electric current"}[table.kind]
+                yield table.path, "model", f"Measured {quantity}, curve {curve.name}"
     if not vehicle.data:
         return
     for axis, names in TABLES.items():

@@ -33,7 +33,7 @@ def _time_tolerance(t: float, h: float) -> float:
 
 
 class _Vehicle(dict[str, float]):
-    """A vehicle as the delay line moves it: the values of all variables by name, and the equation."""
+    """A vehicle as the memory moves it: the values of all variables by name, and the equation."""
 
     equation: Any
 
@@ -53,7 +53,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.declared: list[dict[str, Any]] = declaration["variables"]
         self.equation = importlib.import_module(f"{self.modelName}_model.equation")
         self.voltage_ranges = declaration["voltage_ranges"]
-        self.has_only_water = declaration["has_only_water"]
+        self.left_water = declaration["left_water"]
         self.values = _Vehicle({v["name"]: v["start"] or 0.0 for v in self.declared})
         self.values.equation = self.equation
         self._set_attitude()
@@ -61,8 +61,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         self.is_initialized = False
         self.stop_time: float | None = None
         commands = declaration["commands"]
-        self.line = step.DelayLine({name: self.values[name] for name in commands}, commands, declaration["before"])
-        self.values |= self.line.delayed
+        self.memory = step.Memory({name: self.values[name] for name in commands}, commands, declaration["before"])
+        self.values |= self.memory.delayed
         self.warned: set[str] = set()
         for reference, v in enumerate(self.declared):
             self.register_variable(
@@ -86,8 +86,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def exit_initialization_mode(self) -> None:
         """Begin the simulation. From now on, only inputs and tunable parameters change."""
         self.is_initialized = True
-        self.line.current = {before: self.values[name] for name, before in self.line.names_before.items()}
-        self.values |= self.line.current
+        self.memory.current = {before: self.values[name] for name, before in self.memory.names_before.items()}
+        self.values |= self.memory.current
 
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused."""
@@ -151,7 +151,7 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             self.log(f"a step of {step_size!r} s passes the stop time {self.stop_time!r}.", Fmi2Status.error)
             return False
         try:
-            after = self.line.step(self.values, self.values, {}, self.time, step_size)
+            after = self.memory.step(self.values, self.values, {}, self.time, step_size)
         except ValueError as error:
             self.log(f"{error}.", Fmi2Status.error)
             return False
@@ -163,11 +163,10 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
             return False
         if abs(current_time - self.time) > _time_tolerance(self.time, step_size):
             self._warn_once("time", f"the step from t = {current_time!r} does not begin at t = {self.time!r}")
-        self.values |= {**after, **self.line.delayed, **self.line.current}
-        if self.has_only_water and self.values["z"] < -1e-9:
-            words = "the vehicle has left the water, and this model has no surface: it goes on as under water"
-            self._warn_once("water", words)
+        self.values |= {**after, **self.memory.delayed, **self.memory.current}
         self.time = end
+        if self.left_water and self.values["z"] < -self.left_water[0]:
+            self._warn_once("water", self.left_water[1].format(f"{end:g}"))
         return True
 
     def _set_attitude(self) -> None:
@@ -209,17 +208,17 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
         return bool(v["initial"] != "calculated")
 
     def _get_fmu_state(self) -> dict[str, Any]:
-        line = {
-            "acting": dict(self.line.acting),
-            "waiting": list(self.line.waiting),
-            "current": dict(self.line.current),
+        kept = {
+            "acting": dict(self.memory.acting),
+            "waiting": list(self.memory.waiting),
+            "current": dict(self.memory.current),
         }
         own = {"values": dict(self.values), "time": self.time, "stop_time": self.stop_time}
-        return {**own, "is_initialized": self.is_initialized, **line}
+        return {**own, "is_initialized": self.is_initialized, **kept}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
         self.time, self.stop_time = state["time"], state["stop_time"]
         self.values |= state["values"]
         self.is_initialized = state["is_initialized"]
-        self.line.acting, self.line.current = dict(state["acting"]), dict(state["current"])
-        self.line.waiting = [step.Change(*change) for change in state["waiting"]]  # a serialized state has lists
+        self.memory.acting, self.memory.current = dict(state["acting"]), dict(state["current"])
+        self.memory.waiting = [step.Change(*change) for change in state["waiting"]]  # a serialized state has lists

@@ -4,10 +4,12 @@ FMI 2.0.4 uses the file of FMI 3.0, including fmiVersion="3.0", so it is the sam
 terminalKind: the standard defines none, and our own kind would only prevent connections to others.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from rov_fmu.equation.catalogue import CURRENT, CURRENT_DOWN
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import Point
 from rov_fmu.equation.words import point_declarations, point_words
 from rov_fmu.io.templates import render
 
@@ -30,13 +32,13 @@ class Terminal:
     rule: str
     description: str
     variables: tuple[str, ...]
-    own: str = ""
-    """The part of the names of the variables that the names of the members lack, so that those of a tether match."""
+    names: tuple[str, ...] = ()
+    """The names of the members, if they differ from those of the variables: those of a tether are the same."""
 
     @property
     def members(self) -> dict[str, str]:
         """The names of the members by those of the variables."""
-        return {name: "".join(name.rsplit(self.own, 1)) if self.own else name for name in self.variables}
+        return dict(zip(self.variables, self.names or self.variables, strict=True))
 
 
 def terminals(layout: Layout) -> list[Terminal]:
@@ -48,7 +50,7 @@ def terminals(layout: Layout) -> list[Terminal]:
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     actuators = "thrusters and fins" if layout.fins else "thrusters"
     commands = "pulse widths" if layout.pulse else "-1 to 1"
-    over_ground = layout.outputs_over_ground
+    over_ground = tuple(layout.over_ground)
     groups = [
         Terminal("thrusters", "input", "bus", f"Commands to the {actuators}, {commands}", tuple(layout.commands)),
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
@@ -59,16 +61,12 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),
         Terminal("attitude", "output", "plug", "Euler angles: roll, pitch and heading", tuple(layout.angles)),
         Terminal("thrust", "output", "bus", "Forces and torques of the thrusters", thrust),
+        Terminal("electric", "output", "bus", "Electric current and power of the thrusters", tuple(layout.electric)),
         Terminal(
             "validity", "output", "plug", "How far the motion is beyond what was identified", tuple(layout.outside)
         ),
     ]
-    for point in layout.points:
-        words = (
-            f"Force on the vehicle at the {point_words(point)['point']}, north, east and down; its place and velocity"
-        )
-        port = (name for part in point_declarations(point) for name in part)
-        groups.append(Terminal(f"point_{point.name}", "port", "bus", words, tuple(port), f"_{point.name}"))
+    groups += map(port_of, layout.points)
     placed = {name for terminal in groups for name in terminal.members}
     for causality, declared in (("input", layout.inputs), ("output", layout.state | layout.calculated)):
         rest = tuple(name for name in declared if name not in placed)
@@ -76,6 +74,19 @@ def terminals(layout: Layout) -> list[Terminal]:
     return [terminal for terminal in groups if terminal.members]
 
 
+def port_of(point: Point) -> Terminal:
+    """Return the terminal of a point: the force on the vehicle goes in, then its place and its velocity come out."""
+    words = f"Force on the vehicle at the {point_words(point)['point']}, north, east and down; its place and velocity"
+    port = tuple(name for part in point_declarations(point) for name in part)
+    names = tuple("".join(name.rsplit(f"_{point.name}", 1)) for name in port)
+    return Terminal(f"point_{point.name}", "port", "bus", words, port, names)
+
+
 def terminals_and_icons(layout: Layout) -> bytes:
-    """Return the XML document."""
-    return render("terminalsAndIcons.xml.j2", terminals=terminals(layout), icon=SIGNAL).encode()
+    """Return the XML document of a vehicle."""
+    return terminals_document(terminals(layout), SIGNAL)
+
+
+def terminals_document(declared: Sequence[Terminal], icon: str = "") -> bytes:
+    """Return the XML document of terminals, with the name of their picture if they have one."""
+    return render("terminalsAndIcons.xml.j2", terminals=declared, icon=icon).encode()

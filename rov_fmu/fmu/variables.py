@@ -2,8 +2,8 @@
 
 modelDescription.xml, the table VARIABLES in interface.h, the documentation and the registration with PythonFMU are
 derived from `variables`. The order is that of `Layout.variables`: inputs, states, derivatives, calculated variables,
-what is kept between steps, coefficients, attitude at the start. The value reference of a variable is its
-place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
+what is kept between steps, coefficients, attitude at the start, outputs that came later. The value reference of a
+variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections.abc import Collection, Mapping
@@ -15,6 +15,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Declaration, rate_name
 from rov_fmu.equation.dependencies import dependencies_of
 from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.words import AFLOAT, LEFT_WATER
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -128,9 +129,8 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         )
     derivatives, dependencies = _derivatives(layout), dependencies_of(layout)
     for name, rate in ((name, rate_name(name)) for name in layout.state):
-        causality = "output" if rate in layout.outputs_over_ground else "local"
         rest = {"derivative_of": name, "dependencies": dependencies[rate]}
-        add(rate, derivatives[name], causality, "continuous", initial="calculated", **rest)
+        add(rate, derivatives[name], "local", "continuous", initial="calculated", **rest)
     for name, declaration in layout.calculated.items():
         add(name, declaration, "output", "continuous", initial="calculated", dependencies=dependencies[name])
     for name, declaration in layout.memory.items():
@@ -165,6 +165,8 @@ def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, in
         interfaces=interfaces,
         ranges=vehicle.layout.voltage_ranges,
         has_only_water=vehicle.layout.has_only_water,
+        afloat=AFLOAT,
+        left_water=LEFT_WATER,
         log_categories=LOG_CATEGORIES,
         c_double=lambda value, otherwise: otherwise if value is None else repr(value),
     )

@@ -28,19 +28,18 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import first_of, lines_on, only
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array, usual_range
-from rov_fmu.tank.description import ROV_FILE, Draft
+from rov_fmu.tank.description import ROV_FILE, Description, Draft
 from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.folder import Folder, file_hash, read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.tank_tables import Row
+from rov_fmu.vehicle.full_thrust import USUAL_SQUARE
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
 
 _QUADRATIC = 0.7
 """The share of the quadratic drag at a large velocity, where nothing else is known."""
 _SAG = 0.03 * 0.9
 """Thrust may depend on a voltage of which nine tenths change by more than this, relatively: 3 % in a steady fall."""
-_SQUARE = 0.8
-"""The usual share of the thrust at full command that grows with the square of the command."""
 _ADDED = 1.5
 """The effective inertia relative to that of the dry vehicle, where no added mass is known."""
 _LEAST_FORCE = 1e-6
@@ -73,7 +72,7 @@ def load_tests(
     logged = dict.fromkeys(axis for kind, axis in contents.files if kind == "log" and axis and contents.mistakes)
     of_logs, useless = list[Finding](), list[str]()
     for log in contents.logs:
-        axes, told = driven_axes(log, layout_of(log, contents))
+        axes, told = driven_axes(log, layout_of(log, description))
         told = told or ([] if axes else [Finding("nothing measured", file=log.file)])
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
@@ -148,16 +147,16 @@ def _driven_together(folder: Folder) -> Iterator[Finding]:
                     yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
 
 
-def layout_of(log: Log, of: Folder | Layout) -> Layout:
+def layout_of(log: Log, of: Description | Layout | None) -> Layout:
     """Return the part of the vehicle that a log concerns: one axis alone for a test of this axis.
 
-    Of a folder, it is that of the largest layout that the vehicle can have. A dive that does not show how the vehicle
-    turns concerns only the axes that it shows: turns that nothing corrects would run away and, by the coupling, carry
-    the motion along these axes with them. Roll and pitch show how it turns, too: a turn rate changes both where the
-    vehicle is tilted, and the heading itself moves nothing but a current.
+    Of a description, it is that of the largest layout that the vehicle can have. A dive that does not show how the
+    vehicle turns concerns only the axes that it shows: turns that nothing corrects would run away and, by the coupling,
+    carry the motion along these axes with them. Roll and pitch show how it turns, too: a turn rate changes both where
+    the vehicle is tilted, and the heading itself moves nothing but a current.
     """
+    assert of
     layout = of if isinstance(of, Layout) else of.layout if log.axis else of.logged
-    assert layout
     shown = [log.axis] if log.axis else shown_axes(log, layout)
     is_part = bool(log.axis) or (layout.has(YAW) and not {ROLL, PITCH, YAW} & {*shown})
     return with_axes_alone(layout, shown) if is_part and layout.has(*shown) else layout
@@ -351,9 +350,9 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
         return np.asarray(whole * np.where(is_back, ratio, 1.0) * (share * c * c + (1.0 - share) * c))
 
     def residuals(x: Array) -> Array:
-        return np.array([*(force(x) - F) / largest / 0.003, (x[1] - _SQUARE) / 0.3, x[2] / 0.5])
+        return np.array([*(force(x) - F) / largest / 0.003, (x[1] - USUAL_SQUARE) / 0.3, x[2] / 0.5])
 
-    start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), _SQUARE, 0.0]
+    start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), USUAL_SQUARE, 0.0]
     fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
     values: dict[str, float] = {}
     for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):

@@ -249,7 +249,9 @@ def _missing_or_doubled_tests(
         names = curve.coefficient("a_t"), curve.coefficient("b_t")
         if curve.name not in thrust:
             if not {*names} & {*known, *description.named}:
-                yield f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
+                how = f"no thrust_{curve.name}*.csv, and [known] in rov.toml does not give {names[0]}"
+                about = f'. About will do: thrust = {{ about = 14.0, unit = "N" }} in [curves.{curve.name}]'
+                yield f"{how}{about if curve.name in description.tables.curves else ''}"
             continue
         reverse_names = tuple(curve.name_of(f"{key}{REVERSE}") for key in ("a_t", "b_t"))
         for pair in (names, reverse_names) if thrust[curve.name] else (names,):

@@ -21,6 +21,7 @@ from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.next_test import next_test
+from rov_fmu.identify.progress import OnAnswer, Work
 from rov_fmu.identify.result import (
     ALARM,
     Answer,
@@ -38,7 +39,7 @@ from rov_fmu.identify.unexplained.disturbances import disturbances, followed, un
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.io.messages import Progress, moving, silent
+from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import MISFITS
@@ -49,17 +50,20 @@ from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 __all__ = ["identify", "load_tests"]
 
 
-def identify(tests: Tests, on_progress: Progress = silent) -> Identification:
-    """Identify a vehicle from its tests. Raises DataFileError if nothing can be identified, and VehicleFileError."""
+def identify(tests: Tests, on_progress: Progress = silent, on_answer: OnAnswer | None = None) -> Identification:
+    """Identify a vehicle from its tests. Raises DataFileError if nothing can be identified, and VehicleFileError.
+
+    `on_answer` is called with each axis and a first answer as soon as a fit stands, and again as it improves.
+    """
     with threadpool_limits(limits=1, user_api="blas"):  # the matrices are small: more threads would wait for each other
         try:
-            return _identify(tests, on_progress)
+            return _identify(tests, on_progress, on_answer)
         except DivergedError:
             reason = "no simulation of the logs stays finite. Are units and signs right?"
             raise DataFileError(f"{tests.folder.path}: {reason}") from None
 
 
-def _identify(tests: Tests, on_progress: Progress) -> Identification:
+def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -> Identification:
     path = tests.description.tables.against
     against = load_vehicle(path) if path else None
     on_progress("reading the logs", 0.0)
@@ -75,8 +79,9 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
         wrong = found if left <= ALARM else ()
         return bool(wrong)
 
-    fit = fit_all(known, logs, rows, on_progress, is_mistaken)
-    show = moving(on_progress, "predicting what was left out", 0.88, 0.95)
+    work = Work(on_progress, on_answer)
+    fit = fit_all(known, logs, rows, work, is_mistaken)
+    show = work.steps("predicting what was left out")
     show(0)
     predicted = []
     out = held_out(fit.objective, fit.best)
@@ -96,7 +101,7 @@ def _identify(tests: Tests, on_progress: Progress) -> Identification:
     of_file = with_own_inputs(vehicle, tests)
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
     for n, axis in enumerate(known.fitted):
-        on_progress(f"what to measure next of {axis.name}", 0.95 + 0.05 * n / len(known.fitted))
+        work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
         push = assess.push_of_thrusters(vehicle, of_file, axis)
         of_axis = axis, tested[axis], push
         found = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)

@@ -14,6 +14,7 @@ from scipy.optimize import least_squares
 
 from rov_fmu.equation.catalogue import TUNING, Axis
 from rov_fmu.identify.result import Interval
+from rov_fmu.io.messages import RovError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.uncertainty import quantile
@@ -30,7 +31,7 @@ _LEAST = 1e-9
 """The least size of a wanted V_ss or Tau. The relative errors of smaller ones overflow."""
 
 
-class TuningError(ValueError):
+class TuningError(RovError, ValueError):
     """No tuning gives the wanted response. The message is one line."""
 
 

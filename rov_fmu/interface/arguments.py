@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from math import ceil, copysign
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -260,6 +261,14 @@ def number_of_vehicles(values: Mapping[str, Array]) -> int:
         if size != vehicles or size == 0:
             raise InputError(f"{name}: has values for {size} vehicles, but {first} has values for {vehicles}")
     return next(iter(sizes.values()), 1)
+
+
+def checked_paths(key: str, given: str | Path | Sequence[str | Path]) -> list[Path]:
+    """Return one path or several as a list. Raises InputError if there is none."""
+    paths = [given] if isinstance(given, str | Path) else [*given]
+    if not paths:
+        raise InputError(f"{key} = {shown(given)}: must be a path, or a sequence of one path or more")
+    return [Path(path) for path in paths]
 
 
 def checked_workers(workers: object) -> int | None:

@@ -11,8 +11,8 @@ from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, only, shown
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.description import RovFile
+from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.inspection.headers import header_parts, layout_of
-from rov_fmu.tank.inspection.one_log import description_beside, one_log
 from rov_fmu.tank.readers.parsers import guarded, header_of, one_parser, open_table
 
 

@@ -12,6 +12,7 @@ from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console
 from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of
+from rov_fmu.vehicle.steady import beyond_stated
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 
@@ -26,6 +27,8 @@ def write_fly_page(
     it. Without `output` the page goes into a new temporary folder. Raises FileError and OSError.
     """
     vehicles = [load_vehicle(path) for path in paths]
+    for words in beyond_stated(vehicles[0]):
+        print_message(f"rov-fmu: {words}")
     given = [path for path in (recording, identified) if path]
     read = [*paths, *given, *(file for vehicle in vehicles for file in vehicle.files)]
     check_targets([(output, PAGE)], read, force=force)

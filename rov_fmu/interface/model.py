@@ -1,44 +1,28 @@
-"""The vehicle of the Python interface: loaded by name, changed, simulated, built."""
+"""The vehicle of the Python interface: loaded by name, changed, simulated, built.
 
-import warnings
+What needs NumPy is imported when it is called, so that `rov_fmu.load` is quick.
+"""
+
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from rov_fmu.bridges import arrays
-from rov_fmu.bridges.arrays import force_names
-from rov_fmu.c.simulation import Array, reasons, simulate, usable_cores
-from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.fmu.variables import variables
-from rov_fmu.interface.arguments import (
-    Inputs,
-    check_name,
-    checked_inputs,
-    checked_record,
-    checked_start,
-    checked_times,
-    checked_values,
-    checked_workers,
-    duration_times,
-    held_inputs,
-    number_of_vehicles,
-)
-from rov_fmu.interface.result import Result
-from rov_fmu.interface.stepper import VehicleStepper, checked_length
 from rov_fmu.io.messages import InputError, only, shown
 from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.steady import Steady, steady_with
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients, load_vehicle
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import ArrayLike
 
     from rov_fmu.build import Built
+    from rov_fmu.interface.arguments import Inputs
+    from rov_fmu.interface.result import Result
+    from rov_fmu.interface.stepper import VehicleStepper
 
 __all__ = ["Vehicle", "VehicleModel", "load"]
 
@@ -65,12 +49,12 @@ class VehicleModel(Vehicle):
 
     def simulate(
         self,
-        time: ArrayLike,
-        inputs: Inputs = _NONE,
+        time: "ArrayLike",
+        inputs: "Inputs" = _NONE,
         *,
         start: Mapping[str, Any] = _NONE,
         record: str | Sequence[str] | None = None,
-    ) -> Result:
+    ) -> "Result":
         """Simulate the vehicle with the C code of the FMU; the results are equal to the last bit.
 
         - `time`: the output times, s, which rise; or the duration, s, which gives a result every 0.01 s from 0 on. Each
@@ -102,39 +86,21 @@ class VehicleModel(Vehicle):
         Raises InputError if an argument cannot be used, or if the motion cannot be computed because it overflows or
         needs too many steps; BuildError where the engine cannot be compiled.
         """
-        result = self._simulated(time, inputs, start, _NONE, record, workers=1, many=False)
-        if len(result.failed):
-            first = int(np.argmax(np.isnan(next(iter(result.values())))))
-            length = result.time[first] - result.time[first - 1]
-            until = f"time[{first}] = {result.time[first]:g} s"
-            raise InputError(f"the motion cannot be computed up to {until}: {reasons(self.layout, length)}")
-        return result
+        from rov_fmu.interface.result import simulated
 
-    def _warn_if_turned_over(self, times: Array, quaternion: Array) -> None:
-        """Warn when a vehicle that begins upright turns over. The quaternion has the shape (4, vehicles, times)."""
-        _, roll, pitch, _ = np.square(quaternion) / np.square(quaternion).sum(axis=0)
-        over = roll + pitch > 0.5  # the cosine of the tilt, R_33 = 1 - 2 (roll + pitch), is negative
-        turned = over.any(axis=1) & ~over[:, 0]
-        if turned.any():
-            when = f"{times[over[turned].any(axis=0).argmax()]:g} s"
-            warnings.warn(
-                f"{self.name} turns over at {when}: nothing holds it level. On a real one, an autopilot does, with the "
-                "vertical thrusters; command them as well, or command less thrust",
-                UserWarning,
-                stacklevel=4,
-            )
+        return simulated(self, time, inputs, start, _NONE, record, workers=1, many=False)
 
     def simulate_many(
         self,
-        time: ArrayLike,
-        inputs: Inputs = _NONE,
+        time: "ArrayLike",
+        inputs: "Inputs" = _NONE,
         *,
         start: Mapping[str, Any] = _NONE,
         coefficients: Mapping[str, Any] = _NONE,
         record: str | Sequence[str] | None = None,
         workers: int | None = None,
         lanes: bool = False,
-    ) -> Result:
+    ) -> "Result":
         """Simulate many variations of the vehicle at once, on all cores.
 
         - `time`, `inputs`, `start`, `record`: those of `simulate`. An array among the inputs has the shape (times,),
@@ -159,8 +125,9 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
-        workers = checked_workers(workers) or usable_cores()
-        return self._simulated(time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes)
+        from rov_fmu.interface.result import simulated
+
+        return simulated(self, time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes)
 
     def to_mcap(self, result: "Result | pd.DataFrame") -> bytes:
         """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.
@@ -173,6 +140,7 @@ class VehicleModel(Vehicle):
         installed.
         """
         from rov_fmu.bridges.mcap import motion_mcap
+        from rov_fmu.interface.result import Result
 
         if not isinstance(result, Result):
             if result["run"].nunique() != 1:
@@ -186,6 +154,8 @@ class VehicleModel(Vehicle):
     @property
     def force_names(self) -> tuple[str, ...]:
         """The names of the components of `forces`, in their order."""
+        from rov_fmu.bridges.arrays import force_names
+
         return force_names(self.layout)
 
     def rates(self, x: Any, forces: Any, p: Mapping[str, Any] = _NONE) -> Any:
@@ -204,6 +174,8 @@ class VehicleModel(Vehicle):
 
         Raises InputError if a vector has another length, a coefficient is unknown, or JAX computes in single precision.
         """
+        from rov_fmu.bridges import arrays
+
         return arrays.rates(self, x, forces, p)
 
     def forces(self, inputs: Mapping[str, Any], p: Mapping[str, Any] = _NONE) -> Any:
@@ -219,6 +191,8 @@ class VehicleModel(Vehicle):
 
         Raises InputError if an input or a coefficient is unknown.
         """
+        from rov_fmu.bridges import arrays
+
         return arrays.forces(self, inputs, p)
 
     def step(self, inputs: Mapping[str, float], state: Mapping[str, float], h: float) -> dict[str, float]:
@@ -236,9 +210,13 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used.
         """
+        from rov_fmu.interface.stepper import checked_length
+
         return super().step(self._all_inputs(inputs), self._all_states(state), checked_length(h))
 
-    def stepper(self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None) -> VehicleStepper:
+    def stepper(
+        self, *, start: Mapping[str, Any] = _NONE, record: str | Sequence[str] | None = None
+    ) -> "VehicleStepper":
         """Return the vehicle at time 0 s, to be stepped in a loop: with the states of `simulate` to the last bit.
 
         - `start`, `record`: those of `simulate`.
@@ -252,6 +230,10 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
+        from rov_fmu.fmu.variables import variables
+        from rov_fmu.interface.arguments import checked_record, checked_start
+        from rov_fmu.interface.stepper import VehicleStepper
+
         check_coefficients(self.layout, self.coefficients)
         begin = {name: value.item() for name, value in checked_start(start, self.layout, many=False).items()}
         names = [v.name for v in variables(self) if v.causality != "parameter"]
@@ -276,13 +258,35 @@ class VehicleModel(Vehicle):
 
         Raises InputError if the vehicle has no such axis.
         """
+        return super().response(self._axis(axis), command)
+
+    def find(self, axis: Axis | str, velocity: float, inputs: Mapping[str, float] = _NONE) -> Steady:
+        """Return the command, thrust and electric power that hold a steady velocity along an axis alone.
+
+        - `axis`: the axis or its name.
+        - `velocity`: the velocity through the water, m/s or rad/s, with its sign.
+        - `inputs`: loads, N and N.m, and the voltage, V, where they are not the usual ones.
+
+            rov_fmu.load("bluerov2").find("surge", 1.0).thrust  # N
+
+        Raises InputError if no command gives this velocity, with the largest one in its direction.
+        """
+        kind = self._axis(axis)
+        if kind in self.unidentified:
+            raise InputError(f"{kind.name} was not identified, so no number of its motion is told")
+        return steady_with(self, kind, velocity, inputs)
+
+    def _axis(self, axis: Axis | str) -> Axis:
+        """Return an axis of the vehicle. Raises InputError if it has no axis of this name."""
         kinds = {name: kind.axis for name, kind in self.layout.by_name.items()}
         if isinstance(axis, str) and axis not in kinds:
             raise InputError(f"axis = {shown(axis)}: the vehicle has no such axis{only(axis, [*kinds])}")
-        return super().response(kinds[axis] if isinstance(axis, str) else axis, command)
+        return kinds[axis] if isinstance(axis, str) else axis
 
     def _all_inputs(self, inputs: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all inputs. What is kept between steps, such as commands that act, stays as it is."""
+        from rov_fmu.interface.arguments import held_inputs
+
         layout = self.layout
         kept = {name: value for name, value in inputs.items() if name in layout.memory}
         given = {name: value for name, value in inputs.items() if name not in kept}
@@ -290,6 +294,8 @@ class VehicleModel(Vehicle):
 
     def _all_states(self, state: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all states, and the heading of a vehicle with an attitude if it is given."""
+        from rov_fmu.interface.arguments import check_name
+
         for name in state:
             check_name("state", name, self.layout.state, self.layout.continued)
         return {**self.layout.at_rest, **state}
@@ -324,58 +330,4 @@ class VehicleModel(Vehicle):
             osp=osp,
             sign=sign,
             force=force,
-        )
-
-    def _simulated(
-        self,
-        time: ArrayLike,
-        inputs: Inputs,
-        start: Mapping[str, Any],
-        coefficients: Mapping[str, Any],
-        record: str | Sequence[str] | None,
-        *,
-        workers: int,
-        many: bool,
-        lanes: bool = False,
-    ) -> Result:
-        layout = self.layout
-        check_coefficients(layout, self.coefficients)  # `dataclasses.replace` does not check them
-        times = checked_times("time", duration_times(time) if np.ndim(time) == 0 else time)
-        step_times, input_values = checked_inputs(layout, times, inputs, many=many)
-        values: dict[str, Array] = {
-            **input_values,
-            **checked_start(start, layout, many=many),
-            **checked_values("coefficients", coefficients, layout.coefficients, many=many),
-        }
-        units = {v.name: v.unit for v in variables(self) if v.causality != "parameter"}
-        recorded = checked_record(record, layout, units)
-        vehicles = number_of_vehicles(values)
-        try:
-            attitude = QUATERNION if layout.has_attitude else ()
-            going = (*layout.state, *layout.continued, *layout.memory)
-            others = (*attitude, *layout.continued) if many else (*going, *layout.commands)
-            recording = [*recorded, *(name for name in others if name not in recorded)]
-            trajectories = simulate(
-                self, step_times, values, recording, vehicles=vehicles, workers=workers, lanes=lanes
-            )
-        except MemoryError as error:
-            size = 8e-9 * vehicles * len(step_times) * len(recorded)
-            raise InputError(
-                f"time, record: the result needs {size:.3g} GB, which is more than the available memory. Record "
-                "fewer variables"
-            ) from error
-        if attitude:
-            self._warn_if_turned_over(step_times, trajectories.values[[recording.index(name) for name in attitude]])
-        rows = trajectories.values
-        ends = {name: (row if many else row[0])[..., -1][()] for name, row in zip(recording, rows, strict=True)}
-        if len(step_times) > len(times):
-            rows = rows[..., np.searchsorted(step_times, times)]
-        return Result(
-            times,
-            {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
-            {name: units[name] for name in recorded},
-            {f"{name}_0" if name in layout.continued else name: ends[name] for name in going if name in ends},
-            np.flatnonzero(trajectories.failed < len(step_times)),
-            {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
-            "us" if layout.pulse else "1",
         )

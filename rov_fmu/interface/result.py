@@ -1,16 +1,31 @@
-"""The result of a simulation: arrays by the names of the variables, which can become a data frame or a plot."""
+"""A simulation and its result: arrays by the names of the variables, which can become a data frame or a plot."""
 
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from rov_fmu.c.simulation import reasons, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.units import in_degrees, unit_of
+from rov_fmu.fmu.variables import variables
+from rov_fmu.interface.arguments import (
+    Inputs,
+    checked_inputs,
+    checked_record,
+    checked_start,
+    checked_times,
+    checked_values,
+    checked_workers,
+    duration_times,
+    number_of_vehicles,
+)
 from rov_fmu.io.messages import InputError, UnknownNameError, only
+from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,9 +153,9 @@ class Result(Mapping[str, Array]):
         heights = [0.6 if quantity in _SMALL else 1.0 for quantity, _ in panels] + [0.6] * bool(commands)
         figure.set_size_inches(8.0, 1.0 + 1.6 * sum(heights))
         axes = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
-        for panel, ((quantity, unit), variables) in zip(axes, panels.items(), strict=False):
-            dashes = _dashes([*variables.values()])
-            for n, (name, values) in enumerate(variables.items()):
+        for panel, ((quantity, unit), curves) in zip(axes, panels.items(), strict=False):
+            dashes = _dashes([*curves.values()])
+            for n, (name, values) in enumerate(curves.items()):
                 faint = 1.0 if values.ndim == 1 else 0.3
                 lines = panel.plot(
                     self.time,
@@ -159,6 +174,81 @@ class Result(Mapping[str, Array]):
         if commands:
             draw_commands(axes[-1], self.time, commands, self.command_unit)
         axes[-1].set_xlabel("time (s)")
+
+
+def simulated(
+    vehicle: Vehicle,
+    time: ArrayLike,
+    inputs: Inputs,
+    start: Mapping[str, Any],
+    coefficients: Mapping[str, Any],
+    record: str | Sequence[str] | None,
+    *,
+    workers: int | None,
+    many: bool,
+    lanes: bool = False,
+) -> Result:
+    """Return a simulation of one vehicle, or of many: the work of `VehicleModel.simulate` and of `simulate_many`."""
+    layout = vehicle.layout
+    check_coefficients(layout, vehicle.coefficients)  # `dataclasses.replace` does not check them
+    times = checked_times("time", duration_times(time) if np.ndim(time) == 0 else time)
+    step_times, input_values = checked_inputs(layout, times, inputs, many=many)
+    values: dict[str, Array] = {
+        **input_values,
+        **checked_start(start, layout, many=many),
+        **checked_values("coefficients", coefficients, layout.coefficients, many=many),
+    }
+    units = {v.name: v.unit for v in variables(vehicle) if v.causality != "parameter"}
+    recorded = checked_record(record, layout, units)
+    vehicles = number_of_vehicles(values)
+    try:
+        attitude = QUATERNION if layout.has_attitude else ()
+        going = (*layout.state, *layout.continued, *layout.memory)
+        others = (*attitude, *layout.continued) if many else (*going, *layout.commands)
+        recording = [*recorded, *(name for name in others if name not in recorded)]
+        cores = checked_workers(workers) or usable_cores()
+        trajectories = simulate(vehicle, step_times, values, recording, vehicles=vehicles, workers=cores, lanes=lanes)
+    except MemoryError as error:
+        size = 8e-9 * vehicles * len(step_times) * len(recorded)
+        raise InputError(
+            f"time, record: the result needs {size:.3g} GB, which is more than the available memory. Record "
+            "fewer variables"
+        ) from error
+    if attitude:
+        quaternion = trajectories.values[[recording.index(name) for name in attitude]]
+        _warn_if_turned_over(vehicle.name, step_times, quaternion)
+    rows, failed = trajectories.values, np.flatnonzero(trajectories.failed < len(step_times))
+    ends = {name: (row if many else row[0])[..., -1][()] for name, row in zip(recording, rows, strict=True)}
+    if len(step_times) > len(times):
+        rows = rows[..., np.searchsorted(step_times, times)]
+    if len(failed) and not many:
+        first = int(np.argmax(np.isnan(rows[0, 0])))
+        until, length = f"time[{first}] = {times[first]:g} s", times[first] - times[first - 1]
+        raise InputError(f"the motion cannot be computed up to {until}: {reasons(layout, length)}")
+    return Result(
+        times,
+        {name: row if many else row[0] for name, row in zip(recorded, rows, strict=False)},
+        {name: units[name] for name in recorded},
+        {f"{name}_0" if name in layout.continued else name: ends[name] for name in going if name in ends},
+        failed,
+        {} if many else {name: rows[recording.index(name)][0] for name in layout.commands},
+        "us" if layout.pulse else "1",
+    )
+
+
+def _warn_if_turned_over(name: str, times: Array, quaternion: Array) -> None:
+    """Warn when a vehicle that begins upright turns over. The quaternion has the shape (4, vehicles, times)."""
+    _, roll, pitch, _ = np.square(quaternion) / np.square(quaternion).sum(axis=0)
+    over = roll + pitch > 0.5  # the cosine of the tilt, R_33 = 1 - 2 (roll + pitch), is negative
+    turned = over.any(axis=1) & ~over[:, 0]
+    if turned.any():
+        when = f"{times[over[turned].any(axis=0).argmax()]:g} s"
+        warnings.warn(
+            f"{name} turns over at {when}: nothing holds it level. On a real one, an autopilot does, with the "
+            "vertical thrusters; command them as well, or command less thrust",
+            UserWarning,
+            stacklevel=4,
+        )
 
 
 def _dashes(curves: Sequence[Array]) -> list[Any]:

@@ -1,6 +1,6 @@
 """The command `rov-fmu simulate`: the meaning of its options, the files that it writes, and what it prints."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from math import ceil, floor, isfinite, log10, nan
@@ -17,6 +17,8 @@ from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import FileError, InputError, one_line, only, print_message, shown, wrapped
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table
+from rov_fmu.vehicle.shipped import shipped_name
+from rov_fmu.vehicle.steady import Steady
 
 _STOP = 10.0
 """The default end of a simulation, s, as in the FMU's default experiment."""
@@ -67,6 +69,53 @@ def simulate_vehicle(path: Path, options: Options) -> None:
         print_end({path: old for path, old in written.items() if path in (output, plot)}, following)
     else:
         print_final(vehicle, result, has_no_input=not options.commands and not _moves(options.settings, vehicle.layout))
+
+
+def find_speeds(path: Path, wanted: Sequence[str], settings: Sequence[str]) -> None:
+    """Print the command, the thrust and the electric power that steady speeds take, each given as `surge=1.0`.
+
+    `settings` may have coefficients, loads and the voltage. Raises FileError, InputError.
+    """
+    vehicle = load(path)
+    given = read_settings(settings, vehicle.layout)
+    chosen = vehicle.layout.commands.keys() | vehicle.layout.by_name.keys() | given.start.keys()
+    for name in (name for name in (*given.inputs, *given.start) if name in chosen):
+        raise InputError(f"--set {name}: --find chooses commands and states itself")
+    vehicle = vehicle.with_(**given.coefficients)
+    rows = [_found(vehicle, text, given.inputs) for text in wanted]
+    power = [] if rows[0].power is None else ["power"]
+    found = table("", "axis", ["speed", "command", "thrust", *power])
+    for row in rows:
+        cells = [f"{row.velocity:.4g} {row.axis.unit}", f"{row.command:.4f}", f"{row.thrust:.4g} {row.axis.load}"]
+        found.add_row(row.axis.name, *cells, *([] if row.power is None else [f"{row.power:.4g} W"]))
+    paragraph(console(), f"What holds a steady speed of {vehicle.name}, each axis alone:")
+    print_table(found)
+    for row in rows:
+        low, high = vehicle.tested_along(row.axis)
+        if not low <= row.command <= high:
+            paragraph(console(), f"- {row.axis.name}: tests had commands from {low:.0%} to {high:.0%}, not beyond")
+        for other, push in vehicle.side_effects(row.axis, row.command):
+            words = f"this command also pushes {other.name} with {push:.3g} {other.load}, which is left out here"
+            paragraph(console(), f"- {row.axis.name}: {words}")
+    first = f"{rows[0].axis.name}={rows[0].command:.4f}"
+    sets = [word for setting in (first, *settings) for word in ("--set", setting)]
+    print_end({}, shell_words("rov-fmu", "simulate", shipped_name(path) or path, *sets))
+
+
+def _found(vehicle: VehicleModel, text: str, inputs: Mapping[str, float]) -> Steady:
+    """Return the steady motion for a text such as `surge=1.0`. Raises InputError."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    try:
+        velocity = float(value)
+    except ValueError:
+        velocity = nan
+    if name in vehicle.layout.by_name and not isfinite(velocity):
+        unit = vehicle.layout.by_name[name].axis.unit
+        raise InputError(f"--find {text}: {shown(value)} must be a finite number, {unit}")
+    try:
+        return vehicle.find(name, velocity, inputs)
+    except InputError as error:
+        raise InputError(f"--find {text}: {error}") from error
 
 
 def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path], *, force: bool = False) -> None:

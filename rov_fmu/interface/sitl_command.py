@@ -23,6 +23,7 @@ from rov_fmu.io.messages import InputError, did_you_mean, print_message, shown
 from rov_fmu.io.output import check_targets
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, Servos, chosen_frame, config_of, servos_of
+from rov_fmu.vehicle.steady import beyond_stated
 
 _WITHOUT_POSITION = 45.0
 """The time after which ArduSub knows its position, s."""
@@ -71,6 +72,8 @@ def serve(path: Path, options: Options) -> None:
             paragraph(console(), f"ArduSub must have {config_of(frame)}")
         if _rolls_alone(setup):
             print_message(f"rov-fmu: {_NO_ROLL}")
+        for words in beyond_stated(setup.vehicle):
+            print_message(f"rov-fmu: {words}")
         if floats := _floats(setup):
             print_message(f"rov-fmu: {floats}")
         paragraph(console(), f"listening on {address}, UDP port {port}; Ctrl-C ends it")

@@ -20,7 +20,7 @@ from time import monotonic
 from typing import IO, Any, Literal
 
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
-from rov_fmu.io.messages import reason_of
+from rov_fmu.io.messages import RovError, reason_of
 
 _POLL = 0.1
 """The longest single wait for an answer, s. It is short, because Windows delivers Ctrl-C only between waits."""
@@ -66,7 +66,7 @@ class Limits:
                     resource.prlimit(pid, kind, bounds)
 
 
-class ChildError(Exception):
+class ChildError(RovError):
     """A child process that ended, or that exceeded a limit.
 
     The text is a predicate without a subject: `ended its process: SIGSEGV`, `needs more than 60 s`.

@@ -73,6 +73,8 @@ class Columns:
     """The conversions of the numbers of the file to the first unit, by column."""
     values: Mapping[str, "array[float]"]
     """The numbers by column."""
+    numbers: Mapping[str, "array[float]"]
+    """The numbers as they stand in the file, by column, of those whose unit needs more than a factor."""
     lines: "array[int]"
     """The line of the file on which each row is."""
     unread: Mapping[str, "array[int]"]
@@ -145,6 +147,9 @@ def read_columns(
     values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
     if torn.count and file.align(grown):
         values, lines, unread, torn = read_numbers(file, header, cells, _content, loose=loose)
+    special = [column for column in file_columns.values() if column.unit in column.column.conversions]
+    numbers = {column.name: values[column.name] for column in special}
+    values |= {column.name: array("d", map(column.convert, numbers[column.name])) for column in special}
     if torn.count > len(lines):
         raise DataFileError(file.too_many(torn))
     if not lines:
@@ -156,6 +161,7 @@ def read_columns(
         {column.name: " ".join([column.unit, *column.numbers]) for column in file_columns.values()},
         {column.name: column.convert for column in file_columns.values()},
         values,
+        numbers,
         lines,
         unread,
         torn.count + file.left_out,
@@ -180,7 +186,8 @@ def _by_column(cells: list[str], file_columns: Mapping[int, FileColumn]) -> dict
 
 
 def _value(file_column: FileColumn, loose: bool, text: str, exists: bool) -> float:
-    """Return the number of a cell in the first unit. Raises ValueError with only the reason.
+    """Return the number of a cell in the first unit, or as it stands there if its unit needs more than a factor. Raises
+    ValueError with only the reason.
 
     `exists` is False for a cell that its row does not have.
     """
@@ -196,9 +203,10 @@ def _value(file_column: FileColumn, loose: bool, text: str, exists: bool) -> flo
         if loose:
             return nan
         raise ValueError(_why_no_number(text))
+    if file_column.unit in column.conversions:
+        return number
     value = file_column.convert(number)
-    if file_column.unit not in column.conversions:
-        _check_bounds(value, column, factor)
+    _check_bounds(value, column, factor)
     return value
 
 

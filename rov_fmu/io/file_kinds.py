@@ -7,6 +7,7 @@ from rov_fmu.io.messages import FileError
 
 VEHICLE_FILE, PLAN, FMU, PAGE = "a vehicle file (TOML)", "the plan of a study (TOML)", "an FMU", "a page (HTML)"
 GAZEBO_MODEL = "a model for Gazebo (SDF)"
+SYSTEM, SYSTEM_PLAN = "a system (SSP)", "the plan of a system (TOML)"
 TESTS, TESTS_FILE = "a log, or a folder of tank tests", "the rov.toml of a folder of tank tests"
 _TOML, _TABLE, _LOG = "a TOML file", "a recording or a table (CSV)", "the log of an autopilot, of ROS or of MATLAB"
 DATAFLASH_SUFFIX = ".bin"
@@ -23,13 +24,14 @@ IDENTIFIED = "rov-fmu identify"
 """The profile of an MCAP file with logs as they were identified, by which it is no log of its own."""
 TABLE_SUFFIXES = (".csv", ".mat")
 """The suffixes of tables: CSV files, and variables of MATLAB."""
-_OWN = {".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL}
+_OWN = {".toml": _TOML, ".fmu": FMU, ".html": PAGE, ".sdf": GAZEBO_MODEL, ".ssp": SYSTEM}
 OWN_SUFFIXES = (*_OWN,)
 """The suffixes of files that this program writes, or reads where another file or a command names them."""
 _WRITTEN = {
     VEHICLE_FILE: (".toml",),
     FMU: (".fmu",),
     PAGE: (".html", ".htm"),
+    SYSTEM: (".ssp",),
     GAZEBO_MODEL: (".sdf", ".urdf", ".world", ".xml", ".xacro"),
 }
 """The suffixes that a file may have which a command writes, by its kind."""
@@ -39,6 +41,7 @@ _BY_SUFFIX = {
     **dict.fromkeys((*LOG_SUFFIXES, ".mat"), _LOG),
 }
 _BY_KEY = {
+    **dict.fromkeys(("component", "connect"), SYSTEM_PLAN),
     **dict.fromkeys(("stop_time", "vary", "figures"), PLAN),
     **dict.fromkeys(("known", "windows", "against", "base"), TESTS_FILE),
     **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
@@ -47,6 +50,8 @@ _BY_KEY = {
 _HINTS = {
     VEHICLE_FILE: "`rov-fmu build` makes an FMU of it, and a plan names it as `vehicle`",
     PLAN: "`rov-fmu study` carries it out",
+    SYSTEM_PLAN: "`rov-fmu system` makes a system of it",
+    SYSTEM: "a plan of a study names it as `system`",
     TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
     _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
     _TABLE: "to see a recording beside a vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
@@ -79,7 +84,7 @@ def check_written(path: Path, kind: str) -> None:
 def _other_kind(path: Path, wanted: str) -> str | None:
     """Return the kind of file that the suffix belongs to, or None if it is the wanted kind or unknown."""
     kind = _BY_SUFFIX.get(path.suffix.lower())
-    if kind == wanted or (kind == _TOML and wanted in (VEHICLE_FILE, PLAN)):
+    if kind == wanted or (kind == _TOML and wanted in (VEHICLE_FILE, PLAN, SYSTEM_PLAN)):
         return None
     return kind
 

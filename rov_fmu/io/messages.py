@@ -6,7 +6,6 @@ import shutil
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from difflib import SequenceMatcher, get_close_matches
-from math import exp
 from pathlib import Path
 from textwrap import wrap
 
@@ -19,9 +18,6 @@ _MOST_NAMES = 20
 """The largest number of names in a message that lists those that exist."""
 NO_FILE = "there is no such file"
 """The reason if a file is missing."""
-
-_USUAL_STEPS = 5.0
-"""The number of steps with which most of a part of the work is done whose number of steps is not known."""
 
 Progress = Callable[[str, float], None]
 """A function that is called with the name of the next step and the share of the work that is done, from 0 to 1."""
@@ -36,15 +32,41 @@ def part(on_progress: Progress, low: float, high: float) -> Progress:
     return lambda step, share: on_progress(step, low + (high - low) * share)
 
 
-def moving(on_progress: Progress, step: str, low: float, high: float) -> Callable[[int], None]:
-    """Return the progress of a part of the work whose number of steps is not known: a function of their count.
+class RovError(Exception):
+    """Everything that rov-fmu raises of its own. The message is a line for each reason.
 
-    The share comes nearer and nearer to `high`: it never stands still.
+    `except rov_fmu.RovError` catches them all:
+
+        RovError
+            BeyondError *
+            BuildError
+                OptionError
+            ChildError *
+                LimitError *
+            DivergedError *
+            ExpressionError *
+            FileError
+                DataFileError
+                    UnreadableFileError
+                NoResultsError
+                PlanError
+                VehicleFileError
+            InputError
+                UnknownNameError
+            LoadError *
+            ProofError
+            RunError *
+            StudyError
+            TimeError *
+            TuningError
+            WriteError
+
+    FileError, InputError, OptionError and TuningError are also a ValueError, UnknownNameError is a KeyError, and
+    WriteError an OSError. Those with a star are internal: they become one of the others before they reach a caller.
     """
-    return lambda count: on_progress(step, high - (high - low) * exp(-count / _USUAL_STEPS))
 
 
-class _LinesError(Exception):
+class _LinesError(RovError):
     """An exception whose message has a line for each reason."""
 
     def __init__(self, *reasons: str) -> None:

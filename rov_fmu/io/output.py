@@ -13,11 +13,11 @@ from pathlib import Path
 
 from rov_fmu.io.file_kinds import check_written
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
-from rov_fmu.io.messages import FileError
+from rov_fmu.io.messages import FileError, RovError
 from rov_fmu.io.reading import open_file, read_text
 
 
-class WriteError(OSError):
+class WriteError(RovError, OSError):
     """A path that cannot be written."""
 
 

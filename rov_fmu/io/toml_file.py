@@ -24,6 +24,7 @@ from pydantic_core import ErrorDetails
 from rov_fmu.io.file_kinds import check_keys
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import MOST, FileError, brief, did_you_mean, lines_on, only, shown, similar
+from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes, text_of
 
 if sys.version_info >= (3, 11):
@@ -35,7 +36,7 @@ else:
 class Strict(BaseModel):
     """A table of a TOML file. It may have no other keys, and no number in quotes. Editors show its docstrings."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True)
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, use_attribute_docstrings=True, defer_build=True)
 
     @staticmethod
     def hint(_key: str, /) -> str:
@@ -180,6 +181,15 @@ SYMBOL = rule("must be at most 30 letters, digits and underscores", re.compile("
 SYMBOL_SCHEMA = WithJsonSchema({"type": "string", "pattern": "^[A-Za-z0-9_]{1,30}$"})
 Symbol = Annotated[str, SYMBOL, SYMBOL_SCHEMA]
 """A name that becomes part of the names of FMU variables."""
+
+
+def _beside(name: str, info: ValidationInfo) -> str:
+    inside(folder_of(info), name)
+    return name
+
+
+Beside = Annotated[str, AfterValidator(_beside)]
+"""A file in the folder of the TOML file, or in a folder inside it."""
 
 
 # ---- Problems in words -----------------------------------------------------------------------------------------------

@@ -52,7 +52,7 @@ class Finding:
 
 
 def prove(
-    fmu: Path,
+    fmu: str | Path,
     interface: str | None = None,
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
@@ -67,11 +67,11 @@ def prove(
     - `time_limit`: the time that each experiment may take, s.
     - `on_experiment`: called before each experiment with its name and the share that is done.
 
-        all(finding.passed for finding in prove(Path("videoray.fmu")))
+        all(finding.passed for finding in rov_fmu.prove_fmu("videoray.fmu"))
 
     Raises FileError, and ProofError if the FMU ends its process or exceeds a limit.
     """
-    with opened(fmu, interface, tolerance, time_limit, needs_results=True) as subject:
+    with opened(Path(fmu), interface, tolerance, time_limit, needs_results=True) as subject:
         return compare(subject, on_experiment)
 
 

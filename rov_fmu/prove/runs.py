@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.io.messages import brief, reason_of
+from rov_fmu.io.messages import RovError, brief, reason_of
 
 Array = npt.NDArray[np.float64]
 WARNING = 1
@@ -67,7 +67,7 @@ class Answer:
     """The status of the last refusal, or of the last call, with the FMU's message."""
 
 
-class RunError(Exception):
+class RunError(RovError):
     """A run that the FMU did not do; the text is the reason in one line."""
 
 

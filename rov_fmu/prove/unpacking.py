@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import IO
 from unicodedata import normalize
 
+from rov_fmu.io.file_kinds import FMU
 from rov_fmu.io.messages import FileError, ProofError, brief, reason_of, shown
 from rov_fmu.io.paths import is_portable
 
@@ -52,13 +53,13 @@ _PIECE = 2**14
 """The number of bytes that are unpacked at a time."""
 
 
-def unpack_fmu(file: IO[bytes], fmu: Path, folder: Path) -> None:
-    """Unpack an FMU into a folder.
+def unpack_fmu(file: IO[bytes], fmu: Path, folder: Path, kind: str = FMU) -> None:
+    """Unpack an FMU into a folder, or another kind of archive in words.
 
     Raises FileError, which names the FMU by the path `fmu`, if it is damaged, if a file would lie outside the folder or
     is a link, or if the files take too much space.
     """
-    with opened_archive(file, fmu) as zipped:
+    with opened_archive(file, fmu, kind) as zipped:
         check_order(zipped, fmu)
         try:
             zipped.extractall(folder)
@@ -71,7 +72,7 @@ def unpack_fmu(file: IO[bytes], fmu: Path, folder: Path) -> None:
 
 
 @contextmanager
-def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
+def opened_archive(file: IO[bytes], fmu: Path, kind: str = FMU) -> Iterator[zipfile.ZipFile]:
     """Open the archive of an FMU. Raises FileError, also in place of what zipfile raises in the block."""
     try:
         with zipfile.ZipFile(file) as zipped:
@@ -83,7 +84,7 @@ def opened_archive(file: IO[bytes], fmu: Path) -> Iterator[zipfile.ZipFile]:
     except Exception as error:  # zipfile raises many kinds on damaged or encrypted archives
         is_outside = isinstance(error, OSError) and error.errno == errno.EINVAL
         reason = "its directory names a place outside of it" if is_outside else brief(reason_of(error))
-        raise FileError(f"{fmu}: is not an FMU, or is damaged: {reason}") from error
+        raise FileError(f"{fmu}: is not {kind}, or is damaged: {reason}") from error
 
 
 def refusal(zipped: zipfile.ZipFile) -> str:

@@ -13,20 +13,19 @@ from rov_fmu.identify.result import AxisResult, Identification, Point, Predictio
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.report.plots.identification import plot_answers, plot_forces
 from rov_fmu.report.plots.logs import height_of, plot_log
-from rov_fmu.report.plots.svg import KNOTS, inline_svg, with_even_text
+from rov_fmu.report.plots.svg import KNOTS, NARROW, in_both_widths, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.log import Log
+from rov_fmu.vehicle.steady import speed_table
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_SIZE = 3.7, 2.7
-"""The size of a plot, inches. All plots but the first are as wide, so that their text has the same size."""
+_SIZE = NARROW, 2.7
+"""The size of a plot, inches."""
 _PLOTS: Mapping[str, Callable[..., None]] = {
     "log": plot_log,
     "answers": plot_answers,
     "forces": plot_forces,
 }
-_BROAD = 7.2
-"""The width of the large picture on a wide page, inches."""
 
 
 def report_page(results: Identification, on_progress: Progress = silent) -> str:
@@ -51,10 +50,12 @@ def report_page(results: Identification, on_progress: Progress = silent) -> str:
         plot=plot,
         pictures=pictures,
         height_of=height_of,
-        WIDTH=_SIZE[0],
+        WIDTH=NARROW,
         picture=_picture(results, shown, partial(plot, "Main prediction", "log")) if shown else None,
         script=inline_script("plots.js"),
         card=card(results.vehicle),
+        speeds=[*speed_table(results.vehicle)],
+        layout=results.vehicle.layout,
         KNOTS=KNOTS,
         by=_by,
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
@@ -86,15 +87,10 @@ def _of_logs(results: Identification) -> Iterator[tuple[str, Log | None, list[Pr
 
 
 def _picture(results: Identification, shown: Sequence[Prediction], plot: Callable[..., Markup]) -> Markup:
-    """Return the large picture twice, broad and for phones, of which the page shows one."""
+    """Return the large picture, of the log of these predictions."""
     log = next((log for log in results.folder.logs if log.file == shown[0].file), None)
     height = height_of(log, shown, measured=False)
-    sizes = {"broad": (_BROAD, height), "narrow": (_SIZE[0], height)}
-    drawn = [
-        Markup('<div class="{}">{}</div>').format(key, plot(size, key, predictions=shown, log=log, measured=False))
-        for key, size in sizes.items()
-    ]
-    return Markup("").join(drawn)
+    return in_both_widths(partial(plot, predictions=shown, log=log, measured=False), height)
 
 
 def _by(p: Point, other: Vehicle) -> float | None:

@@ -1,8 +1,8 @@
 """Studies: many runs of an FMU with uncertain parameters, and their results as data frames.
 
-    from rov_fmu.study import study
+    import rov_fmu
 
-    results = study("plan.toml", "results")
+    results = rov_fmu.run_study("plan.toml", "results")
     results.runs, results.trajectories(), results.bands("u"), results.sensitivity("stopping_distance")
 
 Needs the extra `study`: pip install "rov-fmu[study]".
@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
-    from rov_fmu.study.run.cluster import Progress
     from rov_fmu.study.run.run_study import study
+    from rov_fmu.study.run.work import Progress
 
 __all__ = ["Progress", "Results", "study"]
-_MODULES = {"Progress": "run.cluster", "Results": "results.results", "study": "run.run_study"}
+_MODULES = {"Progress": "run.work", "Results": "results.results", "study": "run.run_study"}
 
 
 def __getattr__(name: str) -> Any:

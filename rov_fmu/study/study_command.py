@@ -2,27 +2,35 @@
 
 import logging
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from rov_fmu.interface.model import load
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
-from rov_fmu.report.console import print_end
+from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import vehicle_file
-from rov_fmu.study.results.page import PAGE, study_page
-from rov_fmu.study.results.results import Results
-from rov_fmu.study.results.store import STUDY, is_description
-from rov_fmu.study.results.summary import print_summary
+from rov_fmu.study.results.store import PAGE, STUDY, Part, is_description
 from rov_fmu.study.run.run_study import run_study
+
+if TYPE_CHECKING:
+    from rov_fmu.study.results.results import Results
 
 
 def study_plan(
-    plan: Path, output: Path, workers: int | None, scheduler: str | None, run: int | None, *, force: bool
+    plan: Path,
+    output: Path,
+    workers: int | None,
+    scheduler: str | None,
+    run: int | None,
+    part: tuple[int, int] | None,
+    *,
+    force: bool,
+    **how: Any,
 ) -> None:
     """Do the missing runs of a study, and write and print what came of it. `run` is written for Foxglove, too.
 
-    Raises StudyError if no run is complete, and what `study` raises.
+    A part has no page. Raises StudyError if no run is complete, and what `study` raises.
     """
     logging.getLogger("asyncio").setLevel(logging.CRITICAL)  # after Ctrl-C it tells of connections that Dask closed
     motion = output / f"run-{run}.mcap"
@@ -33,15 +41,26 @@ def study_plan(
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
     with parts() as shown:
-        spent, results = run_study(
+        spent, store = run_study(
             plan,
             output,
             workers,
             scheduler,
             StudyParts(shown).update,
             lambda message: shown.print(f"warning: {message}"),
+            part=part and Part(*part),
             force=force,
+            **how,
         )
+    if part:
+        words = f"part {part[0]} of {part[1]} is complete: {spent.runs} runs now, {spent.failed} failed"
+        paragraph(console(), f"{shell_words(store.folder)}: {words}")
+        return
+    from rov_fmu.study.results.page import study_page
+    from rov_fmu.study.results.results import Results
+    from rov_fmu.study.results.summary import print_summary
+
+    results = Results(output)
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
@@ -52,8 +71,10 @@ def study_plan(
         raise StudyError(f"{output}: no run is complete with all its figures")
 
 
-def _motion_of(results: Results, run: int, vehicle: Path) -> bytes:
+def _motion_of(results: "Results", run: int, vehicle: Path) -> bytes:
     """Return the motion of a run as the content of an MCAP file. Raises FileError if the run has no outputs."""
+    from rov_fmu.interface.model import load
+
     if not results.outputs or (motion := results.trajectories([run])).empty:
         raise FileError(f"{results.folder}: --mcap {run}: there is no such run with outputs, which [keep] names")
     return load(vehicle).to_mcap(motion)

@@ -15,6 +15,7 @@ are applied:
 import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -112,6 +113,10 @@ class Topic:
         return f"{self.source.topic}.{field}".removeprefix(".")
 
 
+Attitude = tuple[Array, Rotation]
+"""Times, and the rotations from the body (forward, starboard, down) to north-east-down."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Measurement:
     """What an entry of the catalogue found in a topic: n x k numbers in SI units."""
@@ -121,6 +126,17 @@ class _Measurement:
     values: Array
     unused: str
     """Why the topic is not used; empty if it may be."""
+
+    @cached_property
+    def attitude(self) -> Attitude:
+        """The attitude at the times at which the measurement knows it: at none if it is of something else."""
+        gives, values, time = self.message.gives, self.values, self.topic.time
+        known = np.isfinite(values).all(axis=1) & (gives in (EULER, QUATERNION))
+        if gives != QUATERNION or not known.any():
+            return time[known], Rotation.from_euler("ZYX", np.reshape(values[known, ::-1], (-1, 3)))
+        earth, body = frames_of(self.message, self.topic.source)
+        rotation = Rotation.from_quat(values[known], scalar_first=True).as_matrix()
+        return time[known], Rotation.from_matrix(earth @ rotation @ body)
 
 
 def channels_of(
@@ -140,9 +156,9 @@ def channels_of(
     attitude = _attitude(measurements)
     channels = [*named]
     for measurement in measurements:
-        is_velocity = measurement.message.gives == VELOCITY
-        reason = measurement.unused or (_contradiction(measurement, measurements) if is_velocity else "")
-        judged = replace(measurement, unused=reason)
+        judged = measurement
+        if measurement.message.gives == VELOCITY and not measurement.unused:
+            judged = replace(measurement, unused=_contradiction(measurement, measurements))
         channels += _channels(*_agreeing(judged, measurements, attitude), attitude, gravity)
     return with_one_source(channels)
 
@@ -197,33 +213,18 @@ def with_one_source(channels: Sequence[Channel]) -> list[Channel]:
 # ---- Attitude and frames ---------------------------------------------------------------------------------------------
 
 
-Attitude = tuple[Array, Rotation]
-"""Times, and the rotations from the body (forward, starboard, down) to north-east-down."""
-
-
 def _attitude(measurements: Iterable[_Measurement]) -> Slerp | None:
     """Return the attitude that is preferred, for interpolation."""
-    found = (_attitude_of(m) for m in measurements if not m.unused)
+    found = (m.attitude for m in measurements if not m.unused)
     return next((Slerp(*attitude) for attitude in found if len(attitude[0]) >= LEAST_SAMPLES), None)
-
-
-def _attitude_of(measurement: _Measurement) -> Attitude:
-    """Return the attitude at the times at which a measurement knows it: at none if it is of something else."""
-    gives, values, time = measurement.message.gives, measurement.values, measurement.topic.time
-    known = np.isfinite(values).all(axis=1) & (gives in (EULER, QUATERNION))
-    if gives != QUATERNION or not known.any():
-        return time[known], Rotation.from_euler("ZYX", np.reshape(values[known, ::-1], (-1, 3)))
-    earth, body = frames_of(measurement.message, measurement.topic.source)
-    rotation = Rotation.from_quat(values[known], scalar_first=True).as_matrix()
-    return time[known], Rotation.from_matrix(earth @ rotation @ body)
 
 
 def _standstill(attitude: _Measurement, measurements: Sequence[_Measurement]) -> str:
     """Return the reason against an attitude that never changes although the vehicle turns, by the rates of turn in the
     same messages, or else in others; or an empty text. Some sensors send a constant where they measure none."""
-    known, _ = _attitude_of(attitude)
     values = attitude.values[np.isfinite(attitude.values).all(axis=1)]
-    if len(known) < LEAST_SAMPLES or np.ptp(values, axis=0).any():
+    is_attitude = attitude.message.gives in (EULER, QUATERNION)
+    if not is_attitude or len(values) < LEAST_SAMPLES or np.ptp(values, axis=0).any():
         return ""
     rates = [m for m in measurements if m.message.gives == RATES and not m.unused]
     for rate in sorted(rates, key=lambda m: m.topic is not attitude.topic)[:1]:
@@ -268,7 +269,7 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     position, quaternion, time = same.get(POSITION), same.get(QUATERNION), velocity.topic.time
     if not position or not quaternion or len(time) < LEAST_SAMPLES:
         return ""
-    known, rotation = _attitude_of(quaternion)
+    known, rotation = quaternion.attitude
     if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
         return ""
     earth, body = frames_of(velocity.message, velocity.topic.source)
@@ -333,7 +334,7 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None,
     if gives == POSITION:
         yield from _of_position(topic, _turned(values, earth), unused)
     elif gives in (EULER, QUATERNION):
-        time, rotation = _attitude_of(measurement)
+        time, rotation = measurement.attitude
         angles = rotation.as_euler("ZYX")[:, ::-1].T if len(time) else ()
         for axis, column in zip((ROLL, PITCH, YAW), angles, strict=False):
             yield Channel(QUANTITIES[axis.position], topic.source, time, column, unused=unused)

@@ -21,6 +21,8 @@ _OTHER_CLOCK = 1.0
 """If the times of messages and of their arrival differ by more than this, they come from different clocks, s."""
 LATE = 1.0
 """A command begins late if its first value comes later after that of another one, s."""
+_LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
+"""A gap is longer than this time, s, and than this many usual intervals."""
 
 
 def restarts(stamps: Iterable[Array]) -> list[float]:
@@ -97,6 +99,19 @@ def usual_delay(pairs: Array) -> float:
     delays = pairs[:, 1] - pairs[:, 0]
     delay = float(np.median(delays[np.isfinite(delays)])) if np.isfinite(delays).any() else 0.0
     return delay if abs(delay) > _OTHER_CLOCK else 0.0
+
+
+def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
+    """Return the last time before each gap in the measurements and the first time after it, s.
+
+    A gap is longer than 1 s and than ten usual intervals between two measurements.
+    """
+    at = time[np.isfinite(values)]
+    intervals = np.diff(at)
+    if not len(intervals):
+        return []
+    (before,) = np.nonzero(intervals > max(_LEAST_GAP, _GAP_INTERVALS * float(np.median(intervals))))
+    return [(float(at[n]), float(at[n + 1])) for n in before]
 
 
 def ascending(time: Array, *values: Array) -> tuple[Array, ...]:

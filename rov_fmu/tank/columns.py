@@ -7,11 +7,12 @@ so a number outside is a mistake; without bounds, fits could overflow.
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
+from functools import partial
 
 import numpy as np
 from pydantic import TypeAdapter
 
-from rov_fmu.equation.catalogue import AXES, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, EXTERNAL, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.columns import (
     COMMANDS,
@@ -59,8 +60,13 @@ def logged_command(keys: LogKeys = NO_KEYS) -> Column:
     """Return the column of a command in a log. A pulse in µs has the neutral and the span of the keys unless the header
     has others; a force in N needs the force of full thrust, as in [N 50]."""
     usual = (NEUTRAL if keys.neutral is None else keys.neutral, keys.span or SPAN)
-    of_keys = dict.fromkeys(PULSES, lambda numbers: pulses(numbers or usual))
+    of_keys = dict.fromkeys(PULSES, partial(_pulses_about, usual))
     return replace(FRACTION, optional=True, conversions={**COMMANDS, **of_keys})
+
+
+def _pulses_about(usual: tuple[float, float], numbers: tuple[float, ...]) -> Conversion:
+    """Return the conversion of a pulse by the numbers of its header, or else by the usual neutral and span."""
+    return pulses(numbers or usual)
 
 
 TABLES = {"thrust": "force", "steady": "velocity", "time_constant": "time constant"}
@@ -96,10 +102,14 @@ SLIPS = (
 def refuse_slips(table: Columns, commands: Iterable[str]) -> None:
     """Raise DataFileError where the commands cannot be in the unit of their header: fractions under [%] or [us]."""
     names = [name for name in commands if name in table.values]
+
+    def largest(name: str) -> float:
+        numbers = table.numbers.get(name) or [FRACTION.units["%"] * value for value in table.values[name]]
+        return float(np.nanmax(np.abs(numbers), initial=0.0))
+
     for units, most, mistake in SLIPS:
         columns = [name for name in names if table.units[name] in units]
-        rows = table.texts(*columns) if columns else ()
-        if 0.0 < max((abs(float(text)) for row in rows for text in row if text), default=0.0) <= most:
+        if 0.0 < max(map(largest, columns), default=0.0) <= most:
             titles = ", ".join(shown(table.headers[name]) for name in columns)
             raise DataFileError(f"{table.path}, column {titles}: {mistake}")
 
@@ -113,28 +123,24 @@ INPUTS, THRUSTERS, AXIS = "inputs", "thrusters", "axis"
 
 
 @dataclass(frozen=True)
-class Entry:
-    """The meaning of a header or a field: a command, or a quantity."""
+class LogColumn(Column):
+    """A column or a field that a log may have, with its meaning: a command, a quantity, or, without a name, a time."""
 
-    name: str
+    name: str = ""
     """The name of the quantity, the input or the thruster; `command` for that of an axis."""
     quantity: Quantity | None = None
     """None for a command."""
+    commands: str = ""
+    """What the command is of. A log has commands of one kind. Empty for another column."""
     convert: Conversion | None = None
     """The conversion of the numbers; None where they have the unit of the column already."""
     is_pulse: bool = False
     """True for a pulse, µs, whose neutral nobody states."""
 
-
-@dataclass(frozen=True)
-class LogColumn:
-    """A column that a log may have."""
-
-    column: Column
-    entry: Entry | None = None
-    """The meaning; None for the time."""
-    commands: str = ""
-    """What the command is of. A log has commands of one kind. Empty for another column."""
+    @classmethod
+    def of(cls, column: Column, name: str = "", commands: str = "", quantity: Quantity | None = None) -> "LogColumn":
+        """Return a column with its meaning."""
+        return cls(**vars(column), name=name, commands=commands, quantity=quantity)
 
 
 def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, LogColumn]:
@@ -144,17 +150,16 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
     column of its command.
     """
     command = logged_command(keys)
-    columns = {"time": LogColumn(TIME)}
-    if axis and not layout.has_wrench:
-        columns[COMMAND] = LogColumn(command, Entry(COMMAND), AXIS)
-    for axis_of_force in AXES.values() if layout.has_wrench else ():  # a vehicle need not have them all
-        name = axis_of_force.external
-        columns[name] = LogColumn(_force_column(axis_of_force), Entry(name), THRUSTERS)
-    for name in (thruster.name for thruster in layout.thrusters if not layout.has_wrench):
-        title = f"thruster {name}" if layout.mix else f"u_{name}"
-        columns[title] = LogColumn(replace(command, also=(name,)), Entry(name), THRUSTERS)
+    columns = {"time": LogColumn.of(TIME)}
+    if layout.has_wrench:  # a vehicle need not have all forces
+        columns |= {one.external: LogColumn.of(_force_column(one), one.external, THRUSTERS) for one in AXES.values()}
+    else:
+        columns |= {COMMAND: LogColumn.of(command, COMMAND, AXIS)} if axis else {}
+        for name in (thruster.name for thruster in layout.thrusters):
+            title = f"thruster {name}" if layout.mix else f"u_{name}"
+            columns[title] = LogColumn.of(replace(command, also=(name,)), name, THRUSTERS)
     for name in layout.commands if layout.mix else ():
-        columns[name] = LogColumn(command, Entry(name), INPUTS)
+        columns[name] = LogColumn.of(command, name, INPUTS)
     for name, quantity in QUANTITIES.items():
         short = name
         if axis and quantity.axis == axis:
@@ -162,19 +167,14 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         also = (name,) if short != name else ()
         # `read_log` checks the bounds after the marks of no measurement are left out.
         column = replace(quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None)
-        columns.setdefault(short, LogColumn(column, Entry(name, quantity)))  # the distance along the axis comes first
-    return {**columns, "date": LogColumn(DATE)}
+        columns.setdefault(short, LogColumn.of(column, name, "", quantity))  # the distance along the axis comes first
+    return {**columns, "date": LogColumn.of(DATE)}
 
 
 def _force_column(axis: Axis) -> Column:
     """Return the column of the force of a wrench along an axis, or of the moment about it."""
     part = f"{TORQUE if axis.is_rotation else FORCE} {'xyz'[axis.place]}"
     return Column({axis.load: 1.0}, optional=True, minimum=-1e6, maximum=1e6, also=(part,))
-
-
-def known_columns(columns: Mapping[str, LogColumn]) -> dict[str, Column]:
-    """Return the columns without their meaning."""
-    return {name: one.column for name, one in columns.items()}
 
 
 # ---- Names of rov.toml -----------------------------------------------------------------------------------------------
@@ -189,7 +189,7 @@ class Names:
 
     columns: Mapping[str, str] = field(default_factory=lambda: WELL_KNOWN)
     """Headers, by the headers of the CSV files."""
-    topics: Mapping[str, Entry] = field(default_factory=dict)
+    topics: Mapping[str, LogColumn] = field(default_factory=dict)
     """Meanings by topic and field: `/bar30/depth.data`."""
     valid: Mapping[str, Sequence[str]] = field(default_factory=dict)
     """The quantities of which a column or a field is a flag."""
@@ -202,12 +202,11 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
 
     Without a layout, a value that is not known may be the command of a thruster.
     """
-    of_logs = columns_of_log(layout or Layout((), (), ()), None, tables.logs)
-    known = known_columns(of_logs)
+    known = columns_of_log(layout or Layout((), (), ()), None, tables.logs)
     of_csv = {**known, COMMAND: logged_command(tables.logs), **_OF_TABLES}
-    del known["time"], known["date"]
+    of_topics = {name: column for name, column in known.items() if column.name}
     entries, mistakes = {}, []
-    for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", known, tables.topics)):
+    for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", of_topics, tables.topics)):
         columns = KnownColumns(allowed)
         for source, title in targets.items():
             try:
@@ -215,9 +214,9 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
             except ValueError as error:
                 mistakes.append(key_line(f"{table}.{source}", str(error), title))
                 continue
-            if found and table == "topics" and (entry := of_logs[found.name].entry):
+            if found and table == "topics":
                 is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None
-                entries[source] = replace(entry, convert=found.convert, is_pulse=is_pulse)
+                entries[source] = replace(known[found.name], convert=found.convert, is_pulse=is_pulse)
     return Names({**WELL_KNOWN, **tables.columns}, entries, tables.valid, tables.logs), mistakes
 
 
@@ -241,4 +240,4 @@ def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list
         for name in named or values
     }
     commands = np.column_stack([*mixed.values()])
-    return [*mixed], commands if layout.has_wrench else np.clip(commands, -1.0, 1.0)
+    return [*mixed], np.clip(commands, -1.0, 1.0) if EXTERNAL.isdisjoint(mixed) else commands

@@ -23,11 +23,11 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from pydantic import Field
 
-from rov_fmu.equation.parts import BodyForce
+from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, SPAN
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed, shown
-from rov_fmu.io.toml_file import Finite, Strict
+from rov_fmu.io.toml_file import AS_TUPLE, Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
 from rov_fmu.tank.channels import Topic, frames_of
@@ -71,6 +71,13 @@ class LogKeys(Strict):
     """The distance from the neutral pulse to full thrust, µs."""
     wrench: bool = False
     """True where the commands are forces and moments on the body, although the vehicle has thrusters."""
+    reversed: Annotated[tuple[str, ...], AS_TUPLE] = ()
+    """The thrusters that push against their directions at a positive command, whatever the parameters of an autopilot
+    tell, by name."""
+
+    def signs(self, thrusters: Sequence[str]) -> Array:
+        """Return -1 for each thruster that is reversed, and 1 for the others."""
+        return np.array([-1.0 if name in self.reversed else 1.0 for name in thrusters])
 
 
 NO_KEYS = LogKeys()
@@ -204,17 +211,18 @@ def commands_of(
     vehicles = {outputs.source.vehicle for outputs in candidates} | _alike(vehicle, topics)
     findings = [*_choice(path, best, own, sorted(vehicles))]
     by_name = dict(zip(names, numbers, strict=True))
-    series, meanings = _fractions(path, best, by_name, parameters, keys)
+    are_pulses = _are_pulses(path, best)
+    series, meanings = _fractions(path, best, by_name, parameters, keys, are_pulses=are_pulses)
     known = {topic for outputs in candidates for topic in outputs.topics}
-    used = {n for n, (_, values) in best.series.items() if np.isfinite(values).any()}
-    used = {*best.used} if _are_pulses(path, best) else used
+    finite = (n for n, (_, values) in best.series.items() if np.isfinite(values).any())
+    used = {*(best.used if are_pulses else finite)}
     without = [name for name, n in by_name.items() if n not in used] if used & {*numbers} else []
     extra = _without_thruster(best, numbers, functions)
     return Commanded(series, best.source, vehicles - {vehicle}, known, [*findings, *meanings], without, extra)
 
 
-def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], keys: LogKeys) -> Commanded:
-    """Return the forces of the wrench that a log has, forward, starboard and down, N or N.m. Raises DataFileError.
+def wrench_of(path: Path, topics: Sequence[Topic], axes: Sequence[Axis], keys: LogKeys) -> Commanded:
+    """Return the forces along some axes of the wrench that a log has, N, or N.m about them. Raises DataFileError.
 
     Of several wrenches, the one that changes most is used, unless [logs] names one.
     """
@@ -225,11 +233,10 @@ def wrench_of(path: Path, topics: Sequence[Topic], forces: Sequence[BodyForce], 
                 _, body = frames_of(message, topic.source)
                 nothing = np.zeros(len(topic.time))
                 values = np.column_stack([topic.fields.get(field, nothing) for field in message.fields]) @ body.T
-                for force in forces:
-                    is_told = message.fields[force.axis.place]
-                    if is_told and force.axis.is_rotation == (message.gives != FORCE):
-                        series = topic.time, np.nan_to_num(values[:, force.axis.place])
-                        found.setdefault(topic.source, {})[force.name] = series
+                for axis in axes:
+                    if message.fields[axis.place] and axis.is_rotation == (message.gives != FORCE):
+                        series = topic.time, np.nan_to_num(values[:, axis.place])
+                        found.setdefault(topic.source, {})[axis.external] = series
     own = _named(path, "outputs", keys.outputs, [*found], lambda source: source.topic)
     if not own:
         return Commanded()
@@ -406,11 +413,17 @@ def _changes_of(values: Array) -> int:
 
 
 def _fractions(
-    path: Path, outputs: _Outputs, numbers: Mapping[str, int], parameters: Parameters, keys: LogKeys
+    path: Path,
+    outputs: _Outputs,
+    numbers: Mapping[str, int],
+    parameters: Parameters,
+    keys: LogKeys,
+    *,
+    are_pulses: bool,
 ) -> tuple[dict[str, Series], list[Finding]]:
     """Return the fractions of the full command of each thruster, not yet limited to ±1, and what had to be decided.
 
-    `numbers` has the number of the output of each thruster, in the order of the motors, or 0. Raises DataFileError.
+    `numbers` has the number of the output of each thruster, in the order of the motors, or 0.
     """
     time, _ = next(iter(outputs.series.values()))
     nothing = time, np.zeros(len(time))
@@ -419,7 +432,7 @@ def _fractions(
     findings = []
     if outputs.rule.unit != "1" and "MOT_1_DIRECTION" not in parameters.told:
         findings.append(about(path.name, "unknown direction"))
-    if not series or not _are_pulses(path, outputs):
+    if not (series and are_pulses):
         return series, findings
     turned, without_pulse = [], 0
     is_open = keys.neutral is None and parameters.last("MOT_PWM_TYPE") not in _BY_SERVO

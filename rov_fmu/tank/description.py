@@ -8,6 +8,7 @@ import os
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import inf
 from pathlib import Path
 from typing import Annotated, Any
@@ -34,6 +35,7 @@ from rov_fmu.io.toml_file import (
     AS_TUPLE,
     Finite,
     Strict,
+    Symbol,
     Toml,
     folder_of,
     join_names,
@@ -47,8 +49,10 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.commands import LogKeys
 from rov_fmu.vehicle.checks import check_distinct_names, check_names_and_keys, check_quantities, check_tables_of_thrust
 from rov_fmu.vehicle.description import Head, Validity
+from rov_fmu.vehicle.full_thrust import CurveToFit
 from rov_fmu.vehicle.geometry import undriven_axes
 from rov_fmu.vehicle.quantity import Quantity
+from rov_fmu.vehicle.schema import MOST as MOST_OF_A_KIND
 from rov_fmu.vehicle.schema import NOT_GIVEN, Tables, read_tables
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
@@ -202,6 +206,7 @@ _Flagged = Annotated[
 class RovTables(Tables):
     """The tables of rov.toml that could be read."""
 
+    curves: dict[Symbol, CurveToFit] = Field(default={}, max_length=MOST_OF_A_KIND)
     base: _VehicleFile | None = None
     """The vehicle file to begin from."""
     against: _VehicleFile | None = None
@@ -279,7 +284,7 @@ class Description:
         """True if the file itself describes the thrusters; otherwise they are those of the base or of the paper."""
         return not self.base_name and bool(self.tables.thruster)
 
-    @property
+    @cached_property
     def logged(self) -> Layout:
         """The layout with the axes of which a log of several axes may have recordings.
 
@@ -409,7 +414,7 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
         axes=tuple(name for name in AXES if name in start.by_name or name in own_layout.by_name),
         known={name: quantity for name, quantity in given.items() if name in layout.coefficients},
         named=tuple(dict.fromkeys([*given, *known_names])),
-        base_quantities=_quantities(base.with_(layout)) if base else {},
+        base_quantities=_quantities(base.with_(layout)) if base else _thrust_about(file, layout),
         requests=file.fit.model_copy(update={"lag": curves}) if file.fit.lag is True else file.fit,
         measured_at={names[name]: file.known[name].value for name in names.keys() & file.known.keys()},
         limits=file.validity.limits if file.validity else base.limits if base else (),
@@ -441,6 +446,13 @@ def _quantities(vehicle: Vehicle) -> dict[str, Quantity]:
     }
 
 
+def _thrust_about(file: RovTables, layout: Layout) -> dict[str, Quantity]:
+    """Return the coefficients of the curves whose force at full command the file tells about."""
+    curves = layout.curves_by_name
+    own = ((curves[name], curve.guess) for name, curve in file.curves.items() if name in curves)
+    return {curve.name_of(key): quantity for curve, guess in own for key, quantity in guess.items()}
+
+
 def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) -> Layout:
     """Add every axis that the thrusters drive, and the keys of the file's own axis tables."""
     forms = []
@@ -465,6 +477,8 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     yield from _mistakes_in_known(file, description)
     if "known" not in lost:
         yield from _missing_halves(file, description)
+    yield from _doubled_thrust(file, description)
+    yield from _unknown_reversed(file, layout)
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.by_name]
     for name in file.windows:
         if name not in windows:
@@ -523,6 +537,25 @@ def _mistakes_in_known(file: RovTables, description: Description) -> Iterator[st
     for name, quantity in file.quantities(description.layout).items():
         if quantity and name in file.known:
             yield key_line(f"known.{name}", f"is given in [{'.'.join(tables[name][:-1])}] too")
+
+
+def _doubled_thrust(file: RovTables, description: Description) -> Iterator[str]:
+    """Yield a line for each curve whose force at full command is told beside its coefficients."""
+    for name, curve in file.curves.items():
+        if curve.thrust and (own := description.layout.curves_by_name.get(name)):
+            given = [a for a in map(own.coefficient, ("a_t", "b_t")) if a in description.named]
+            if given:
+                yield key_line(f"curves.{name}.thrust", f"leave it out, because {join_names(given)} is given")
+
+
+def _unknown_reversed(file: RovTables, layout: Layout) -> Iterator[str]:
+    """Yield a line for each name in [logs] reversed that no thruster has."""
+    names = [thruster.name for thruster in layout.thrusters]
+    for name in file.logs.reversed:
+        if layout.has_wrench:
+            yield key_line("logs.reversed", "the logs have forces on the body, which no thruster reverses", name)
+        elif name not in names:
+            yield key_line("logs.reversed", f"there is no such thruster{only(name, names)}", name)
 
 
 def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:

@@ -133,7 +133,7 @@ _DOUBTS = {
     ),
     "unknown direction": (
         "{files}: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
-        "push ahead above its neutral pulse"
+        "push ahead above its neutral pulse. [logs] in rov.toml may name those that do not: reversed = [...]"
     ),
     "unknown velocity": "{files}: {count:#velocity} left out, because the filter marks them as unknown",
     "depth by pressure": "{files}: the depth is computed from the {by}",

@@ -14,11 +14,12 @@ A bag of ROS 2 may be in a folder of its own. The files of the tables [dives] of
 A command is that of an axis, or, in a test of a thrust curve, that of all thrusters that were tested together.
 """
 
+import warnings
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
@@ -29,8 +30,17 @@ from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, names_of
-from rov_fmu.tank.description import ROV_FILE, Dive, Draft, Requests, RovFile, RovTables, read_description
-from rov_fmu.tank.findings import Finding, about
+from rov_fmu.tank.description import (
+    NO_ROV_FILE,
+    ROV_FILE,
+    Dive,
+    Draft,
+    Requests,
+    RovFile,
+    RovTables,
+    read_description,
+)
+from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.quality import checked, uninterrupted
 from rov_fmu.tank.read_log import read_logs
@@ -162,9 +172,10 @@ class Folder:
                 instead = "those of the logs are forces on the body, by `wrench` in [logs]: move it to another folder"
             reason = f"its commands are of thrusters, and {instead}"
             self.mistakes.append(f"{self.path / name}: {reason}")
-        largest = [log.commands.largest for log in self.logs if log.commands]
-        names = [curve.name for curve in description.layout.curves]
-        full = {name: max((one.get(name, 0.0) for one in largest), default=0.0) or 1.0 for name in names}
+        largest = dict.fromkeys(description.layout.curves_by_name, 0.0)
+        for name, most in (pair for log in self.logs if log.commands for pair in log.commands.largest.items()):
+            largest[name] = max(most, largest.get(name, 0.0))
+        full = {name: largest[name] or 1.0 for name in description.layout.curves_by_name}
         self.logs = [replace(log, commands=log.commands and log.commands.relative_to(full)) for log in self.logs]
         source = "The largest force in the logs"
         known = {
@@ -174,9 +185,8 @@ class Folder:
         }
         self.rov_file = replace(self.rov_file, description=replace(description, known={**description.known, **known}))
         if self.logs:
-            loads = {form.axis.external: form.axis.load for form in description.layout.axes}
-            commanded = {name for one in largest for name, most in one.items() if most}
-            told = [f"{name} = {full[name]:.3g} {loads[name]}" for name in full if name in loads.keys() & commanded]
+            forces = ((axis.external, axis.load) for axis in description.layout.bare_axes)
+            told = [f"{name} = {largest[name]:.3g} {unit}" for name, unit in forces if largest.get(name)]
             inputs = _OWN_THRUSTERS if description.thrusters else _LOADS
             self.findings.append(Finding("wrench", words={"full": listed(told) or "there is none", "inputs": inputs}))
 
@@ -369,6 +379,39 @@ def joined_dive(folder: Path, dive: Dive, layout: Layout, names: Names) -> Log:
     return together(paths[0], logs, dive.other_clock)
 
 
+# ---- One log ---------------------------------------------------------------------------------------------------------
+
+_NOT_TOLD = {"missing column", "unknown direction", "time of arrival"}
+"""The findings that a flight or a simulation does not need."""
+
+
+def description_beside(path: Path) -> RovFile:
+    """Return what the rov.toml beside a log says. Raises FileError if there is no log."""
+    with open_file(path):
+        described = path.parent / ROV_FILE
+        return read_description(described) if described.exists() else NO_ROV_FILE
+
+
+def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = False) -> Log:
+    """Return a log up to the first restart of its clock, and warn of what is left out. Raises FileError.
+
+    Of a dive of several files, all are read, whichever is named. `is_part` is true where a log of commands alone will
+    do. The tables [columns], [topics], [valid], [dives] and [logs] of the rov.toml beside the log are obeyed.
+    """
+    names, wrong = names_of(layout, rov_file.tables)
+    if wrong or not rov_file.explains_files:
+        raise VehicleFileError(*(lines_on(path.parent / ROV_FILE, wrong) or rov_file.mistakes))
+    dives = [dive for dive in rov_file.tables.dives.values() if path.name in dive.files]
+    if dives:
+        log, others = joined_dive(path.parent, dives[0], layout, names), []
+    else:
+        log, *others = read_logs(path, layout, names, axis_in_name(path), is_part=is_part)
+    told = [f"{path}: only the part before the clock restarts is used"] * bool(others)
+    for sentence in (*told, *sentences(f for f in log.findings if f.kind not in _NOT_TOLD)):
+        warnings.warn(sentence, UserWarning, stacklevel=4)
+    return log
+
+
 # ---- Files -----------------------------------------------------------------------------------------------------------
 
 
@@ -454,6 +497,11 @@ def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
             fitting = (name for name in names if f"{rest}_".startswith(f"{name.lower()}_"))
             return kind, max(fitting, key=len, default="")
     return "", ""
+
+
+def axis_in_name(path: Path) -> Axis | None:
+    """Return the axis that the name of a file contains."""
+    return next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
 
 
 def file_hash(path: Path, kind: str = "sha3_256") -> str:

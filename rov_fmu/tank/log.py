@@ -6,19 +6,23 @@ identification, `--inspect`, the flight page and `simulate` use it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.arrays import Array, Flags, spread
 from rov_fmu.tank.catalogue import Quantity
-from rov_fmu.tank.clocks import held
+from rov_fmu.tank.clocks import gaps, held
 from rov_fmu.tank.findings import Finding
 
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
 
+_TURN = 2.0 * pi + 0.3
+"""The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
 _LONG, _LONG_INTERVALS, _CHANGING, _REGULAR = 1.0, 10.0, 0.9, 2.0
 """Commands are told only where they change if two conditions hold. Somewhere no command comes for longer than the first
 number, s, and for longer than the second number of usual intervals of the measurements. And either at least the third
@@ -70,15 +74,28 @@ class Channel:
     corrected: str = ""
     """By what a velocity is corrected so that it agrees with the position, in words; empty for values as measured."""
 
-    @property
+    @cached_property
     def there(self) -> Flags:
         """n: True where there is a measurement."""
         return np.isfinite(self.values)
 
-    @property
+    @cached_property
     def samples(self) -> tuple[Array, Array]:
         """The times and the values of the measurements that there are."""
         return self.time[self.there], self.values[self.there]
+
+    @cached_property
+    def unwrapped(self) -> tuple[Array, Array]:
+        """The same, but an angle has no jumps of a full turn.
+
+        It is already continuous if it ranges over clearly more than a turn, or if it never jumps by more than half a
+        turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is taken.
+        """
+        time, values = self.samples
+        jumps = np.abs(np.diff(values)) > pi
+        jumps[np.isin(time[:-1], [start for start, _ in gaps(time, values)])] = False
+        is_wrapped = self.quantity.wraps and jumps.any() and spread(values) < _TURN
+        return time, np.unwrap(values) if is_wrapped else values
 
     @property
     def count(self) -> int:
@@ -183,6 +200,21 @@ class Log:
     def used(self, name: str) -> Channel | None:
         """Return the channel that is used for a quantity, by the quantity's name, or None if nothing measures it."""
         return next((c for c in self.channels if c.quantity.name == name and not c.unused and c.count), None)
+
+    @cached_property
+    def shown(self) -> tuple[Channel, ...]:
+        """The channels of axes that are used, with the measurements during the commands; angles do not jump."""
+        if self.commands is None or not self.commands.time.size:
+            return ()
+        begin, end = float(self.commands.rows[0]), self.commands.end
+        found = []
+        for channel in self.channels:
+            axis = channel.quantity.axis
+            if axis and not channel.unused and self.axis in (None, axis):
+                time, values = channel.unwrapped
+                inside = (time >= begin) & (time <= end)
+                found.append(replace(channel, time=time[inside], values=values[inside]))
+        return tuple(found)
 
     @property
     def tilt(self) -> tuple[Channel, Channel] | None:

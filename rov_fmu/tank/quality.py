@@ -3,25 +3,21 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
+from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.tank.agreement import Disagreement, disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Commands, Log
 
 _MOST_SOURCES = 4
 """The largest number of sources that are not used and told."""
-_LEAST_GAP, _GAP_INTERVALS = 1.0, 10.0
-"""A gap is longer than this time, s, and than this many usual intervals."""
-_TURN = 2.0 * pi + 0.3
-"""The largest range of a wrapped angle, rad: noise and filters exceed a turn a little where the angle wraps."""
 _LEAST_SHARE, _LEAST_TIME = 0.2, 5.0
 """A sensor is frozen if it keeps its last value for more than this share of the log, and for more than this time, s."""
 _CHANGING, _TURNING, _VISIBLE = 0.5, 0.2, 1.5
@@ -43,15 +39,12 @@ Other quantities change _FASTER times as fast."""
 def checked(log: Log) -> Log:
     """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
     channels, frozen = _without_frozen(log.file, log.channels)
-    channels = _agreeing(channels, log.axis)
+    channels, scaled = _agreeing(log, channels)
     findings = [*log.findings, *frozen, *_corrected(log.file, channels)]
     used = [channel for channel in channels if not channel.unused]
     findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
-    for channel in used:
-        if not channel.quantity.is_velocity:
-            findings += scales_differ(log.file, channel, channels)
-    findings += sources(log.file, channels)
+    findings += [*scaled, *sources(log.file, channels)]
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
     return replace(log, commands=commands, channels=tuple(channels), findings=tuple(findings))
@@ -106,19 +99,6 @@ def _others(channel: Channel, channels: Sequence[Channel]) -> str:
 # ---- Gaps, angles and jumps ------------------------------------------------------------------------------------------
 
 
-def gaps(time: Array, values: Array) -> list[tuple[float, float]]:
-    """Return the last time before each gap in the measurements and the first time after it, s.
-
-    A gap is longer than 1 s and than ten usual intervals between two measurements.
-    """
-    at = time[np.isfinite(values)]
-    intervals = np.diff(at)
-    if not len(intervals):
-        return []
-    (before,) = np.nonzero(intervals > max(_LEAST_GAP, _GAP_INTERVALS * float(np.median(intervals))))
-    return [(float(at[n]), float(at[n + 1])) for n in before]
-
-
 def uninterrupted(log: Log) -> list[Log]:
     """Return the pieces of a log between the gaps in which it tells neither a command nor a measurement.
 
@@ -155,25 +135,10 @@ def gaps_in_words(found: Sequence[tuple[float, float]], begin: float) -> str:
     return ", ".join(first_of([f"{end - start:.3g} s from {start - begin:.4g} s on" for start, end in found], MOST))
 
 
-def unwrapped(channel: Channel) -> Channel:
-    """Return a channel whose values have no jumps of a full turn, if they are angles; NaN stays NaN.
-
-    An angle is already continuous if it ranges over clearly more than a turn, or if it never jumps by more than half a
-    turn between two samples (gaps excepted). Such an angle stays as it is. Across a gap, the smaller turn is assumed.
-    """
-    found, there = channel.values.copy(), channel.there
-    values = found[there]
-    jumps = np.abs(np.diff(values)) > pi
-    jumps[np.isin(channel.time[there][:-1], [start for start, _ in gaps(channel.time, found)])] = False
-    if channel.quantity.wraps and jumps.any() and spread(values) < _TURN:
-        found[there] = np.unwrap(values)
-    return replace(channel, values=found)
-
-
 def _jumps(file: str, channel: Channel) -> Finding | None:
     """Return a finding about the jumps of a position: resets of a filter or of a sensor."""
     axis, unit = channel.quantity.axis, channel.quantity.unit
-    time, values = unwrapped(channel).samples
+    time, values = channel.unwrapped
     if unit not in ("m", "rad") or not len(indices := jumps(time, values)):
         return None
     factor, shown_unit = in_degrees(unit)
@@ -203,14 +168,26 @@ def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[n
     return np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
 
 
-def scales_differ(file: str, position: Channel, channels: Sequence[Channel]) -> list[Finding]:
-    """Return a finding if a position changes by another factor than 1 of what the velocity of its axis says."""
-    found = _disagreement(position, channels)
-    if not found or not found[1].scaled.any():
-        return []
-    quantity, axis = position.quantity, position.quantity.axis
-    assert axis
-    return [about(file, "scales differ", axis.name, quantity=quantity.name, factor=float(found[1].scale[0]))]
+def _agreeing(log: Log, channels: Sequence[Channel]) -> tuple[list[Channel], list[Finding]]:
+    """Return the channels with each velocity moved by its offset from the position of its axis, if their scales agree,
+    and a finding about each position that changes by another factor than 1 of what the velocity of its axis says.
+
+    In a log of one axis, velocities are through the water and distances over ground, so that a current moves one.
+    """
+    moved: dict[Channel, Channel] = {}
+    findings = []
+    for position in (c for c in channels if not (c.unused or c.quantity.is_velocity)):
+        if not (found := _disagreement(position, channels)):
+            continue
+        (velocity, differs), quantity = found, position.quantity
+        if differs.scaled.any():
+            name, factor = quantity.axis.name if quantity.axis else "", float(differs.scale[0])
+            findings.append(about(log.file, "scales differ", name, quantity=quantity.name, factor=factor))
+        elif differs.moved.any() and log.axis not in (SURGE, SWAY):
+            offset = float(differs.offset[0])
+            words = offset_in_words(offset, velocity.quantity.unit)
+            moved[velocity] = replace(velocity, values=velocity.values + offset, corrected=words)
+    return [moved.get(channel, channel) for channel in channels], findings
 
 
 def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Channel, Disagreement] | None:
@@ -224,7 +201,7 @@ def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Chann
     tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
     if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
         return None
-    time, values = unwrapped(position).samples
+    time, values = position.unwrapped
     at, speeds = velocity.samples
     both = (at >= time[0]) & (at <= time[-1])
     if not spread(speeds[both]):
@@ -232,21 +209,6 @@ def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Chann
     positions = np.interp(at[both], time, values)
     found = disagreement(at[both], positions[:, None], speeds[both, None])
     return (velocity, found) if found else None
-
-
-def _agreeing(channels: Sequence[Channel], axis: Axis | None) -> list[Channel]:
-    """Return the channels with each velocity moved by its offset from the position of its axis, if their scales agree.
-
-    In a log of one axis, velocities are through the water and distances over ground, so that a current moves one.
-    """
-    moved: dict[Channel, Channel] = {}
-    for position in (c for c in channels if not (c.unused or c.quantity.is_velocity or axis in (SURGE, SWAY))):
-        found = _disagreement(position, channels)
-        if found and found[1].moved.any() and not found[1].scaled.any():
-            velocity, offset = found[0], float(found[1].offset[0])
-            words = offset_in_words(offset, velocity.quantity.unit)
-            moved[velocity] = replace(velocity, values=velocity.values + offset, corrected=words)
-    return [moved.get(channel, channel) for channel in channels]
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------

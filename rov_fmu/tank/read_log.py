@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import AXES, EXTERNAL, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import BodyForce
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.groups import grouped
@@ -24,13 +23,13 @@ from rov_fmu.tank.columns import (
     COMMAND,
     INPUTS,
     THRUSTERS,
-    Entry,
+    LogColumn,
     Names,
     columns_of_log,
     is_of_inputs,
     thruster_commands,
 )
-from rov_fmu.tank.commands import Series, at_rest, commands_of, wrench_of
+from rov_fmu.tank.commands import Commanded, Series, at_rest, commands_of, wrench_of
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.ardusub_frames import frame_of, misfits
@@ -69,7 +68,7 @@ def _log(
     content: Content,
     piece: Piece,
     layout: Layout,
-    entries: Mapping[str, Entry],
+    entries: Mapping[str, LogColumn],
     names: Names,
     axis: Axis | None,
 ) -> Log:
@@ -81,11 +80,12 @@ def _log(
     named, told, labels = _meant(path, piece, entries)
     thrusters = [thruster.name for thruster in layout.thrusters]
     topics = [] if any(not entry.quantity for entry in entries.values()) else piece.topics
-    if layout.has_wrench:
-        forces = [thruster for thruster in layout.thrusters if isinstance(thruster, BodyForce)]
-        commanded = wrench_of(path.with_name(file), topics, forces, keys)
-    else:
+    commanded = Commanded()
+    if not layout.has_wrench:
         commanded = commands_of(path.with_name(file), topics, thrusters, piece.parameters, keys)
+    if layout.has_wrench or not (layout.axes or commanded.series):  # nothing is known of the vehicle
+        forces = wrench_of(path.with_name(file), topics, layout.bare_axes or [*AXES.values()], keys)
+        commanded = forces if forces.series else commanded
     without_thruster = (content.without_thruster if is_first else {}) or commanded.without_thruster
     config = piece.parameters.last("FRAME_CONFIG")
     source = commanded.sender or Source.of_several([*labels.values()])
@@ -106,7 +106,7 @@ def _log(
     if series:
         rows, values = in_rows(series)
         thrusters, fractions = thruster_commands(layout, values)
-        commands = Commands.of_rows(thrusters, rows, fractions, source)
+        commands = Commands.of_rows(thrusters, rows, fractions * keys.signs(thrusters), source)
     unread = content.unread | described(topic for topic in piece.topics if topic.source.topic not in used)
     return Log(
         file,
@@ -121,7 +121,7 @@ def _log(
     )
 
 
-def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
+def _move_to_neutral(content: Content, entries: Mapping[str, LogColumn]) -> None:
     """Move the pulses of outputs that rest elsewhere than at the usual neutral pulse to this one, and tell it."""
     fields = (pair for piece in content.pieces for topic in piece.topics for pair in topic.full_fields())
     pulses = grouped((field, values) for field, values in fields if field in entries and entries[field].is_pulse)
@@ -133,7 +133,7 @@ def _move_to_neutral(content: Content, entries: Mapping[str, Entry]) -> None:
 
 
 def _meant(
-    path: Path, piece: Piece, entries: Mapping[str, Entry]
+    path: Path, piece: Piece, entries: Mapping[str, LogColumn]
 ) -> tuple[list[Channel], dict[str, Series], dict[str, str]]:
     """Return the channels and the commands that `entries` say that fields are, and the fields of the commands.
 
@@ -180,13 +180,12 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
         if time[0] > first + LATE:
             at = f"{time[0] - first:.4g}"
             yield about(file, "late command", column=labels.get(name, f"thruster {name}"), at=at)
-    for name, (_, values) in series.items() if not layout.has_wrench else ():
-        if count := int((np.abs(values) > 1.0 + 1e-9).sum()):
+    for name, (_, values) in series.items():
+        count = int((np.abs(values) > 1.0 + 1e-9).sum())
+        if count and name not in EXTERNAL:
             yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
     expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
-    for title, column in columns_of_log(layout, None).items():
-        is_expected = column.commands == expected and column.entry and column.entry.name not in series
-        if layout.has_wrench and title not in layout.curve_of:
-            continue
-        if is_expected and series and COMMAND not in series:
+    missing = {*layout.commands, *layout.curve_of} - series.keys()
+    for title, column in columns_of_log(layout, None).items() if series and COMMAND not in series else ():
+        if column.commands == expected and column.name in missing:
             yield about(file, "missing column", column=title)

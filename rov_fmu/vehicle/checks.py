@@ -51,6 +51,10 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
         yield from _check_electric_currents(parts)
     if "axes" not in lost:
         yield from _check_cross(parts)
+        for name in parts.validity.stated if parts.validity else ():
+            if name not in (names := [axis.name for axis in parts.axis_tables]):
+                reason = f"the vehicle has no such axis, only {', '.join(names)}"
+                yield key_line(f"validity.stated.{name}", reason)
     yield from _check_needed_tables(parts, lost)
     if lost & {"thruster", "axes", "inputs"} or not parts.axis_tables:
         return

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, TypeVar, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped, is_portable
-from rov_fmu.io.toml_file import AS_TUPLE, Name, Strict, Text, folder_of, printable, rule
+from rov_fmu.io.toml_file import AS_TUPLE, Finite, Name, Strict, Text, folder_of, printable, rule
 from rov_fmu.vehicle.quantity import Interval
 
 _KEYWORDS = re.compile(
@@ -146,17 +146,38 @@ def _with_their_units(ranges: dict[str, IdentifiedRange]) -> dict[str, Identifie
     return ranges
 
 
+_Any = TypeVar("_Any")
 _BETWEEN_FULL = rule(
     "must be [low, high] with -1 <= low <= 0 <= high <= 1", lambda ends: -1.0 <= ends[0] <= 0.0 <= ends[1] <= 1.0
 )
 
 
-def _of_axes(tested: dict[str, Interval]) -> dict[str, Interval]:
-    """Return the commands if each belongs to an axis. Raises ValueError."""
-    for name in tested:
+def _of_axes(given: dict[str, _Any], what: str = "commands") -> dict[str, _Any]:
+    """Return the values if each belongs to an axis. Raises ValueError."""
+    for name in given:
         if name not in AXES:
-            raise ValueError(f"must have commands of {', '.join(AXES)}, and not of {name}")
-    return tested
+            raise ValueError(f"must have {what} of {', '.join(AXES)}, and not of {name}")
+    return given
+
+
+class StatedSpeed(Strict):
+    """The top speed along an axis, in its positive direction, as somebody states it of the real vehicle."""
+
+    value: Annotated[Finite, Field(gt=0.0)]
+    """The speed."""
+    unit: Literal["m/s", "rad/s"]
+    source: Text
+    """Who states it, as the subject of a sentence: `its maker`."""
+    measured: Annotated[Interval, _NOT_EMPTY] | None = None
+    """The velocities between which the coefficients of the axis were measured, where this is known."""
+
+
+def _with_units_of_axes(stated: dict[str, StatedSpeed]) -> dict[str, StatedSpeed]:
+    """Return the speeds if each belongs to an axis and has its unit. Raises ValueError."""
+    for name, one in _of_axes(stated, "speeds").items():
+        if one.unit != AXES[name].unit:
+            raise ValueError(f"must have the speed of {name} in {AXES[name].unit}, and not in {one.unit}")
+    return stated
 
 
 class Validity(Strict):
@@ -172,6 +193,10 @@ class Validity(Strict):
     tested: Annotated[dict[str, Annotated[Interval, _BETWEEN_FULL]], AfterValidator(_of_axes)] = Field(default={})
     """The commands along each axis between which tests of this axis held it long enough, as in `surge = [-0.52, 0.57]`,
     which `rov-fmu identify` writes. An axis that is not among them was tested up to `command_max`."""
+    stated: Annotated[dict[str, StatedSpeed], AfterValidator(_with_units_of_axes)] = Field(default={})
+    """The top speeds that others state of the real vehicle, by axis, such as `surge = { value = 1.5, unit = "m/s",
+    source = "its maker" }`. If the model differs by more than 10 %, `fly`, `sitl` and the model card say so. The key
+    `measured`, `[low, high]`, tells between which velocities the coefficients were measured."""
     limits: _Sentences = ()
     """Known effects that the model leaves out, in sentences, for the FMU's documentation."""
 

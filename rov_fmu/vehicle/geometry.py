@@ -239,7 +239,7 @@ def _doubts_of_voltage(layout: Layout, coefficients: Mapping[str, float]) -> Ite
     voltage = layout.voltage or 0.0
     for curve in layout.curves:
         for low, high in pairwise(curve.tables):
-            if high.forces[-1] <= low.forces[-1] or high.forces[0] >= low.forces[0]:
+            if high.values[-1] <= low.values[-1] or high.values[0] >= low.values[0]:
                 same = f"at {high.voltage:g} V, full thrust is not stronger than at {low.voltage:g} V"
                 yield key_line(f"curves.{curve.name}.tables", f"{same}: is one table a copy of the other?")
     for curve in layout.curves:

@@ -38,7 +38,7 @@ from rov_fmu.equation.catalogue import (
     declarations_of,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import CurrentTable, SourcedVector, ThrustTable, Vector, VehicleAxis
+from rov_fmu.equation.parts import SourcedVector, Table, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.paths import inside_or_shipped
 from rov_fmu.io.toml_file import (
@@ -176,8 +176,8 @@ def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
 
 
 _TEXT = WithJsonSchema({"type": "string"})
-_Thrust = Annotated[InstanceOf[ThrustTable], _file_read_by(read_thrust), _TEXT]
-_Current = Annotated[InstanceOf[CurrentTable], _file_read_by(read_current), _TEXT]
+_Thrust = Annotated[InstanceOf[Table], _file_read_by(read_thrust), _TEXT]
+_Current = Annotated[InstanceOf[Table], _file_read_by(read_current), _TEXT]
 
 
 _Volts = Annotated[Finite, Field(ge=0.1, le=1000.0)]
@@ -193,9 +193,8 @@ class TableAtVoltage(Strict):
 
 
 class ElectricCurrent(Strict):
-    """The electric current of one thruster, which only `rov-fmu sitl` uses: the `voltage` (V) at which it was measured,
-    and the `table`, a CSV file with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it,
-    or none."""
+    """The electric current of one thruster: the `voltage` (V) at which it was measured, and the `table`, a CSV file
+    with the columns `command [1]`, `[%]` or `[us]`, and `current [A]`. All curves have it, or none."""
 
     voltage: _Volts
     """The voltage, V."""
@@ -245,7 +244,7 @@ class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
             **{key: getattr(self, key) for key in ("description", "equation", "lag")},
             n_thrusters=self.together,
             tables=tuple(replace(t, name=f"{n}_{name}", voltage=voltage) for n, (voltage, t) in tables.items()),
-            electric_current=replace(current.table, voltage=current.voltage) if current else None,
+            electric_current=replace(current.table, name=name, voltage=current.voltage) if current else None,
         )
 
 

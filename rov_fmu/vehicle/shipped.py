@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_suffix
-from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean
+from rov_fmu.io.messages import NO_FILE, FileError, did_you_mean, shown
 from rov_fmu.io.paths import MODELS
 
 SHIPPED = {folder.name: folder / f"{folder.name}.toml" for folder in sorted(MODELS.iterdir()) if folder.is_dir()}
@@ -37,3 +37,18 @@ def find_vehicle(given: str | Path) -> Path:
         beside = [str(file) for file in sorted(path.parent.glob("*.toml"))]
         raise FileError(f"{name}: {NO_FILE}{ships}{did_you_mean(name, [*SHIPPED, *beside])}")
     return path
+
+
+def named_in(path: Path, key: str, given: str, failure: type[FileError]) -> Path:
+    """Return the vehicle file that a key of a plan at a path names: one in its folder, or one that ships.
+
+    Raises `failure`.
+    """
+    beside = path.parent / given
+    if beside.is_file():
+        return beside
+    if given not in SHIPPED:
+        ships = ", ".join(SHIPPED)
+        reason = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
+        raise failure(f"{path}: {key} = {shown(given)}: {reason}{did_you_mean(given, SHIPPED)}")
+    return SHIPPED[given]

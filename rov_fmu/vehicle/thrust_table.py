@@ -2,10 +2,11 @@
 
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
 
-from rov_fmu.equation.parts import CurrentTable, ThrustTable
+from rov_fmu.equation.parts import Table
 from rov_fmu.io.columns import BEYOND, COMMANDS, FORCE_UNITS, Column, read_columns
 from rov_fmu.io.csv_table import DataFileError
 
@@ -17,7 +18,7 @@ _WIDEST = 0.05
 """The largest part of the commands that a table may leave out at each end."""
 
 
-def read_thrust(path: Path) -> ThrustTable:
+def read_thrust(path: Path) -> Table:
     """Read a CSV file with the columns command [1], [%], [us] or [N 50], and thrust [N], [kgf] or [lbf].
 
     Raises DataFileError. Rows with equal commands become one point with their mean thrust. The table has no name yet.
@@ -32,7 +33,7 @@ def read_thrust(path: Path) -> ThrustTable:
     return thrust_table(commands, forces, path)
 
 
-def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path | None = None) -> ThrustTable:
+def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path | None = None) -> Table:
     """Return the table with a force (N) at each command: a monotone cubic between them (Fritsch and Butland 1984).
 
     Beyond the outermost points, the thrust continues with their slopes to the commands -1 and 1.
@@ -47,18 +48,23 @@ def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path
         if command != end
     ]
     commands, forces, steepness = zip(*sorted(rows + ends), strict=True)
-    return ThrustTable("", commands, forces, steepness, path=path)
+    return Table("", commands, forces, steepness, path=path)
 
 
-def read_current(path: Path) -> CurrentTable:
+def read_current(path: Path) -> Table:
     """Read a CSV file with the columns command [1], [%], [us] or [N 50], and current [A]. Raises DataFileError.
 
-    Rows with equal commands become one point with their mean current.
+    Rows with equal commands become one point with their mean current. The current is linear between the points, and
+    that of the last point beyond them. The table has no name yet.
     """
     commands, currents = _points(path, "current", _CURRENT)
     if reason := _why_incomplete(commands):
         raise DataFileError(f"{path}: {reason}")
-    return CurrentTable(path, commands, currents)
+    rows = zip((-1.0, *commands, 1.0), (currents[0], *currents, currents[-1]), strict=True)
+    lines = [(low, high) for low, high in pairwise(rows) if low[0] < high[0]]
+    places, values = zip(*(end for line in lines for end in line), strict=True)
+    slopes = [(high - low) / (to - at) for (at, low), (to, high) in lines for _ in range(2)]
+    return Table("", places, values, tuple(slopes), path=path, kind="current")
 
 
 _Points = tuple[tuple[float, ...], tuple[float, ...]]

@@ -18,7 +18,7 @@ from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
 from rov_fmu.equation.python.printed import model_of
-from rov_fmu.equation.python.step import DelayLine, formula_name, heading, step
+from rov_fmu.equation.python.step import Memory, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
 from rov_fmu.io.file_kinds import VEHICLE_FILE, check_keys
@@ -26,7 +26,7 @@ from rov_fmu.io.messages import FileError, InputError, did_you_mean, lines_on, o
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line, parse_toml, problem_lines
 from rov_fmu.vehicle.checks import check_parts, no_thrust
-from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance
+from rov_fmu.vehicle.description import PICTURES, TABLES, Provenance, StatedSpeed
 from rov_fmu.vehicle.geometry import check_mass, doubts
 from rov_fmu.vehicle.quantity import within
 from rov_fmu.vehicle.schema import FORMAT, NOT_GIVEN, UNTUNED, Alternative, Basis, Estimated, File, read_tables
@@ -67,7 +67,7 @@ class _Formulas:
 
 _formulas_of = lru_cache(maxsize=100)(_Formulas)
 _thrust_of = cache(
-    lambda curve: compiled(curve_formulas(curve), {table.function: table.force for table in curve.tables})
+    lambda curve: compiled(curve_formulas(curve), {table.function: table.value for table in curve.tables})
 )
 
 
@@ -106,6 +106,8 @@ class Vehicle:
     """The weakest and the strongest thruster command for which the model was identified."""
     tested: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     """The commands along axes between which these were tested, by the names of the axes."""
+    stated: Mapping[str, StatedSpeed] = field(default_factory=dict)
+    """The top speeds that others state of the real vehicle, by the names of the axes."""
     alternatives: Mapping[str, Alternative] = field(default_factory=dict)
     """Other sets of published coefficients, by a name for each set."""
     data: Path | None = None
@@ -343,7 +345,7 @@ class Vehicle:
         values = self._outputs(inputs, state)
         for name in self.layout.continued:
             values[name] = heading(values, state.get(name, values[name]))
-        return {name: values[formula_name(name)] for name in self.layout.calculated}
+        return {name: values[name] for name in self.layout.calculated}
 
     def effect(self, thruster: Thruster, axis: Axis) -> float:
         """Return the force along an axis per newton of a thruster, or the torque per newton (m)."""
@@ -382,9 +384,9 @@ class Vehicle:
         after = step(self._formulas.model, self._values(inputs, state), h)
         return {name: after[name] for name in (*self.layout.state, *self.layout.continued)}
 
-    def delay_line(self) -> DelayLine:
-        """Return the commands that act before the first one, and nothing that waits for the dead time."""
-        return DelayLine(self.layout.usual_inputs, self.layout.acting, self.layout.before)
+    def memory(self) -> Memory:
+        """Return what is kept before the first step: no command acts or waits, and there was no other current."""
+        return Memory(self.layout.usual_inputs, self.layout.acting, self.layout.before)
 
     # ---- One axis alone ----
 
@@ -527,6 +529,7 @@ def read_vehicle(path: Path, content: bytes, *, coming: Path | None = None) -> V
         },
         command_range=validity.command_range,
         tested=validity.tested,
+        stated=validity.stated,
         alternatives=file.alternatives,
         limits=validity.limits,
         provenance=file.provenance,

@@ -59,6 +59,7 @@ def _tables(vehicle: Vehicle) -> dict[str, Any]:
             "command_max": high,
             "limits": vehicle.limits,
             "tested": vehicle.tested or None,
+            "stated": {name: one.model_dump(exclude_none=True) for name, one in vehicle.stated.items()} or None,
             "identified": _ranges(layout),
         },
         "body": {"coupling": True} if layout.coupled else {},

@@ -87,7 +87,7 @@ def test_numpy_and_casadi_agree_with_the_engine(name: str) -> None:
     check(_from_casadi(rov, inputs, states, casadi.MX), expected, scale)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_jax_agrees_with_the_engine() -> None:
     """The program runs in a process of its own: JAX starts threads, and other tests start processes by forks."""
     program = [sys.executable, "-m", "tests.bridges.jax_rates"]

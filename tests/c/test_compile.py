@@ -1,6 +1,8 @@
 """The platforms that binaries are compiled for (rov_fmu/c/compile.py)."""
 
+import ctypes
 import platform
+import shutil
 import stat
 import sys
 from collections.abc import Iterator
@@ -8,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.build import _only_here
 from rov_fmu.c import compile as module
 from rov_fmu.c.compile import PLATFORMS, engine_flags, host_platform
 
@@ -51,7 +54,7 @@ def test_only_in_fmi_2_the_library_for_the_mac_is_for_both_of_its_processors() -
 def compiled_by(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     """A script that replaces the compiler, with a cache folder that nobody can make."""
     script = tmp_path / "cc"
-    monkeypatch.setattr(module, "compiler", lambda: [str(script)])
+    monkeypatch.setattr(module, "compiler", lambda: [str(script), "cc"])
     monkeypatch.setenv("ZIG_GLOBAL_CACHE_DIR", "/proc/x/zig")
     yield script
     module._temporary_cache.cache_clear()
@@ -97,3 +100,67 @@ def test_the_messages_of_a_compiler_are_told_but_not_all(compiled_by: Path) -> N
         with pytest.warns(UserWarning, match="^/proc/x/zig: .* A temporary"), pytest.raises(module.BuildError) as error:
             compile_c({"engine.c": ""})
         assert str(error.value) == f"{what}: " + "\n".join(f"a.c:{n}: error" for n in range(1, lines + 1))
+
+
+# ---- Another compiler ------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def without_ziglang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder that is all of the PATH, on a machine without the package."""
+    found = module._package_folder
+    monkeypatch.setattr(module, "_package_folder", lambda name: None if name == "ziglang" else found(name))
+    monkeypatch.setenv("PATH", str(tmp_path))
+    return tmp_path
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="there, only zig is looked for")
+def test_a_compiler_on_the_path_serves_without_ziglang(without_ziglang: Path) -> None:
+    with pytest.raises(module.BuildError, match="missing: pip install ziglang, or put zig, clang or cc on the PATH"):
+        module.compiler()
+    assert module.compiler_identity() == ""
+    for name, words in (("cc", [""]), ("clang", [""]), ("zig", ["", " cc"])):
+        _write(without_ziglang / name, f"echo {name}")
+        command = module.compiler()
+        assert command == [str(without_ziglang / name), *(["cc"] if len(words) > 1 else [])], "the best one there is"
+        assert module.is_zig(command) == (name == "zig")
+        assert module.compiler_identity() == f"{name}\n", "another compiler has another place in the cache"
+
+
+_THREE = '__attribute__((visibility("default"))) int three(void);\nint three(void) { return 3; }\n'
+OTHERS = [name for name in ("clang", "gcc") if shutil.which(name)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere, these were not tried")
+@pytest.mark.parametrize("name", OTHERS)
+def test_another_compiler_compiles_for_this_machine_alone(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its library loads. What it cannot compile is one line that names it and the remedy."""
+    command = [str(shutil.which(name))]
+    monkeypatch.setattr(module, "compiler", lambda: command)
+    host = host_platform(fmi=3)
+    assert host
+    library = tmp_path / "library.so"
+    library.write_bytes(module.compile_engine({"engine.c": _THREE}, host))
+    assert ctypes.CDLL(str(library)).three() == 3
+    for platform_name in (other for other in PLATFORMS if other not in (host, "darwin64")):
+        with pytest.raises(module.BuildError) as error:
+            module.compile_all([platform_name], {"fmu.c": ""}, "rov")
+        target = PLATFORMS[platform_name].target
+        reason = f"{name} compiles only for this machine, and not for {target}: pip install ziglang"
+        assert str(error.value) == f"{platform_name}: the compiler failed for {target}: {reason}"
+    with pytest.raises(module.BuildError, match=f"{name} compiles only for this machine, and not for wasm32"):
+        module.compile_module({"module.c": ""})
+    if name == "gcc":
+        with pytest.raises(module.BuildError, match="gcc lacks the vectors of clang"):
+            module.compile_engine({"lanes.c": ""})
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere, these were not tried")
+def test_a_build_has_only_the_binary_that_the_compiler_can_make(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("rov_fmu.build.compiler", lambda: ["/usr/bin/cc"])
+    with pytest.warns(UserWarning, match="^cc compiles only for this machine, .*: pip install ziglang for others$"):
+        assert _only_here(2) == host_platform(fmi=2)
+    monkeypatch.setattr("rov_fmu.build.compiler", lambda: ["/usr/bin/zig", "cc"])
+    assert _only_here(2) is None

@@ -79,7 +79,8 @@ class Run:
         """`lengths` are those of the times between two changes of the inputs, s, unless they are drawn, too."""
         self.rov, self.layout = rov, rov.layout
         self.moving = [*self.layout.state, *self.layout.continued, *self.layout.memory]
-        self.record = [*self.moving, *self.layout.calculated]  # which follow the new inputs at once
+        calculated = self.layout.calculated.keys() - self.layout.over_ground.keys()  # a large heading has few digits
+        self.record = [*self.moving, *sorted(calculated)]  # which follow the new inputs at once
         lengths = lengths or [
             rng.choice((0.013, 0.04, 0.1, 0.27)) * rng.choice((1.0, rng.random())) for _ in range(CHANGES)
         ]

@@ -68,6 +68,16 @@ def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureReque
     np.testing.assert_array_equal(found.values[:, 0], fmu_states(folder, rov, times, inputs, start))
 
 
+@pytest.mark.parametrize("lanes", [False, True])
+def test_an_output_is_the_same_where_it_is_recorded_alone(lanes: bool) -> None:
+    """Outputs are calculated only for those who record them. Some have places behind the parameters."""
+    values, outputs = {"u_1": 0.5, "u_2": -0.3, "V_N": 0.2, "psi": 1.0}, [*HEAVY.layout.calculated]
+    whole = simulate(HEAVY, [0.0, 0.3], values, outputs, lanes=lanes).values[:, 0, 1]
+    alone = [simulate(HEAVY, [0.0, 0.3], values, [name], lanes=lanes).values[0, 0, 1] for name in outputs]
+    np.testing.assert_array_equal(alone, whole)
+    assert whole[[outputs.index("vg_N"), outputs.index("electric_current")]].all()
+
+
 def test_a_motion_that_cannot_be_computed_ends_with_nan_and_affects_no_other() -> None:
     times = np.array([0.0, 1.0, 2.0])
     found = simulate(VIDEORAY, times, {"x": 1e308, "V_N": [[0.0], [1e308], [0.0]], "r": 0.1}, ["u", "psi"], vehicles=3)

@@ -56,7 +56,7 @@ def _unsealed(ours: bytes) -> bytes:
 _WORK = (
     "rov_fmu.tank.folder.read_rows",
     "rov_fmu.interface.identify_command.identify",
-    "rov_fmu.interface.inspect_command.inspect_logs",
+    "rov_fmu.identify.inspection.inspected.inspect_logs",
     "rov_fmu.interface.fly_command.fly_page",
     "rov_fmu.interface.simulate_command.run",
     "rov_fmu.interface.tune_command.tune",

@@ -94,6 +94,12 @@ def test_a_command_imports_what_it_uses() -> None:
         assert set(imported) & set(_SLOW) <= allowed, arguments
 
 
+def test_a_vehicle_is_loaded_without_what_takes_long_to_import() -> None:
+    script = "import sys, rov_fmu; rov_fmu.load('videoray'); print(*sys.modules)"
+    ran = subprocess.run([sys.executable, "-c", script], cwd=ROOT, capture_output=True, text=True, check=True)
+    assert {*ran.stdout.split()} & {*_SLOW} == {"pydantic"}
+
+
 # ---- Completion ------------------------------------------------------------------------------------------------------
 
 
@@ -103,12 +109,14 @@ COMMANDS = [
     "fly",
     "identify",
     "inspect",
+    "list",
     "prove",
     "schema",
     "sdf",
     "simulate",
     "sitl",
     "study",
+    "system",
     "tables",
     "tune",
 ]

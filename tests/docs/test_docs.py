@@ -34,7 +34,7 @@ State = dict[str, float]
 WEEKLY = ".github/workflows/weekly.yml"
 README, CHANGELOG = ROOT / "README.md", ROOT / "CHANGELOG.md"
 PAGES = [
-    *(README, ROOT / "CONTRIBUTING.md", ROOT / "SECURITY.md", CHANGELOG),
+    *(README, CHANGELOG, *(ROOT / f"{name}.md" for name in ("CONTRIBUTING", "CODE_OF_CONDUCT", "SECURITY"))),
     *sorted((ROOT / "docs").glob("*.md")),
     *sorted((ROOT / "models").rglob("README.md")),
     *sorted((ROOT / "examples").rglob("README.md")),

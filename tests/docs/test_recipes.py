@@ -74,9 +74,9 @@ def _deep(layout: Layout, names: Names) -> Iterator[Force]:
     "equation/layout.py": [
         (
             _BEHIND,
-            "return self.thrust | self.angles | self.outside",
+            "return self.over_ground | self.electric",
             """ | {
-            "power": Declaration("W", "Electric power of all thrusters")
+            "pressure": Declaration("Pa", "Pressure behind all thrusters")
         }""",
         ),
     ],
@@ -85,12 +85,12 @@ def _deep(layout: Layout, names: Names) -> Iterator[Force]:
             _BEFORE,
             "\n    def _is_constant(",
             """\
-        self.forces["power"] = total(10.0 * abs(Name(f"F_{thruster.name}")) for thruster in layout.thrusters)
+        self.forces["pressure"] = total(10.0 * abs(Name(f"F_{thruster.name}")) for thruster in layout.thrusters)
 """,
         ),
     ],
     "equation/units.py": [
-        (_BEFORE, '    "N": Unit(', '    "W": Unit("Power", "power", {"kg": 1, "m": 2, "s": -3}),\n'),
+        (_BEFORE, '    "N": Unit(', '    "Pa": Unit("Pressure", "pressure", {"kg": 1, "m": -1, "s": -2}),\n'),
     ],
     "tank/readers/parsers.py": [
         (
@@ -156,7 +156,7 @@ found = {
     "thrust": base["alpha_w"] * base.commanded(inputs)["t"],
     "apart": max(abs(whole[name] - half[name]) for name in whole),
     "alone": [rov.response(HEAVE, 0.5)[0], rov.force(HEAVE, 0.5), rov["alpha_w"], rov["a_d_w"], rov["b_d_w"]],
-    "power": rov.calculated(inputs, state)["power"],
+    "pressure": rov.calculated(inputs, state)["pressure"],
     "F_t": rov.calculated(inputs, state)["F_t"],
     "description": content["modelDescription.xml"].decode(),
     "equation": content["sources/equation.h"].decode(),
@@ -241,11 +241,11 @@ def test_every_bridge_has_them_or_tells_that_it_lacks_them(found: dict[str, Any]
 
 
 def test_an_output_with_a_new_unit_is_in_every_list(found: dict[str, Any]) -> None:
-    assert found["power"] == 10.0 * abs(found["F_t"])
-    assert '<BaseUnit kg="1" m="2" s="-3"/>' in found["description"]
-    assert 'name="power"' in found["description"]
-    assert 'ref="power"' in found["osp"]
-    assert found["terminals"]["other_outputs"] == ["power"]
+    assert found["pressure"] == 10.0 * abs(found["F_t"])
+    assert '<BaseUnit kg="1" m="-1" s="-2"/>' in found["description"]
+    assert 'name="pressure"' in found["description"]
+    assert 'ref="pressure"' in found["osp"]
+    assert found["terminals"]["other_outputs"] == ["pressure"]
 
 
 def test_a_log_in_a_new_format_is_read_as_every_table_is(found: dict[str, Any]) -> None:

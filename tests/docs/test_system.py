@@ -1,5 +1,6 @@
 """examples/system: the ROV with autopilot, current and battery is held, and engines agree on it."""
 
+import re
 import zipfile
 from functools import cache
 from math import degrees
@@ -20,7 +21,14 @@ from examples.system.system import (
     parameter_sets,
     system_files,
 )
-from examples.systems import PARAMETER_SET
+from examples.tether import draw
+from rov_fmu.bridges.system import system
+from rov_fmu.bridges.system.plan import load_system_plan
+from rov_fmu.bridges.system.run import recorded
+from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
+from rov_fmu.cli import main
+from tests.bridges.system.fmus import undescribed_build
+from tests.commands import ROOT
 from tests.conftest import Made, without_page
 
 SETS = tuple(parameter_sets())
@@ -134,3 +142,69 @@ def test_the_command_runs_and_judges(
     monkeypatch.setattr(run, "DEPTH", 1e-9)
     assert run.main([str(tmp_path / "system")]) == 1
     assert "FAILED" in capsys.readouterr().out
+
+
+# ---- docs/system.md --------------------------------------------------------------------------------------------------
+
+PAGE = (ROOT / "docs" / "system.md").read_text(encoding="utf-8")
+
+
+def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every input that hangs on the world is connected."""
+    monkeypatch.setattr(system, "build", undescribed_build)
+    monkeypatch.setattr(system, "lack", lambda _: "")
+    path = tmp_path / "tether.toml"
+    (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    assert len(block.splitlines()) <= 22
+    path.write_text(block, encoding="utf-8")
+    plan = load_system_plan(path)
+    found = system.made(plan, path)
+    assert {start[0] for start, _, _ in found.connections} == {"rov", "tether", "water", "autopilot"}
+    assert [*system.unconnected(plan, found)] == [
+        "rov: nothing is connected to X_ext, Z_ext and N_ext, which keep their start values",
+        "tether: nothing is connected to y_top, z_top, v_N_top, v_E_top and v_D_top, which keep their start values",
+        "autopilot: nothing is connected to heave, yaw and sag, which keep their start values",
+    ]
+
+
+@pytest.mark.interop
+@pytest.mark.parametrize("engine", ["libcosim, SSP", "Ecos, SSP"])
+def test_engines_agree_on_the_tether_of_the_page(engine: str, tmp_path: Path) -> None:
+    """All states and forces; a tether is stiff, and shows steps that differ in their last bits."""
+    if reason := ENGINES[engine].missing():
+        pytest.skip(f"{engine}: {reason}")
+    pytest.importorskip("moordyn")
+    (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    (tmp_path / "tether.toml").write_text(block.replace("stop_time = 60", "stop_time = 20"), encoding="utf-8")
+    ssp = tmp_path / "tether.ssp"
+    with without_page():
+        assert main(["system", str(tmp_path / "tether.toml"), "-o", str(ssp), "--run"]) == 0
+    motion = np.genfromtxt(ssp.with_suffix(".csv"), delimiter=",", names=True, deletechars="")
+    structure = read_ssp(ssp)
+    # Those that follow an input at once are of the next step in Ecos.
+    names = [(c, name) for c, name in recorded(structure) if name not in structure.parts[c].direct]
+    if engine.startswith("Ecos"):
+        found = engines.by_ecos(ssp, names, 1000, 0.02)
+    else:
+        found = engines.by_libcosim(ssp, names, 1000)
+    for name, values in found.items():
+        np.testing.assert_allclose(values, motion[name][1:], rtol=0.0, atol=1e-9, err_msg=name)
+
+
+def test_the_picture_of_a_tether_shows_it(tmp_path: Path) -> None:
+    places = [f"tether.{axis}_{n}" for n in range(3) for axis in "yz"]
+    names = ["time", "rov.y", "rov.z", "tether.tension_top", "tether.tension_bottom", *places]
+    rows = [",".join(names), *(",".join(map(str, [n] * len(names))) for n in range(5))]
+    (tmp_path / "motion.csv").write_text("\n".join(rows), encoding="utf-8")
+    draw(tmp_path / "motion.csv", tmp_path / "tether.svg")
+    assert "Tension" in (tmp_path / "tether.svg").read_text(encoding="utf-8")
+
+
+def test_the_controller_of_the_page_holds_the_depth(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (block,) = re.findall(r"^```python\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    assert len(block.splitlines()) <= 20
+    monkeypatch.chdir(folder)
+    exec(compile(block, "system.md", "exec"), {})
+    assert capsys.readouterr().out == "2.000 m\n"

@@ -7,7 +7,7 @@
 
 #include "bits.h"
 
-enum { N_OUTPUTS = N_STATES + N_OTHER };
+enum { N_OUTPUTS = N_STATES + N_OTHER + N_ADDED };
 
 int main(int argc, char *argv[])
 {
@@ -20,7 +20,7 @@ int main(int argc, char *argv[])
         inputs[i] = FIRST_REFERENCE + i;
     }
     for (unsigned i = 0; i < N_OUTPUTS; i++) {
-        outputs[i] = FIRST_REFERENCE + (i < N_STATES ? FIRST_STATE + i : FIRST_OTHER + i - N_STATES);
+        outputs[i] = FIRST_REFERENCE + (i < N_STATES ? FIRST_STATE : i < N_STATES + N_OTHER ? FIRST_CALCULATED : FIRST_ADDED - N_STATES - N_OTHER) + i;
     }
     double t = 0.0, h, values[N_INPUTS > N_OUTPUTS ? N_INPUTS : N_OUTPUTS];
     while (read_double(&h)) {

@@ -214,7 +214,7 @@ def test_inputs_that_saturate_and_steps_that_cannot_be_taken_are_told(
         assert slave.step(t, h) == (True, [])
     assert slave.get("u", "r", "delayed_u_r", "F_bow") == after
     assert after[2] == 2500.0
-    slave.rov.line.waiting = [Change(0.05, dict.fromkeys(slave.rov.line.names, 1100.0))] * 1024
+    slave.rov.memory.waiting = [Change(0.05, dict.fromkeys(slave.rov.memory.names, 1100.0))] * 1024
     many = "more than 1024 changes of commands wait for the dead time; change them less often."
     assert slave.step(slave.rov.time, 0.1) == (False, [many])
     slave.rov._set_fmu_state(slave.rov._get_fmu_state() | {"waiting": []})

@@ -178,7 +178,7 @@ def _study(folder: Path) -> str:
     from rov_fmu.study import Results
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.summary import print_summary
-    from rov_fmu.study.run.cluster import Spent
+    from rov_fmu.study.run.work import Spent
 
     with TemporaryDirectory() as temporary, _without_plots("study.results.plots"):
         results = Results(shutil.copytree(folder, Path(temporary, folder.name)))

@@ -17,7 +17,7 @@ else:
     import tomli as tomllib
 
 DRAFT = """# A draft.
-base = "?"
+base = "bluerov2"
 
 [vehicle]
 name = "x"
@@ -110,10 +110,48 @@ def test_a_file_of_any_form_is_completed_and_not_damaged(own: str, has_vehicle: 
     assert lacking(text, DRAFT, has_vehicle=has_vehicle) == "", "a second time, nothing is lacking"
 
 
-@pytest.mark.parametrize(
-    "own", ["axes = 3", 'columns = "x"\nvehicle = []', "dives.a = 3", "dives = []", "[dives.a]\nfiles = 3"]
+TOLD = (
+    DRAFT.replace('base = "bluerov2"\n', "")
+    .replace('m_rov = { value = "?"', "m_rov = { value = 9.0")
+    .replace('{ value = ["?", "?", "?"] }   # of its thrust', "{ value = [1, 0, 0] }   # of its thrust; a guess")
 )
-def test_a_key_of_a_wrong_type_stays_as_it_is(own: str) -> None:
-    text = completed(own, lacking(own, DRAFT, has_vehicle=False))
+"""The draft with what later logs tell."""
+
+
+@given(own_files())
+def test_what_is_told_takes_the_place_of_a_question_mark_alone(own: str) -> None:
+    """A base that is not decided goes, where the logs tell the thrusters; every comment stays."""
+    own = own.replace('"bluerov2"', '"?"')
+    before = tomllib.loads(own)
+    text = completed(own, lacking(own, TOLD, has_vehicle=False))
+    after = tomllib.loads(text)
+    assert text.count("# mine") == own.count("# mine")
+    if before.get("thruster"):
+        assert after["thruster"][0]["direction"] == {"value": [1, 0, 0]}
+    if "m_rov" in before.get("body", {}):
+        assert after["body"]["m_rov"] == {"value": 9.0, "unit": "kg"}
+    assert lacking(text, TOLD, has_vehicle=False) == "", "a second time, nothing is lacking"
+    mine = own.replace('"?"', "7.5")
+    numbers = tomllib.loads(mine)
+    kept = tomllib.loads(completed(mine, lacking(mine, TOLD, has_vehicle=True)))
+    assert all(kept[name] == value or kept[name].items() >= value.items() for name, value in numbers.items())
+
+
+@pytest.mark.parametrize("draft", [DRAFT, TOLD])
+@pytest.mark.parametrize(
+    "own",
+    [
+        *("axes = 3", 'columns = "x"\nvehicle = []', "dives.a = 3", "dives = []", "[dives.a]\nfiles = 3"),
+        *('thruster = "?"', 'body = "?"', '[curves.all]\nthrust = "?"\nT = 3.0', 'thruster = [3, "A"]'),
+    ],
+)
+def test_a_key_of_a_wrong_type_stays_as_it_is(own: str, draft: str) -> None:
+    text = completed(own, lacking(own, draft, has_vehicle=False))
     assert tomllib.loads(own).items() <= tomllib.loads(text).items() or "dives" in own
-    assert lacking(text, DRAFT, has_vehicle=False) == ""
+    assert lacking(text, draft, has_vehicle=False) == ""
+
+
+def test_thrusters_without_a_name_of_their_own_stay() -> None:
+    own = '[[thruster]]\nname = [1]\ndirection = "?"\n'
+    after = tomllib.loads(completed(own, lacking(own, TOLD, has_vehicle=False)))
+    assert [one["name"] for one in after["thruster"]] == [[1], "A", "B"]

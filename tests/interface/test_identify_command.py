@@ -11,6 +11,7 @@ import pytest
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.related import origin
+from rov_fmu.identify.progress import Work
 from rov_fmu.interface.identify_command import identify_tests
 from rov_fmu.io.messages import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -31,7 +32,16 @@ def test_the_progress_names_what_is_done_and_never_goes_back(
 
     report = tmp_path / "report.html" if with_report else None
     folder = small_folder(tmp_path / "tests")
-    identification, _ = identify_tests([folder], tmp_path / "rov.toml", report, force=False, begin=begin)
+    answers: list[tuple[str, str]] = []
+    identification, _ = identify_tests(
+        [folder], tmp_path / "rov.toml", report, force=False, begin=begin, on_answer=lambda *told: answers.append(told)
+    )
+    for axis in identification.axes:
+        told = [answer for name, answer in answers if name == axis.axis.name]
+        match = re.fullmatch(rf"{axis.axis.name} ([\d.]+) \S+ at (\d+)%(, fits the .*)?", told[-1])
+        assert match, "each axis has an answer before the end"
+        speed = abs(identification.vehicle.response(axis.axis, float(match[2]) / 100.0)[0])
+        assert float(match[1]) == pytest.approx(speed, rel=0.1)
     _check_is_the_same(identification.vehicle, tmp_path / "rov.toml")
     assert [*begun] == ["reading the tests", "identifying the vehicle", *["drawing the report"] * with_report]
     for calls in begun.values():
@@ -109,3 +119,17 @@ def _check_is_the_same(vehicle: Vehicle, path: Path) -> None:
     )
     assert name.endswith(".toml")
     assert content == path.read_bytes()
+
+
+def test_a_stage_that_is_left_out_is_no_part_of_the_work() -> None:
+    """The stages that are left are then a larger share of it, and so are those that are done."""
+    shares: dict[str, list[float]] = {}
+    for stages in (["start 1", "quadratic thrust"], ["start 1", "hypotheses", "quadratic thrust"]):
+        work = Work(lambda stage, share: shares.setdefault(stage, []).append(share))
+        for stage in stages:
+            show = work.steps(stage)
+            for count in range(3):
+                show(count)
+    without, with_ = shares["quadratic thrust"][0], shares["quadratic thrust"][3]
+    assert 0.0 < shares["start 1"][0] + 1e-9 < without < with_ < 1.0
+    assert all(before <= after for before, after in pairwise(shares["quadratic thrust"][:3]))

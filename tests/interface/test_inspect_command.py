@@ -127,8 +127,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace('direction = { value = ["?", "?", "?"]', "direction = { value = [0, 0, 1]")
     text = text.replace('["?", "?", "?"]', "[0, 0, 0]").replace('"?"', "9.0")
     text = text.replace("[axes.yaw]", "")  # its column may stay
-    thrust = "".join(f'{key}_all = {{ value = 10.0, unit = "N", source = "Guessed" }}\n' for key in ("a_t", "b_t"))
-    (tmp_path / "rov.toml").write_text(f"{text}\n[known]\n{thrust}", encoding="utf-8")
+    (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
     assert [*load_tests(tmp_path).vehicle.layout.by_name] == ["heave"]
 
 

@@ -8,13 +8,11 @@ import pytest
 import rov_fmu
 from rov_fmu.bridges.sdf import gazebo_model
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.identify import identify
 from rov_fmu.identify.tuning import Target, tune
 from rov_fmu.io.output import sealed
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import load_vehicle
-from rov_fmu.vehicle.writer import write_tuned, write_vehicle
+from rov_fmu.vehicle.writer import write_tuned
 from tests.commands import BARE, FEW_TESTS, WRITING
 from tests.conftest import without_page
 
@@ -43,7 +41,7 @@ FUNCTIONS: dict[tuple[str, str], Callable[[Path], object]] = {
     ("export", "output"): lambda path: path.write_text(
         sealed(gazebo_model(rov_fmu.load(BARE)).text, "export"), encoding="utf-8"
     ),
-    ("identify", "output"): lambda path: write_vehicle(identify(load_tests(FEW_TESTS)).vehicle, path),
+    ("identify", "output"): lambda path: rov_fmu.identify_folder(FEW_TESTS, output=path),
     ("tune", "output"): _tuned,
 }
 

@@ -23,6 +23,19 @@ _LONG_WORDS = """() => {
   return changed;
 }"""
 """Replaces all text of a page by a long word, except the texts that are our own."""
+_SMALL = """() => {
+  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const small = [];
+  while (texts.nextNode()) {
+    const { parentElement: own, textContent: words } = texts.currentNode;
+    if (!words.trim() || !own.checkVisibility() || own.closest("script, style, noscript, tspan")) continue;
+    const svg = own.closest("svg");
+    const scale = svg ? svg.getBoundingClientRect().width / svg.viewBox.baseVal.width : 1;
+    if (scale * parseFloat(getComputedStyle(own).fontSize) < 10) small.push(words.trim());
+  }
+  return small;
+}"""
+"""Returns the texts of less than 10 px, except for subscripts in plots."""
 UNFOLD = "document.querySelectorAll('details').forEach((fold) => { fold.open = true; })"
 """The script that opens everything that is folded on a page."""
 
@@ -38,7 +51,8 @@ def check_breaks_long_words(page: str, path: Path, visit: Callable[..., Visit]) 
 
 
 def check_fits_and_is_accessible(seen: Visit, path: Path, wait_for: str = "body") -> None:
-    """Check a page folded and unfolded: nothing overlaps or is cut, axe finds nothing in it, and it asks for nothing.
+    """Check a page folded and unfolded: nothing overlaps, is cut or too small to read, axe finds nothing in it, and it
+    asks for nothing.
 
     It has the colours of the visit's scheme, and nothing moves by itself for people who do not want that.
     """
@@ -50,6 +64,7 @@ def check_fits_and_is_accessible(seen: Visit, path: Path, wait_for: str = "body"
         seen.page.evaluate(action)
         assert seen.page.evaluate("document.documentElement.scrollWidth <= innerWidth")
         assert problems(seen.page) == [], "nothing overlaps or is cut"
+        assert seen.page.evaluate(_SMALL) == []
     assert axe.run(seen.page).response["violations"] == []
     assert seen.page.evaluate("document.getAnimations().length") == 0
     lightness = seen.page.evaluate("getComputedStyle(document.body).backgroundColor").removeprefix("rgb(").split(",")[0]

@@ -121,17 +121,22 @@ def test_what_is_folded_opens_by_a_click_or_a_link_and_on_paper(report: Path, vi
     assert box["height"] > 50
 
 
-def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, visit: Callable[..., Visit]) -> None:
-    seen = visit(width=1440)
-    seen.page.goto(report.as_uri())
+def values_at(seen: Visit, at: float) -> str:
+    """Return the values that the large picture of a page shows while the pointer is at a time."""
     plot = seen.page.locator(".broad svg")
     panel = json.loads(plot.locator('[data-plot*="box"]').first.get_attribute("data-plot") or "")
     (left, top, right, _), (low, high) = panel["box"], panel["x"]
     scale = plot.evaluate("svg => svg.clientWidth / svg.viewBox.baseVal.width")
-    at = 20.0
     x = left + (at - low) / (high - low) * (right - left)
     plot.hover(position={"x": scale * x, "y": scale * (top + 10.0)})
-    shown = " ".join(seen.page.locator(".broad .values span").all_inner_texts()).replace("−", "-")
+    return " ".join(seen.page.locator(".broad .values span").all_inner_texts()).replace("−", "-")
+
+
+def test_a_plot_of_the_report_shows_the_values_under_the_pointer(report: Path, visit: Callable[..., Visit]) -> None:
+    seen = visit(width=1440)
+    seen.page.goto(report.as_uri())
+    at = 20.0
+    shown = values_at(seen, at)
     expected = example().axes[0].predictions[0]
     values = [np.interp(at, expected.time, values) for values in (expected.measured, expected.predicted)]
     pattern = r"time \(s\): (\S+) Distance, 10 s ahead \(m\): measured ([-\d.]+); predicted, with 95 % band ([-\d.]+)"
@@ -149,3 +154,24 @@ def test_the_answers_are_on_the_first_page_of_paper(report: Path, visit: Callabl
     seen.page.goto(report.as_uri())
     bottom = seen.page.evaluate("document.querySelector('.overview').getBoundingClientRect().bottom")
     assert 300.0 < bottom < 1031.0
+
+
+# ---- The page of logs ------------------------------------------------------------------------------------------------
+
+
+def test_the_page_of_logs_is_as_wide_as_the_window_and_shows_values(
+    inspection: Path, visit: Callable[..., Visit]
+) -> None:
+    seen = visit(width=1800)
+    seen.page.goto(inspection.as_uri())
+    picture, table = (seen.page.locator(f".log {part}").first.bounding_box() for part in (".picture", "table"))
+    assert picture is not None
+    assert table is not None
+    assert picture["x"] < 30.0
+    assert table["x"] + table["width"] > 1770.0
+    assert abs(table["y"] - picture["y"]) < 60.0, "beside the picture"
+    shown = values_at(seen, DIVE.start + 5.0)
+    (depth,) = re.findall(r"Depth \(m\): measured ([\d.]+)", shown)
+    assert float(depth) == pytest.approx(np.interp(5.0, DIVE.time, DIVE.position[:, 2]), abs=0.02)
+    assert re.search(r"Commands \(%\): .*u_5 50", shown)
+    assert (seen.problems(), seen.requests) == ([], [inspection.as_uri()])

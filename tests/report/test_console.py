@@ -8,7 +8,8 @@ from pathlib import Path
 from time import sleep
 
 import pytest
-from rich.progress import Progress, TextColumn
+from rich.console import Console
+from rich.progress import TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
@@ -17,7 +18,7 @@ from rov_fmu.prove.claims import CLAIMS, Proof
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_claims, print_end, print_table, table
-from rov_fmu.report.progress import Parts, StudyParts, compiling, parts
+from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -34,7 +35,7 @@ def test_tables_paragraphs_and_parts_escape_control_characters(is_terminal: bool
     print_table(found, out)
     paragraph(out, FOREIGN)
     out.print(FOREIGN)
-    display = Progress(TextColumn("{task.description}", markup=False), console=out)
+    display = Display(TextColumn("{task.description}", markup=False), console=out)
     shown = Parts(display)
     shown.begin(FOREIGN)(FOREIGN, 0.5)
     shown.print(FOREIGN)
@@ -154,7 +155,7 @@ class Runs:
 
 
 def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.CaptureFixture[str]) -> None:
-    display = Progress()
+    display = Display()
     shown = Parts(display)
     assert shown.is_shown
     shown.begin("first")("its step", 0.25)
@@ -162,15 +163,36 @@ def test_a_terminal_shows_the_share_or_the_count_of_each_part(capsys: pytest.Cap
     assert (first.description, first.completed, first.fields["count"]) == ("its step", 0.25, "25%")
     study = StudyParts(shown)
     study.update(Runs(2_000))
-    assert [task.description for task in display.tasks] == ["first", "starting the workers", "runs"]
+    assert [task.description for task in display.tasks] == ["first", "starting the study", "runs"]
     assert [task.completed for task in display.tasks] == [1.0, 1.0, 0.0]
     study.update(Runs(7_000))
     assert (display.tasks[2].completed, display.tasks[2].fields["count"]) == (0.5, "7,000/12,000 runs")
-    study.update(Runs(7_000, has_workers=False))
-    assert display.tasks[2].description == "no worker is there", "the rate is of before"
     study.update(Runs(12_000))
     assert display.tasks[2].completed == 0.999, "it is not done before it ends"
     assert capsys.readouterr().out == "rov-fmu: what the workers do: http://localhost\n"
+
+
+def test_a_study_tells_no_rate_that_is_not_measured_now(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is shown at each time (s), by what is done then: the rate of the last ten seconds, or that nothing is."""
+    now = [0.0]
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: now[0])
+    display = Display()
+    shown = Parts(display)
+    study = StudyParts(shown)
+    for now[0], runs, words in (
+        (0.0, Runs(2_000), "runs"),
+        (4.0, Runs(2_000, has_workers=False), "no worker is there, 4 s without a result"),
+        (5.0, Runs(2_100), "20 runs/s"),
+        (11.0, Runs(3_300), "118 runs/s"),
+        (17.0, Runs(3_900), "150 runs/s"),
+        (19.0, Runs(3_900), "129 runs/s"),
+        (19.5, Runs(3_900, has_workers=False), "no worker is there, 2 s without a result"),
+        (627.0, Runs(3_900, failed=7), "610 s without a result, 7 failed"),
+        (637.0, Runs(4_500), "60 runs/s"),
+    ):
+        study.update(runs)
+        assert display.tasks[1].description == words
+    assert shown._running["runs"].left is not None
 
 
 def test_a_pipe_gets_a_line_again_and_again(
@@ -190,8 +212,8 @@ def test_a_pipe_gets_a_line_again_and_again(
         sleep(0.12)
     sleep(0.12)
     text = capsys.readouterr().err
-    assert "rov-fmu: starting the workers (0 s so far)" in text
-    assert "rov-fmu: starting the workers: done in 2.0 s" in text
+    assert "rov-fmu: starting the study (0 s so far)" in text
+    assert "rov-fmu: starting the study: done in 2.0 s" in text
     line = "rov-fmu: 600 runs/s, 2 failed, 7,200/12,000 runs (2 s so far, about 8 s left)\n"
     assert 1 <= text.count(line) <= 3, "none after the end"
     assert "what the workers do" not in text
@@ -199,10 +221,42 @@ def test_a_pipe_gets_a_line_again_and_again(
     assert not capsys.readouterr().err
 
 
+def test_what_is_left_becomes_smaller_until_the_next_step_is_done(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A quarter is done after 10 s, so 30 s are left. A step that takes longer leaves something to the end."""
+    now, left = [0.0], []
+    monkeypatch.setattr("rov_fmu.report.progress.perf_counter", lambda: now[0])
+    shown = Parts(None)
+    show = shown.begin("work")
+    for time, share in ((10.0, 0.25), (10.0, 0.25), (25.0, 0.25), (80.0, 0.25), (90.0, 0.9)):
+        now[0] = time
+        show("a step", share)
+        shown.print_running()
+        left += re.findall(r"about (\d+) s left", capsys.readouterr().err)
+    seconds = [*map(int, left)]
+    assert seconds[:2] == [30, 30]
+    assert 30 > seconds[2] > seconds[3] > 0
+    assert seconds[4] == 10
+
+
+def test_an_answer_takes_the_place_of_the_one_before(capsys: pytest.CaptureFixture[str]) -> None:
+    """In a pipe, each has a line."""
+    answers = ["heave 0.5 m/s at 50%, fits the depth to 9 cm", "heave 0.46 m/s at 50%, fits the depth to 2 cm"]
+    out = io.StringIO()
+    display = Display(console=Console(file=out, width=100))
+    for shown in (Parts(display), Parts(None)):
+        for answer in answers:
+            shown.tell("heave", answer)
+    assert capsys.readouterr().err == "".join(f"rov-fmu: so far: {answer}\n" for answer in answers)
+    display.print(*display.get_renderables())
+    assert re.findall("so far: .*", out.getvalue()) == [f"so far: {answers[-1]}"]
+
+
 def test_a_pipe_gets_a_line_for_each_of_several_platforms(capsys: pytest.CaptureFixture[str]) -> None:
     for platforms in (["linux"], ["linux", "windows"]):
-        with compiling(platforms) as (begin, done):
-            begin()
+        with compiling() as (begin, done):
+            begin(platforms)
             for name in platforms:
                 done(name)
         found = capsys.readouterr().err

@@ -19,7 +19,6 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.report.published import load_tables
 from rov_fmu.tank.columns import Names, columns_of_log
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import unwrapped
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -405,8 +404,9 @@ def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
     assert {axes[signal["axis"]] for signal in recording["signals"]} == {axis for axis, _ in used if axis in axes}
     for signal in recording["signals"]:
         channel = used[axes[signal["axis"]], signal["isPosition"]]
-        there = channel.there & (log.commands is None or channel.time >= log.commands.rows[0])
-        assert np.sin(signal["values"]) == pytest.approx(np.sin(unwrapped(channel).values[there]), abs=1e-6), log.file
+        times, values = channel.unwrapped
+        there = values[log.commands is None or times >= log.commands.rows[0]]
+        assert np.sin(signal["values"]) == pytest.approx(np.sin(there), abs=1e-6), log.file
 
 
 @pytest.mark.parametrize("name", WRITTEN)
@@ -441,12 +441,12 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
     for name, column in known.items():
         beside = f"{command} [%]" if not column.commands else "depth [m]"
         units = [
-            *column.column.units,
-            *(f"{unit} 2000" for unit in column.column.conversions if unit not in PULSES),
+            *column.units,
+            *(f"{unit} 2000" for unit in column.conversions if unit not in PULSES),
             "us",
             "us 0 2000",
         ]
-        for title in (name, *column.column.also):
+        for title in (name, *column.also):
             for unit in units:
                 header = f"time [s],{beside},{title.upper()} [{unit}]" + ("" if column.commands else ",voltage [V]")
                 rows = [f"{n},{n},{1000 + n}{'' if column.commands else ',12'}" for n in range(30)]

@@ -3,6 +3,8 @@
 import builtins
 import errno
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
@@ -55,9 +57,9 @@ def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, schedul
     return study(_plan(folder, videoray_fmu), folder / "results", scheduler=scheduler)
 
 
-def _close(results: Results, other: Results) -> None:
-    pd.testing.assert_frame_equal(results.runs, other.runs, rtol=1e-11, atol=1e-13)
-    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), rtol=1e-11, atol=1e-13)
+def _close(results: Results, other: Results, rtol: float = 1e-11) -> None:
+    pd.testing.assert_frame_equal(results.runs, other.runs, rtol=rtol, atol=1e-13)
+    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), rtol=rtol, atol=1e-13)
 
 
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
@@ -90,17 +92,24 @@ def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were
     assert not [*Path(worker.local_directory).rglob("modelDescription.xml")]
 
 
-def test_a_study_of_a_vehicle_keeps_the_fmu_that_is_built_for_it(
+def test_a_vehicle_in_lanes_and_its_fmu_give_the_same_rows_and_the_lanes_load_neither_dask_nor_fmpy(
     tmp_path: Path, videoray_fmu: Path, native: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def built(vehicle: Vehicle, path: Path, platforms: list[str]) -> SimpleNamespace:
         assert (vehicle.identifier, path.name, platforms) == ("videoray", "videoray.fmu", ["host"])
         return SimpleNamespace(path=videoray_fmu)
 
-    monkeypatch.setattr("rov_fmu.study.run.run_study.build", built)
-    results = study(_plan(tmp_path, None), tmp_path / "results", scheduler=scheduler)
-    _close(results, native)
-    assert (results.folder / "videoray.fmu").read_bytes() == videoray_fmu.read_bytes()
+    plan = _plan(tmp_path, None)
+    given = ["study", str(plan), "-o", str(tmp_path / "lanes"), "--part", "1/1"]
+    program = f"import sys; from rov_fmu.cli import main; assert main({given}) == 0; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
+    assert "numpy" in loaded
+    assert not {"distributed", "dask", "fmpy", "matplotlib", "rov_fmu.build"} & {*loaded}
+    lanes = study(plan, tmp_path / "lanes", merge=True)
+    _close(lanes, native, 1e-12)
+    assert (tmp_path / "lanes" / "study.json").exists()
+    monkeypatch.setattr("rov_fmu.build.build", built)
+    _close(study(plan, tmp_path / "results", scheduler=scheduler), native)
 
 
 @pytest.mark.long

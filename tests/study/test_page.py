@@ -1,5 +1,6 @@
 """The page about a study shows what is in its data frames."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -53,6 +54,21 @@ def test_a_grid_of_one_or_two_variables_has_lines(monkeypatch: pytest.MonkeyPatc
         study_page(results)
         assert shown[0] == label
         shown.clear()
+
+
+def test_the_page_leads_with_the_figures_and_their_units() -> None:
+    results = Results(SOBOL)
+    results.units["y"] = "m/s"
+    page = html.fromstring(study_page(results))
+    leads = {
+        p.findtext("code"): p.text_content().replace("\N{MINUS SIGN}", "-") for p in page.xpath("//p[@class='lead']")
+    }
+    assert {*leads} == {"end", "twice"}, "what varies and has a value"
+    for name, lead in leads.items():
+        (told,) = re.findall(rf"^{name}: (\S+) m/s, and (\S+) to (\S+) m/s in 90 % of the runs$", lead)
+        expected = results.runs[name].quantile([0.5, 0.05, 0.95])
+        assert [*map(float, told)] == pytest.approx(expected.tolist(), abs=0.06)
+        assert page.xpath(f"string(//tr[td/code='{name}']/td[2])").strip() == "m/s"
 
 
 def test_a_study_of_which_all_runs_failed_has_a_page_and_nothing_to_plot(

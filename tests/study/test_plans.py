@@ -38,13 +38,17 @@ WHOLE = {
     HEAD.replace("0.1", "5e-8") + VARY + TAIL: "step = 5e-08: must divide a run into at most 10000000 steps",
     HEAD.replace("0.1", "0.0") + VARY + TAIL: "step = 0.0: must be greater than 0",
     HEAD.replace("4", "0") + VARY + TAIL: "runs = 0: must be greater than or equal to 1",
+    HEAD.replace("runs = 4", 'runs = 60000000\nsampler = "latin-hypercube"')
+    + VARY
+    + TAIL: "runs = 60000000: a Latin hypercube is drawn as a whole, at most 50000000 runs with 1 variables",
+    HEAD.replace("4", "1000000000") + VARY + TAIL: "runs = 1000000000: must be less than or equal to 100000000",
     HEAD.replace("runs = 4", "") + VARY + TAIL: "runs: this key is missing",
     HEAD + "[vary]\nu_l.values = [0.0]\n[inputs]\nu_l = 0.5\n" + TAIL: "vary.u_l: is given in [set] or [inputs] too",
 }
 """Plans and the beginnings of the messages about them."""
 HEADS = {
     'sampler = "soboll"': "sampler = 'soboll': must be 'grid', 'sobol', 'latin-hypercube', 'random' or 'saltelli'",
-    'vehicle = "videoray"': "must have either fmu or vehicle",
+    'vehicle = "videoray"': "must have one of fmu, vehicle and system",
     'vary_from = "mine.toml"': "vary_from = 'mine.toml': there is no such file beside the plan",
     'vary_from = "videoray"': "vary_from = 'videoray': no coefficient of this vehicle has an interval",
     "time_limit = 0": "time_limit = 0: must be greater than 0",

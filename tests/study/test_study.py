@@ -4,14 +4,12 @@ import os
 import signal
 import subprocess
 import time
-from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Event
-from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -30,8 +28,8 @@ from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.child import Child
-from rov_fmu.study.run.cluster import Spent, _Runs
 from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.work import Spent, Work
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -202,9 +200,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         (results / draft).write_bytes(b"of a process that was killed")
     _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
-    assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent(
-        0, 0, 0, 0.0, 0.0
-    )
+    assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent()
     assert not [*results.glob("*/*part-000000090*")]
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
@@ -223,17 +219,21 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
 
 def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_path: Path) -> None:
     store = Store(tmp_path / "results")
+    study = {"plan": {}, "fmu": "1", "vehicle": "rov", "engine": "lanes", "runs": 9}
     with store.held():
-        store.belongs_to({}, "1", "rov", 9)
+        store.describe(study)
         store.write(2, 4, b"", None)
-        assert (store.missing(9), store.missing(4)) == ([(0, 2), (4, 9)], [(0, 2)])
-        with pytest.raises(
-            FileError, match="another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"
+        assert (store.missing(0, 9), store.missing(0, 4)) == ([(0, 2), (4, 9)], [(0, 2)])
+        assert (store.missing(1, 3), store.missing(2, 4), store.missing(3, 6)) == ([(1, 2)], [], [(4, 6)])
+        for change, reason in (
+            ({"fmu": "2"}, "another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"),
+            ({"engine": "fmu"}, "results: holds runs of --engine lanes: choose another folder"),
         ):
-            store.belongs_to({}, "2", "rov", 9)
+            with pytest.raises(FileError, match=reason):
+                store.describe({**study, **change})
         (store.folder / "study.json").unlink()
         with pytest.raises(FileError, match=r"has runs, but study\.json, which describes them, is missing"):
-            store.belongs_to({}, "1", "rov", 9)
+            store.describe(study)
     for text in ("{", "[1]", '{"format": 0}', '{"format": 2}'):
         (store.folder / "study.json").write_text(text)
         with pytest.raises(FileError, match="or was written by another version of this tool"):
@@ -334,22 +334,40 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
     _same(Results(results), slow)
 
 
-def test_a_scheduler_that_is_not_there_or_has_no_workers_is_a_line(
+def test_a_scheduler_that_is_not_there_is_a_line(
     foreign: Foreign, tmp_path: Path, cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 1.0)
     scheduler: Any = cluster.scheduler
     (worker,) = scheduler.workers
-    with LocalCluster(n_workers=0, processes=False, dashboard_address="127.0.0.1:0") as without:
-        for address, reason in {
-            "tcp://127.0.0.1:9": "no scheduler of Dask answers there",
-            worker: "no scheduler of Dask answers there",
-            without.scheduler_address: "it has no workers",
-        }.items():
-            with pytest.raises(FileError) as refused:
-                study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
-            assert str(refused.value) == f"--scheduler {address}: {reason}"
+    for address in ("tcp://127.0.0.1:9", worker):
+        with pytest.raises(FileError) as refused:
+            study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
+        assert str(refused.value) == f"--scheduler {address}: no scheduler of Dask answers there"
     assert not (tmp_path / "results").exists()
+
+
+def test_a_scheduler_without_workers_is_told_and_its_workers_are_waited_for(
+    foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("rov_fmu.study.run.work._WATCH", 0.05)
+    monkeypatch.setattr("rov_fmu.study.run.cluster._WAIT", 0.1)
+    told = list[Progress]()
+    with LocalCluster(n_workers=0, processes=False, threads_per_worker=1, dashboard_address="127.0.0.1:0") as late:
+
+        def start_one(now: Progress) -> None:
+            if not now.has_workers and not any(before.has_workers is False for before in told):
+                late.scale(1)
+            told.append(now)
+
+        results = study(
+            _plan(tmp_path, foreign(), runs=4),
+            tmp_path / "results",
+            scheduler=late.scheduler_address,
+            on_progress=start_one,
+        )
+    assert [now.done for now in told if not now.has_workers][:1] == [0]
+    assert [*results.runs.index] == [0, 1, 2, 3]
 
 
 def _fail(error: Exception) -> Callable[..., None]:
@@ -419,15 +437,22 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
     _same(study(plan, results, scheduler=scheduler), slow)
 
 
-def test_a_study_tells_that_no_worker_is_there(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_study_tells_again_and_again_whether_workers_are_there(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Its last rate would stand there otherwise, although nothing is done."""
-    monkeypatch.setattr("rov_fmu.study.run.cluster._WATCH", 0.001)
-    ended, told = Event(), list[Progress]()
-    threads = iter([{"a": 1}, {}, {}])
-    client = SimpleNamespace(nthreads=lambda: next(threads), dashboard_link=None)
-    nothing = cast("Any", None)
-    design = cast("Any", SimpleNamespace(runs=9))
-    runs = _Runs(cast("Any", client), nothing, design, nothing, deque(), Spent(runs=4), told.append)
-    runs.done_before = 0
-    runs._watch(ended)  # until the client has no answer
-    assert told == [Progress(4, 9, 0, "", has_workers=False)] * 2
+    monkeypatch.setattr("rov_fmu.study.run.work._WATCH", 0.001)
+    told, all_told = list[Progress](), Event()
+
+    def tell(now: Progress) -> None:
+        told.append(now)
+        if len(told) == 4:
+            all_told.set()
+
+    counts, nothing = iter([1, 0, 0]), cast("Any", None)
+    store = Store(tmp_path / "results")
+    with store.held():
+        work = Work(nothing, nothing, store, 0, 9, tell, spent=Spent(runs=4))
+        with work.watched(lambda: next(counts)):  # until the client has no answer
+            assert all_told.wait(10.0)
+    assert told == [Progress(4, 9, 0, has_workers=there) for there in (True, True, False, False)]

@@ -14,7 +14,7 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import Names
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.quality import checked, unwrapped
+from rov_fmu.tank.quality import checked
 from rov_fmu.tank.read_log import read_logs
 
 
@@ -42,8 +42,7 @@ def used(log: Log, quantity: str) -> Channel:
 
 def measured(log: Log, quantity: str) -> Array:
     """Return the values that were measured of a quantity; angles are unwrapped."""
-    channel = used(log, quantity)
-    return unwrapped(channel).samples[1]
+    return used(log, quantity).unwrapped[1]
 
 
 def commanded(log: Log, thruster: str, time: Array | None = None) -> Array:

@@ -10,11 +10,11 @@ import pytest
 from rov_fmu.equation.catalogue import AXES, HEAVE, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import VehicleAxis
-from rov_fmu.io.columns import read_columns
+from rov_fmu.io.columns import Column, read_columns
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
-from rov_fmu.tank.columns import TIME, Names, columns_of, columns_of_log, known_columns
+from rov_fmu.tank.columns import TIME, Names, columns_of, columns_of_log
 from rov_fmu.tank.inspection.headers import guessed
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.read_log import read_logs
@@ -46,10 +46,10 @@ def test_all_units_of_a_column(name: str, tmp_path: Path) -> None:
 
 
 # The columns of each kind of file, a header, and for each limit a number within and one beyond.
-BY_FILE = {
+BY_FILE: Mapping[str, Mapping[str, Column]] = {
     **{kind: columns_of(kind) for kind in ("thrust", "steady", "time_constant")},
-    "log": known_columns(columns_of_log(VIDEORAY.layout, HEAVE)),
-    "wrench": known_columns(columns_of_log(Layout.of_wrench(map(VehicleAxis, AXES.values())), None)),
+    "log": columns_of_log(VIDEORAY.layout, HEAVE),
+    "wrench": columns_of_log(Layout.of_wrench(map(VehicleAxis, AXES.values())), None),
 }
 LIMITS: Sequence[tuple[str, str, Mapping[float, float]]] = [
     ("thrust", "command [%]", {-100: -100.01, 100: 100.01, 0.01: 0.0099}),

@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SWAY
-from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
 from rov_fmu.tank.description import ROV_FILE
@@ -19,6 +20,7 @@ from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
 from tests.commands import TESTS
 from tests.folders import (
     BLUEROV2,
+    DOWN,
     FORCE,
     HEAD,
     SPEED,
@@ -29,9 +31,48 @@ from tests.folders import (
     responses,
 )
 from tests.recordings import run, write_log
+from tests.tank.logs import commanded
+from tests.tank.readers import writers
+from tests.tank.readers.motion import DIVE, THRUSTERS, TIME
 from tests.tank.test_description_mistakes import LIMITS
 
 DOCS = Path(__file__).parents[2] / "docs"
+
+
+# ---- What is about known, and what is reversed -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("thrust", "force"),
+    [
+        ('thrust = { about = 14.0, unit = "N" }', 14.0),
+        ('thrust = { about = 2.0, unit = "kgf" }\ntogether = 3', 3.0 * 2.0 * 9.80665),
+    ],
+)
+def test_thrust_may_be_known_about(thrust: str, force: float, tmp_path: Path) -> None:
+    """It is the centre of a prior: the fit may change it, and forces that are measured replace it."""
+    rov = DOWN.replace("[curves.t200]", f"[curves.t200]\n{thrust}")
+    folder = folder_of(tmp_path / "tests", rov, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"})
+    tests = load_tests(folder)
+    assert tests.base["a_t_t200"] + tests.base["b_t_t200"] == pytest.approx(force)
+    known, _, _ = begin(tests)
+    assert [curve.name for curve in known.curves] == ["t200"]
+    assert not {"a_t_t200", "b_t_t200"} & known.exact
+    (folder / "thrust_t200.csv").write_text(pulled(30.0, 20.0), encoding="utf-8")
+    assert not {"a_t_t200", "b_t_t200"} & load_tests(folder).known.keys()
+
+
+@pytest.mark.parametrize("write", [writers.csv, writers.tlog, writers.flash])
+def test_a_motor_may_be_reversed_whatever_the_log_tells(
+    write: Callable[[Path, writers.Dive], Path], tmp_path: Path
+) -> None:
+    write(tmp_path, DIVE)
+    rov = f'{BLUEROV2}[logs]\nreversed = ["2", "5"]\n'
+    (log,) = load_tests(folder_of(tmp_path, rov, {})).folder.logs
+    assert log.commands
+    for name, values in THRUSTERS.items():
+        sign = -1.0 if name in ("2", "5") else 1.0
+        assert commanded(log, name, TIME - TIME[0] + log.commands.rows[0]) == pytest.approx(sign * values, abs=3e-3)
 
 
 # ---- A vehicle to begin from -----------------------------------------------------------------------------------------

@@ -38,6 +38,7 @@ def given(name: str, value: float, unit: str) -> str:
     return f'{name} = {{ value = {value}, unit = "{unit}", source = "s" }}\n'
 
 
+ABOUT = 'thrust = { about = 14.0, unit = "N" }\n'
 HEAVE_ALONE = {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n0.6,0.4\n"}
 WITH_THRUST = HEAVE_ALONE | {"thrust_t200.csv": pulled(30.0, 20.0)}
 LIMITS = """[windows]
@@ -142,7 +143,28 @@ WRONG: list[tuple[str, Mapping[str, str], str]] = [
         {"thrust_t200.csv": pulled(1.0, 1.0), "steady_yaw.csv": f"{RATE}\n0.3,0.2\n"},
         "/rov.toml: thruster.1.position: this key, or arm, is missing, and the vehicle has yaw",
     ),
-    (DOWN, HEAVE_ALONE, ": no thrust_t200*.csv, and [known] in rov.toml does not give a_t_t200"),
+    (
+        DOWN,
+        HEAVE_ALONE,
+        ": no thrust_t200*.csv, and [known] in rov.toml does not give a_t_t200. About will do: "
+        'thrust = { about = 14.0, unit = "N" } in [curves.t200]',
+    ),
+    (
+        DOWN.replace("[curves.t200]", '[curves.t200]\nthrust = { about = 0.0, unit = "kg" }'),
+        HEAVE_ALONE,
+        "/rov.toml: curves.t200.thrust.about = 0.0: must be above 0"
+        " | /rov.toml: curves.t200.thrust.unit = 'kg': must be N, kgf, lbf",
+    ),
+    (
+        DOWN.replace("[curves.t200]", f"[curves.t200]\n{ABOUT}{given('a_t', 9.0, 'N')}{given('b_t', 9.0, 'N')}"),
+        HEAVE_ALONE,
+        "/rov.toml: curves.t200.thrust: leave it out, because a_t_t200, b_t_t200 is given",
+    ),
+    (
+        f'{DOWN}[logs]\nreversed = ["w"]\n',
+        WITH_THRUST,
+        "/rov.toml: logs.reversed = 'w': there is no such thruster, only v",
+    ),
     (
         DOWN,
         {"thrust_t200.csv": pulled(30.0, 20.0), "time_constant_heave.csv": f"{TAU}\n0.3,2\n"},

@@ -7,28 +7,28 @@ import numpy as np
 import pytest
 
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.clocks import in_rows
+from rov_fmu.tank.clocks import gaps, in_rows
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, gaps, scales_differ, uninterrupted, unwrapped
+from rov_fmu.tank.quality import checked, uninterrupted
 from tests.tank.logs import channel, commands
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
 
 
-def test_a_heading_is_unwrapped_keeps_its_blanks_and_noise_beyond_its_range_is_no_second_turn() -> None:
+def test_a_heading_is_unwrapped_without_its_blanks_and_noise_beyond_its_range_is_no_second_turn() -> None:
     heading = 5.8 + 0.7 * STEPS
     values = heading % (2.0 * pi)
     values[50:55] = np.nan
     values += np.radians(2.0) * np.sign(values - pi) * (np.abs(values - pi) > 3.0)
-    found = unwrapped(channel("heading", STEPS, values)).values
+    times, found = channel("heading", STEPS, values).unwrapped
     there = np.isfinite(values)
-    assert np.isnan(found[~there]).all()
-    assert found[there] == pytest.approx(heading[there], abs=np.radians(2.1))
+    assert times.tolist() == STEPS[there].tolist()
+    assert found == pytest.approx(heading[there], abs=np.radians(2.1))
 
 
 def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() -> None:
     values = np.tile(np.linspace(-3.4, 3.4, 100), 2)
-    assert unwrapped(channel("heading", STEPS, values)).values.tolist() == values.tolist()
+    assert channel("heading", STEPS, values).unwrapped[1].tolist() == values.tolist()
 
 
 @pytest.mark.parametrize(
@@ -115,10 +115,9 @@ def test_sensors_of_other_scales_are_told(scale: float, is_told: bool) -> None:
     depth = scale * (2.0 * np.sin(0.3 * time) + 0.05 * time) + 0.005 * random.standard_normal(len(time))
     speed = 0.6 * np.cos(0.3 * at) + 0.01 * random.standard_normal(len(at))
     channels = channel("depth", time, depth), channel("heave velocity", at, speed)
-    findings = scales_differ("a.csv", channels[0], channels)
-    assert [f.kind for f in findings] == ["scales differ"] * is_told
-    for finding in findings:
-        assert finding.words["factor"] == pytest.approx(scale, abs=0.003)
-    assert not scales_differ("a.csv", channels[0], (*channels, channel("pitch angle", time, 0.1 * time)))
-    told = {f.kind for f in checked(Log("a.csv", None, channels)).findings}
-    assert ("scales differ" in told) is is_told
+    tilted = (*channels, channel("pitch angle", time, 0.1 * time))
+    for measured, count in ((channels, is_told), (tilted, False)):
+        told = [f for f in checked(Log("a.csv", None, measured)).findings if f.kind == "scales differ"]
+        assert len(told) == count
+        for finding in told:
+            assert finding.words["factor"] == pytest.approx(scale, abs=0.003)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE
-from rov_fmu.equation.parts import CurrentTable
+from rov_fmu.equation.parts import Table
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
@@ -40,7 +40,7 @@ def table(folder: Path, text: str) -> Path:
     return path
 
 
-def currents_of(vehicle: Vehicle) -> list[CurrentTable]:
+def currents_of(vehicle: Vehicle) -> list[Table]:
     """The electric current of each curve. All curves of these vehicles have one."""
     return [current for curve in vehicle.layout.curves if (current := curve.electric_current)]
 
@@ -48,9 +48,9 @@ def currents_of(vehicle: Vehicle) -> list[CurrentTable]:
 def test_pulses_and_kilograms_become_commands_and_newtons(tmp_path: Path) -> None:
     found = read_thrust(table(tmp_path, "pulse [us];thrust [kgf]\n1100;-4\n1500;0,0\n1900;5\n1900;5,2\n"))
     assert found.commands == (-1.0, 0.0, 1.0)
-    assert found.forces == pytest.approx((-4.0 * 9.80665, 0.0, 5.1 * 9.80665), rel=1e-15)
+    assert found.values == pytest.approx((-4.0 * 9.80665, 0.0, 5.1 * 9.80665), rel=1e-15)
     with_numbers = read_thrust(table(tmp_path, "pwm [us 1500 300],force [lbf]\n1200,-9\n1500,0\n1800,11\n"))
-    assert with_numbers.forces == pytest.approx((-9.0 * 4.4482216152605, 0.0, 11.0 * 4.4482216152605), rel=1e-15)
+    assert with_numbers.values == pytest.approx((-9.0 * 4.4482216152605, 0.0, 11.0 * 4.4482216152605), rel=1e-15)
 
 
 @pytest.mark.parametrize("unit", ["us 0 40", "us -10 40", "N 40", "kgf 40"])
@@ -60,29 +60,29 @@ def test_pulses_relative_to_neutral_and_forces_are_commands(unit: str, tmp_path:
     rows = "".join(f"{9 * c},{40 * c + neutral}\n" for c in (-1, -0.5, 1, 0, 0.5))
     found = read_thrust(table(tmp_path, f"thrust [N],command [{unit}]\n{rows}"))
     assert found.commands == (-1.0, -0.5, 0.0, 0.5, 1.0)
-    assert found.forces == (-9.0, -4.5, 0.0, 4.5, 9.0)
+    assert found.values == (-9.0, -4.5, 0.0, 4.5, 9.0)
 
 
 def test_thrust_goes_on_with_its_slope_to_full_command(tmp_path: Path) -> None:
     found = read_thrust(table(tmp_path, "command [%],thrust [N]\n-95,-190\n-50,-100\n0,0\n50,60\n95,114\n"))
     assert found.commands == (-1.0, -0.95, -0.5, 0.0, 0.5, 0.95, 1.0)
-    assert found.forces == pytest.approx((-200.0, -190.0, -100.0, 0.0, 60.0, 114.0, 120.0), rel=1e-14)
+    assert found.values == pytest.approx((-200.0, -190.0, -100.0, 0.0, 60.0, 114.0, 120.0), rel=1e-14)
 
 
 def test_the_limits_of_a_table_are_allowed(tmp_path: Path) -> None:
     commands = np.linspace(-1.0, 1.0, 2000)
     rows = "\n".join(f"{c:.6f},{1e6 * c * (abs(c) > 0.1):.1f}" for c in commands)
-    assert read_thrust(table(tmp_path, f"command [1],thrust [N]\n{rows}\n")).forces[0] == -1e6
+    assert read_thrust(table(tmp_path, f"command [1],thrust [N]\n{rows}\n")).values[0] == -1e6
     for line, limit in (("-1,-1000000.5", "-1e+06"), ("1,1000000.5", "1e+06")):
         with pytest.raises(DataFileError, match=re.escape(limit)):
             read_thrust(table(tmp_path, f"command [1],thrust [N]\n-1,-1\n0,0\n1,1\n{line}\n"))
-    assert read_current(table(tmp_path, "command [1],current [A]\n-1,10000\n0,0\n1,1\n")).current(-1.0) == 1e4
+    assert read_current(table(tmp_path, "command [1],current [A]\n-1,10000\n0,0\n1,1\n")).value(-1.0) == 1e4
 
 
 def test_the_electric_current_is_linear_between_the_points_and_constant_beyond_them(tmp_path: Path) -> None:
     found = read_current(table(tmp_path, "pulse [us],current [A]\n1104,24.3\n1500,0\n1896,23\n1896,25\n"))
     commands = (-1.0, -0.99, -0.5, 0.0, 0.25, 0.99, 1.0)
-    assert [found.current(c) for c in commands] == pytest.approx(
+    assert [found.value(c) for c in commands] == pytest.approx(
         [24.3, 24.3, 24.3 * 0.5 / 0.99, 0.0, 24.0 * 0.25 / 0.99, 24.0, 24.0]
     )
 
@@ -333,5 +333,22 @@ def test_at_the_ends_of_the_voltage_thrust_is_that_of_its_table(voltage: float, 
     vehicle, table = load_vehicle(path), read_thrust(folder / file)
     assert vehicle.layout.pulse == (500.0, 510.0, 2500.0)
     ends = [vehicle.force(SURGE, command) for command in (-1.0, 1.0)]
-    assert ends == pytest.approx([1.8 * table.forces[0], 1.8 * table.forces[-1]])
+    assert ends == pytest.approx([1.8 * table.values[0], 1.8 * table.values[-1]])
     assert vehicle.strongest(SURGE) == pytest.approx(ends[1])
+
+
+def test_thrusters_draw_the_current_of_their_tables_and_its_power_at_the_voltage_of_the_battery(folder: Path) -> None:
+    """The maker's sheet of a T200 at 16 V: 23.90 A at 1896 us, 4.40 A at 1300 us. The dead time comes before."""
+    heavy = load_vehicle(SHIPPED["bluerov2_heavy"])
+    found = heavy.calculated(heavy.layout.usual_inputs | {"u_1": 0.99, "u_2": -0.5}, heavy.layout.at_rest)
+    assert [found[f"electric_current_{n}"] for n in (1, 2, 3)] == pytest.approx([23.9, 4.4, 0.0], abs=0.1)
+    assert found["electric_current"] == pytest.approx(found["electric_current_1"] + found["electric_current_2"])
+    assert found["electric_power"] == pytest.approx(16.0 * found["electric_current"])
+    path = folder / "rov.toml"
+    drawn = {f"curves.{name}.electric_current": _DRAWN for name in ("main", "bow", "lift")}
+    path.write_text(changed(drawn, TEXT), encoding="utf-8")
+    rov = load_vehicle(path)
+    drawing = dict.fromkeys(rov.layout.delayed, -1.0) | dict.fromkeys(rov.layout.commands, 0.5) | {"voltage": 14.0}
+    found = rov.calculated(rov.layout.usual_inputs | drawing, rov.layout.at_rest)
+    count = len(rov.layout.thrusters)
+    assert (found["electric_current"], found["electric_power"]) == pytest.approx((9.0 * count, 14.0 * 9.0 * count))

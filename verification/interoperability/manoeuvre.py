@@ -105,12 +105,12 @@ class Manoeuvre:
         """The time and the outputs at each communication point by the step in Python."""
         rov, inputs = self.rov.with_(**self.parameters), self.inputs_at(0.0)
         state: Mapping[str, float] = rov.layout.at_rest
-        line = rov.delay_line()
+        memory = rov.memory()
         rows = []
         for time in TIMES:
             if time > 0.0:
-                state = line.step(rov, inputs, state, time - STEP, STEP)
-            rows.append({"time": time, **state, **rov.calculated({**inputs, **line.delayed}, state)})
+                state = memory.step(rov, inputs, state, time - STEP, STEP)
+            rows.append({"time": time, **state, **rov.calculated({**inputs, **memory.delayed}, state)})
             inputs = self.inputs_at(time)
         return rows
 

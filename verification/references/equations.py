@@ -12,9 +12,10 @@ from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.equation.parts import Curve, Thruster, ThrustTable
+from rov_fmu.equation.parts import Curve, Table, Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # a float, or a number of mpmath or gmpy2
@@ -165,12 +166,12 @@ def of_voltage(rov: Vehicle, curve: Curve, voltage: Number, numbers: Any, power:
     return (max(numbers.mpf(voltage), numbers.zero) / V_0) ** (n_V * power / 2)
 
 
-def _interpolated(table: ThrustTable, command: Number, numbers: Any) -> Number:
+def _interpolated(table: Table, command: Number, numbers: Any) -> Number:
     """Return the force of the monotone cubic, which SciPy computes, at a command."""
     slopes = [
-        numbers.mpf(float(x)) for x in PchipInterpolator(table.commands, table.forces).derivative()(table.commands)
+        numbers.mpf(float(x)) for x in PchipInterpolator(table.commands, table.values).derivative()(table.commands)
     ]
-    c, F = ([numbers.mpf(x) for x in row] for row in (table.commands, table.forces))
+    c, F = ([numbers.mpf(x) for x in row] for row in (table.commands, table.values))
     n = next(n for n in range(len(c) - 1) if command <= c[n + 1])
     h = c[n + 1] - c[n]
     t = (command - c[n]) / h
@@ -291,4 +292,26 @@ def calculated(rov: Vehicle, values: Mapping[str, Number], numbers: Any) -> dict
     for curve in rov.layout.turning_curves:
         turning = (effect(k, t, "r", numbers) * forces[t.name] for t in rov.layout.thrusters if t.curve == curve.name)
         found[f"tau_{curve.name}"] = numbers.fsum(turning)
-    return found | {f"der({name})": rate for name, rate in rates.items()}
+    of_states = {f"der({name})": rate for name, rate in rates.items()}
+    return found | with_over_ground(of_states) | electric(k, values, numbers)
+
+
+def electric(rov: Vehicle, values: Mapping[str, Number], numbers: Any) -> dict[str, Number]:
+    """Return the electric current and power of the thrusters, by their tables, between whose points they are linear."""
+    found: dict[str, Number] = {}
+    driven, voltage = commands(rov, values, numbers), max(values.get("voltage", 0.0), 0.0)
+    for name, curve in rov.layout.curve_of.items():
+        if table := curve.electric_current:
+            found[f"electric_current_{name}"] = np.interp(float(driven[name]), table.commands, table.values)
+            volts = table.voltage if rov.layout.voltage is None else voltage
+            found[f"electric_power_{name}"] = found[f"electric_current_{name}"] * volts
+    kinds = ("electric_current", "electric_power") if found else ()
+    return found | {kind: math.fsum(x for name, x in found.items() if name.startswith(kind)) for kind in kinds}
+
+
+def with_over_ground(rates: Mapping[str, Number]) -> dict[str, Number]:
+    """Return the derivatives of all states, with those of the position also as the velocity over ground."""
+    return {
+        **rates,
+        **{f"vg_{d}": rates[f"der({x})"] for d, x in zip("NED", "xyz", strict=True) if f"der({x})" in rates},
+    }

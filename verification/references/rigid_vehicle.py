@@ -201,7 +201,7 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     R, held = rotation(y[6:10]), {name: number(mp.mpf(values.get(name, 0.0))) for name in ("V_N", "V_E", "V_D")}
     tied: dict[str, Number] = {}
     for name, at in _points(rov, lambda name: number(mp.mpf(values[name]))):
-        outputs = (*(f"{x}_{name}" for x in "xyz"), *(f"der({x}_{name})" for x in "xyz"))
+        outputs = (*(f"{x}_{name}" for x in "xyz"), *(f"vg_{d}_{name}" for d in "NED"))
         tied |= dict(zip(outputs, of_point(at, R, y[:6], y[10:13], np.array([*held.values()])), strict=True))
     if not layout.has_attitude:
         return equations.calculated(rov, values, mp) | tied
@@ -210,7 +210,8 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     rates = rigid_body.rates(of_vehicle, of_vehicle.inverse, y)
     names = [*VELOCITIES, *QUATERNION, *"xyz", *layout.lagging]
     found = {name: x for name, x in zip(names, y, strict=True) if name in layout.state}
-    found |= {f"der({name})": rate for name, rate in zip(names, rates, strict=True) if name in layout.state}
+    of_states = {f"der({name})": rate for name, rate in zip(names, rates, strict=True) if name in layout.state}
+    found |= equations.with_over_ground(of_states)
     steady = steady_forces(k, values, mp)
     forces = {name: values.get(f"F_{name}", force) for name, force in steady.items()}
     for n, (name, curve) in enumerate(layout.curve_of.items()):
@@ -222,4 +223,5 @@ def calculated(rov: Vehicle, values: Values, number: Callable[[Number], Number] 
     for curve in layout.turning_curves:
         own = [t for t in layout.thrusters if t.curve == curve.name]
         found[f"tau_{curve.name}"] = mp.fsum(_wrench(t.place, t.direction.value)[5] * forces[t.name] for t in own)
+    found |= equations.electric(k, values, mp)
     return found | tied | dict(zip(("phi", "theta", "psi"), euler_angles(R), strict=True))

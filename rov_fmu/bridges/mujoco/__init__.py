@@ -134,7 +134,7 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
     - `vehicle`: the vehicle, which needs a mass.
     - `coefficients`: other values of coefficients by name, in SI units. They may change at any time.
 
-        rov = mujoco.load(rov_fmu.load("bluerov2"), health_1=0.5)  # from rov_fmu.bridges import mujoco
+        rov = rov_fmu.load_mujoco(rov_fmu.load("bluerov2"), health_1=0.5)
         rov.data.ctrl[:] = 0.2  # the commands, -1 to 1
         rov.step()
 

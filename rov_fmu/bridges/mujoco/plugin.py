@@ -26,7 +26,7 @@ if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.k
 import mujoco
 import numpy as np
 
-from rov_fmu.equation.python.step import DelayLine
+from rov_fmu.equation.python.step import Memory
 
 _FLIP = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
 """The signs of the components in MuJoCo's frames, relative to those in the equation's."""
@@ -88,7 +88,7 @@ class Water:
     def reset(self) -> None:
         """Stop the thrusters, and forget the commands that wait for the dead time."""
         self.forces = dict.fromkeys(self.equation.LAGGING, 0.0)
-        self.line = DelayLine(self.equation.COMMANDS, self.equation.DELAYED)
+        self.memory = Memory(self.equation.COMMANDS, self.equation.DELAYED)
         self.held: tuple[float, ...] = ()
         self.numbers: dict[str, float] = {}
         self.since = 0.0
@@ -110,7 +110,7 @@ class Water:
 
     def __copy__(self) -> "Water":
         other = object.__new__(Water)
-        other.__dict__ = {**self.__dict__, "line": copy(self.line)}
+        other.__dict__ = {**self.__dict__, "memory": copy(self.memory)}
         other.coefficients, other.inputs = Numbers(self.coefficients), Numbers(self.inputs)
         return other
 
@@ -136,15 +136,15 @@ class Water:
         """
         self.velocity, self.quaternion = state
         self.outside, self.change = outside, [0.0] * 6
-        self.line.step(self, commands, {}, t, h)
+        self.memory.step(self, commands, {}, t, h)
         return [x / h for x in self.change]
 
     def __getitem__(self, name: str) -> float:
-        """Return a coefficient, as the delay line asks for it."""
+        """Return a coefficient, as the memory asks for it."""
         return self.coefficients[name]
 
     def step(self, commands: Mapping[str, float], _: Mapping[str, float], h: float) -> dict[str, float]:
-        """Move for a part of the time step, during which some commands act. The delay line calls this."""
+        """Move for a part of the time step, during which some commands act. The memory calls this."""
         before, outside = self.velocity, self.outside
         start = self._acceleration(commands, 0.0, before, self.quaternion)
         middle = [v + 0.5 * h * (a + b) for v, a, b in zip(before, start, outside, strict=True)]

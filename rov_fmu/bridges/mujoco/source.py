@@ -13,7 +13,7 @@ from rov_fmu.equation.attitude import ROTATION
 from rov_fmu.equation.catalogue import AXES, CURRENT, CURRENT_DOWN
 from rov_fmu.equation.expression import ZERO, Expression, to_c
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import ThrustTable
+from rov_fmu.equation.parts import Table
 from rov_fmu.equation.python.printed import TIME, accelerations_of, arrived, lagging, reversals
 from rov_fmu.io.paths import FMU_SRC
 
@@ -32,7 +32,7 @@ def outer_names(layout: Layout) -> list[str]:
 def water_sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle in MuJoCo by their names. The last one includes the others."""
     equation = accelerations_of(layout).equation
-    needed = {"real.h": True, "delay.c": layout.has_dead_time, "table.c": bool(equation.tables)}
+    needed = {"real.h": True, "delay.c": layout.has_dead_time, "table.c": bool(equation.thrust_tables)}
     shared = {name: (C_SOURCES / name).read_text(encoding="utf-8") for name, is_needed in needed.items() if is_needed}
     return {"equation.h": _equation(layout)} | shared | {WATER.name: WATER.read_text(encoding="utf-8")}
 
@@ -70,7 +70,7 @@ enum {{ {", ".join(f"{name} = {n}" for name, n in sizes.items())} }};
 {_array("int", "CURRENT", current)} /* the places of the current, or -1 */
 {_array("int", "LACKS", (int(name not in layout.velocities) for name in _VELOCITIES))} /* 1 along axes that it lacks */
 {_array("double", "STARTS", (layout.usual_inputs[name] for name in layout.commands))} /* of the commands */
-{_tables(equation.tables)}
+{_tables(equation.thrust_tables)}
 /* Compute all numbers that follow from coefficients, inputs, directions of motion and what lags. */
 static void equation_numbers(double v[])
 {{
@@ -126,13 +126,13 @@ def _array(kind: str, name: str, values: Iterable[object]) -> str:
     return f"static const {kind} {name}[] = {{{', '.join(map(str, values)) or 0}}};"
 
 
-def _tables(tables: Mapping[str, ThrustTable]) -> str:
+def _tables(tables: Mapping[str, Table]) -> str:
     """Print the functions of the thrust tables."""
     text = '#include "table.c"\n' if tables else ""
     for name, table in tables.items():
         columns: dict[str, Sequence[float]] = {
             f"commands_{name}": table.commands,
-            f"forces_{name}": table.forces,
+            f"values_{name}": table.values,
             f"slopes_{name}": table.slopes,
         }
         arrays = "\n".join(_array("double", column, values) for column, values in columns.items())
@@ -140,7 +140,7 @@ def _tables(tables: Mapping[str, ThrustTable]) -> str:
 {arrays}
 static double {name}(double command)
 {{
-    return force_in_table({", ".join(columns)}, {len(table.commands)}, command);
+    return value_in_table({", ".join(columns)}, {len(table.commands)}, command);
 }}
 """
     return text

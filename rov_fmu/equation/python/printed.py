@@ -13,6 +13,7 @@ from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
 from ..catalogue import AXES
 from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
 from ..layout import Layout
+from ..parts import Table
 from ..terms import Equation, Term, equation_of, mass_matrix, rate_formula
 from .step import interpolated
 
@@ -61,7 +62,7 @@ OFFSETS = {places(offsets)!r}  # the states on which no rate depends, as offsets
 GROUPS = {[*filter(None, groups)]!r}  # the states of like size
 QUATERNION = {places(quaternion)!r}
 PIVOTS = {[name.identifier for name in equation.names.of_kind("pivot")]!r}  # of the mass matrix, all above 0
-{_tables(equation)}
+{_tables(equation.tables)}
 
 def numbers(values):
     \"\"\"Return all numbers that follow from the coefficients, inputs and states, together with these.\"\"\"
@@ -170,7 +171,7 @@ def accelerations_text(layout: Layout) -> str:
     accelerations = "".join(f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in every)
     return f"""\
 VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
-{_tables(equation)}
+{_tables(equation.thrust_tables)}
 
 def numbers(values):
     \"\"\"Return all numbers that follow from coefficients, inputs, velocities and what lags, and these.\"\"\"
@@ -311,14 +312,14 @@ def _reversals(equation: Equation) -> Iterable[str]:
     return (f", {written(x, PYTHON, _value)}" for x in reversals(equation))
 
 
-def _tables(equation: Equation) -> str:
-    """Print the functions of the thrust tables."""
+def _tables(tables: Mapping[str, Table]) -> str:
+    """Print the functions of tables."""
     return "".join(
         f"""
 
 def {name}(command):
-    \"\"\"Return the measured force of a thruster (N).\"\"\"
-    return interpolated(command, {(table.commands, table.forces, table.slopes)!r})
+    \"\"\"Return the measured {table.kind} of a thruster.\"\"\"
+    return interpolated(command, {(table.commands, table.values, table.slopes)!r})
 """
-        for name, table in equation.tables.items()
+        for name, table in tables.items()
     )

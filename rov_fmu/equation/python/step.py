@@ -252,9 +252,10 @@ class Change(NamedTuple):
         return Change(remaining, self.commands, passed - (remaining - self.remaining))
 
 
-class DelayLine:
-    """The commands that act on a vehicle, and the changes that wait for the dead time; and the current before.
+class Memory:
+    """What a vehicle keeps from step to step beside its states, in the Python step: commands and the current.
 
+    These are the commands that act, the changes that wait for the dead time, and the current during the step before.
     Before its first command, every thruster is still. For a vehicle without a dead time, nothing waits.
     """
 

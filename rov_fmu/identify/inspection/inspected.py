@@ -2,7 +2,10 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import inf
 from pathlib import Path
+
+import tomlkit
 
 from rov_fmu.equation.catalogue import EXTERNAL
 from rov_fmu.equation.layout import Layout
@@ -11,13 +14,24 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import listed
 from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
+from rov_fmu.io.toml_file import Toml
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, has_wrench, read_description
 from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
-from rov_fmu.tank.inspection.draft import LikelyVehicle, completed, dives, draft, lacking, likely_vehicle
+from rov_fmu.tank.inspection.draft import (
+    Guess,
+    LikelyVehicle,
+    completed,
+    dives,
+    draft,
+    is_open,
+    lacking,
+    likely_vehicle,
+)
 from rov_fmu.tank.inspection.headers import TableHeaders, headers_of_tables
 from rov_fmu.tank.inspection.inspection import Inspection, inspect, logs_among
+from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, Moved, moved
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.readers.listing import Listing, list_files, named
 from rov_fmu.tank.readers.parsers import one_parser
@@ -71,13 +85,7 @@ class Inspected:
     @property
     def dives(self) -> list[Log]:
         """The logs with commands, each with the channels of the files without commands that belong to it."""
-        by_name = {one.path.name: one.log for one in self.logs if one.log}
-        joined = {files[0]: files for files in dives(self.logs)}
-        logs = []
-        for log in (log for log in (inspection.log for inspection in self.logs) if log and log.commands):
-            parts = [by_name[name] for name in joined.get(log.file, ()) if by_name.get(name)]
-            logs.append(together(self.path.with_name(log.file), parts) if len(parts) > 1 else log)
-        return logs
+        return _dives(self.path, self.logs)
 
     @property
     def undetermined(self) -> list[str]:
@@ -136,12 +144,20 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
         raise DataFileError(*([*mistakes, *listing.lines("unreadable file")] if mistakes else listing.no_tests()))
     headers = headers_of_tables(folder)
     likely = likely_vehicle(inspections, headers.curves)
-    name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
-    text = draft(name, inspections, headers, replace(likely, base="") if described.tables.thruster else likely)
     own = read_text(path, VehicleFileError).strip() if path.exists() else ""
+    document = tomlkit.parse(own).unwrap()
+    if "thruster" in document:
+        likely = replace(likely, base="")
+    name = (files[0].stem if files else folder.resolve().name) or inspections[0].path.stem
+    is_known = likely.base or not is_open(document.get("base", "?")) or not EXTERNAL.isdisjoint(likely.thrusters)
+    found = NOTHING_MOVED if is_known else moved(_dives(path, inspections))
     has_vehicle = is_described or _has_form_of_paper(described, likely)
-    lacks = lacking(own, text, has_vehicle=has_vehicle) if own else text
-    if lacks and path.exists():  # what is told is about the file that it will be
+    for _ in range(2):  # thrusters that are completed tell which axes they drive
+        text = draft(name, inspections, headers, likely, _guess(found, described.description, document))
+        lacks = lacking(own, text, has_vehicle=has_vehicle) if own else text
+        if not (lacks and path.exists()):
+            break
+        # What is told is about the file that it will be.
         described = read_description(path, draft=Draft(completed(own, lacks), ""))
     notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
@@ -158,6 +174,32 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
         name=name,
     )
     return inspected if own else replace(inspected, description=_drafted(inspected).description)
+
+
+def _dives(path: Path, inspections: Sequence[Inspection]) -> list[Log]:
+    """Return the logs with commands, each with the channels of the files without commands that belong to it. `path` is
+    that of rov.toml."""
+    by_name = {one.path.name: one.log for one in inspections if one.log}
+    joined = {files[0]: files for files in dives(inspections)}
+    logs = []
+    for log in (log for log in (inspection.log for inspection in inspections) if log and log.commands):
+        parts = [by_name[name] for name in joined.get(log.file, ()) if by_name.get(name)]
+        logs.append(together(path.with_name(log.file), parts) if len(parts) > 1 else log)
+    return logs
+
+
+def _guess(found: Moved, description: Description | None, own: Toml) -> Guess:
+    """Return what the logs tell of a vehicle that has no base: what its thrusters move, and its size by its mass.
+
+    Thrusters that rov.toml describes tell themselves which axes they drive. `own` is its content, which may have
+    mistakes.
+    """
+    if description and description.has_hardware_tables:
+        found = replace(found, driven=frozenset(form.axis for form in description.logged.axes))
+    mass: object = own
+    for key in ("body", "m_rov", "value"):
+        mass = mass.get(key) if isinstance(mass, dict) else None
+    return Guess(found, float(mass) if isinstance(mass, int | float) and 0.0 < mass < inf else None)
 
 
 def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:

@@ -49,10 +49,11 @@ def undetermined(
     fitted: it follows from what is measured, and from how the thrusters are commanded.
     """
     layout = description.logged
+    concerned = {log: layout_of(log, description) for log in logs}
     driven: dict[Log, list[Axis]] = {}
     findings: list[Finding] = []
-    for log in logs:
-        driven[log], of_log = driven_axes(log, layout_of(log, layout if not log.axis else description.layout))
+    for log, part in concerned.items():
+        driven[log], of_log = driven_axes(log, part)
         findings += of_log
     tested = {axis for axes in driven.values() for axis in axes}
     untested = [axis for axis in layout.bare_axes if axis not in tested]
@@ -84,9 +85,8 @@ def undetermined(
         for group in thrusters_alike(layout, values):
             if len(group) > 1:
                 yield from sentences([about("", "not told apart", of=listed(group))])
-        for log in logs:
-            logged = layout_of(log, layout if not log.axis else description.layout)
-            if log.commands and (lost := lost_between_rows(log, logged)):
+        for log, part in concerned.items():
+            if log.commands and (lost := lost_between_rows(log, part)):
                 words = lost_in_words(lost, log.commands.interval)
                 yield HYPOTHESES["momentary commands"].sentence.format(of=log.file, **words)
         known = {c.name for c in layout.curves if c.coefficient("a_t") in description.known}

@@ -19,6 +19,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.kinds import Action
+from rov_fmu.io.messages import RovError
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -187,7 +188,7 @@ class _Set(ctypes.Structure):
     _fields_ = [("numbers", ctypes.c_void_p), ("inputs", ctypes.c_void_p)]
 
 
-class DivergedError(Exception):
+class DivergedError(RovError):
     """The motion of the model overflows."""
 
 

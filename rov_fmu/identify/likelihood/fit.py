@@ -38,9 +38,9 @@ from rov_fmu.identify.likelihood.solve import (
     scaled,
     start_of,
 )
+from rov_fmu.identify.progress import Work
 from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import Progress, moving, silent
 from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
@@ -121,7 +121,7 @@ def fit_all(
     known: Prior,
     logs: Sequence[SampledLog],
     rows: Sequence[TableRow],
-    on_progress: Progress = silent,
+    work: Work | None = None,
     is_mistaken: Callable[[Objective, Array, Array], bool] = lambda *_: False,
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
@@ -132,38 +132,39 @@ def fit_all(
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
     the reason, and not the structure. Such a fit is not refined, because nobody should use it.
     """
+    work = work or Work()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
-    ends, is_enough = _from_starts(quick, on_progress)
-    show, start = moving(on_progress, "all samples", 0.3, 0.6), StructureFit({}, quick, ends[0], 0.0, 0.0)
+    ends, is_enough = _from_starts(quick, work)
+    start = StructureFit({}, quick, ends[0], 0.0, 0.0)
     is_wrong = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
     most = _UNREFINED if is_wrong else MOST_STEPS
-    near = minimise(full, scaled(full, ends[0].z), show, most=most, last=False)
-    plain, first = (
-        StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0])),
-        dict[Suspect, float](),
-    )
+    near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
+    work.fits(full, near)
+    plain = StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0]))
+    first = dict[Suspect, float]()
     if not is_wrong:
         plain, first = settled(plain)
     before = windows(plain.objective, plain.minimum.z)
-    tried, show_tried = count(), moving(on_progress, "hypotheses", 0.6, 0.7)
+    tried, show_tried = count(), work.steps("hypotheses")
     search = StructureSearch(plain, lambda: show_tried(next(tried)))
     if not is_wrong:
         search.run()
     full, near = search.now.objective, search.now.minimum
+    if first or search.odds:
+        work.fits(full, near)
     measured = full.table.known.measured_curves
-    for n, curve in enumerate(() if is_wrong else measured):
+    for curve in () if is_wrong else measured:
         other, needed = _bending(full, full.table.known.bent | {curve}), evidence_at(full, near) + KEPT
 
         def bends(value: float, information: Array, other: Objective = other, needed: float = needed) -> bool:
             return evidence(other, value, information) > needed
 
-        low, high = (0.7 + 0.1 * m / len(measured) for m in (n, n + 1))
-        show = moving(on_progress, f"the shape of the thrust of {curve}", low, high)
+        show = work.steps("shape of the thrust", f"the shape of the thrust of {curve}")
         found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
             full, near = other, minimise(other, found.z, last=False)
     # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    on_progress("exact derivatives", 0.8)
+    work.steps("exact derivatives")(0)
     best = minimise(full, scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
@@ -175,10 +176,10 @@ def fit_all(
     if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
     told, least, bent = full, best, full.table.known.bent
-    show, of_measured = moving(on_progress, "quadratic thrust", 0.82, 0.88), bent.intersection(measured)
+    of_measured = bent.intersection(measured)
     if of_measured < bent:
-        told, least = _less_bent(full, of_measured, best, most, show)
-    file = _less_bent(full, frozenset(), least, most, show) if of_measured else (told, least)
+        told, least = _less_bent(full, of_measured, best, most, work)
+    file = _less_bent(full, frozenset(), least, most, work) if of_measured else (told, least)
     misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
     unseen = unseen_errors(told, least.z, before, misfits)
@@ -204,25 +205,25 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
 
 
 def _less_bent(
-    objective: Objective, bent: frozenset[str], near: Minimum, most: int, on_step: Callable[[int], None]
+    objective: Objective, bent: frozenset[str], near: Minimum, most: int, work: Work
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
-    other = _bending(objective, bent)
-    return other, minimise(other, near.z, on_step, near=near.data, most=most, enough=QUICK)
+    other, show = _bending(objective, bent), work.steps("quadratic thrust")
+    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK)
 
 
-def _from_starts(quick: Objective, on_progress: Progress) -> tuple[list[Minimum], bool]:
+def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
         is_enough = len(ends) == n and not any(_is_loud(quick.table, end.z) for end in ends)
         if ends and (words is _STARTS[-1] or is_enough):
             break
-        show = moving(on_progress, words, 0.1 * n, 0.1 * (n + 1))
         try:
-            ends.append(least_from(quick, start_of(quick, n), show))
+            ends.append(least_from(quick, start_of(quick, n), work.steps(words)))
         except DivergedError:
             continue
+        work.fits(quick, min(ends, key=lambda end: end.value))
     if not ends:
         raise DivergedError
     return sorted(ends, key=lambda end: end.value), is_enough

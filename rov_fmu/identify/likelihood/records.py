@@ -16,11 +16,11 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
 from rov_fmu.tank.arrays import Array, rms
-from rov_fmu.tank.clocks import first_in_each
+from rov_fmu.tank.clocks import first_in_each, gaps
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
-from rov_fmu.tank.quality import gaps, gaps_in_words, jumps, unwrapped
+from rov_fmu.tank.quality import gaps_in_words, jumps
 from rov_fmu.vehicle.vehicle import Vehicle
 
 FASTEST = 20.0
@@ -287,16 +287,8 @@ def shown_axes(log: Log, layout: Layout) -> list[Axis]:
 
 
 def _channels(log: Log, layout: Layout) -> Iterator[tuple[Axis, Channel]]:
-    """Yield the measurements that are used, during the commands, with the axis of the layout that each concerns."""
-    if log.commands is None or not log.commands.time.size:
-        return
-    begin, end = float(log.commands.rows[0]), log.commands.end
-    for channel in log.channels:
-        axis = channel.quantity.axis
-        if channel.unused or axis is None or axis.name not in layout.by_name or (log.axis and axis is not log.axis):
-            continue
-        inside = channel.there & (channel.time >= begin) & (channel.time <= end)
-        yield axis, replace(channel, time=channel.time[inside], values=unwrapped(channel).values[inside])
+    """Yield what a log shows of the axes of the layout, with the axis that each channel concerns."""
+    return ((axis, channel) for channel in log.shown if (axis := channel.quantity.axis) and layout.has(axis))
 
 
 def _wanders(measured: Sequence[SampledChannel]) -> bool:
@@ -442,7 +434,7 @@ def _tilt(log: Log, layout: Layout) -> Array:
     """Return times, roll and pitch of a dive of a vehicle that has neither axis, 3 x k; k = 0 if unknown."""
     if log.follows_axis or layout.has_attitude or not log.tilt:
         return np.zeros((3, 0))
-    (times, rolls), (time, pitches) = (unwrapped(one).samples for one in log.tilt)
+    (times, rolls), (time, pitches) = (one.unwrapped for one in log.tilt)
     if min(len(times), len(time)) < LEAST_SAMPLES:
         return np.zeros((3, 0))
     return np.array([time, np.interp(time, times, rolls), pitches])

@@ -40,6 +40,7 @@ from rov_fmu.report.plots.steps import (
 from rov_fmu.report.plots.svg import LIGHT, add_legend, image, inline_svg, name_axes
 from rov_fmu.report.published import Cell, ResponseTable
 from rov_fmu.report.templates import page
+from rov_fmu.vehicle.steady import speed_table
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _PANEL = (3.7, 2.9)  # inches
@@ -96,6 +97,7 @@ def documentation_page(
         settable=[v.name for v in variables(vehicle) if v.name in layout.state and v.initial == "exact"]
         + [*layout.initial],
         card=card(vehicle),
+        speeds=[*speed_table(vehicle)],
         coupled=listed(equations.coupled(layout)),
         equations=equations.equations_of(layout),
         mathml=equations.mathml,

@@ -21,8 +21,9 @@ from rov_fmu.report.plots.geometry import place, size_of
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
-from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, Entry, LogColumn, columns_of_log
+from rov_fmu.tank.columns import FRACTION, INPUTS, THRUSTERS, LogColumn, columns_of_log
 from rov_fmu.tank.readers.tables import rules_of_page
+from rov_fmu.vehicle.steady import beyond_stated
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
@@ -149,7 +150,18 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mappin
     Raises DataFileError.
     """
     vehicle = flown[0].vehicle
-    return page("fly.html.j2", vehicle=vehicle, layout=vehicle.layout, live=live(flown, recording), compact=compact)
+    given = recording["commands"] if recording else {}
+    commands = [abs(value) for name, values in given.items() if name in vehicle.layout.commands for value in values]
+    return page(
+        "fly.html.j2",
+        vehicle=vehicle,
+        layout=vehicle.layout,
+        live=live(flown, recording),
+        beyond=[*beyond_stated(vehicle)],
+        compact=compact,
+        recording=recording,
+        strongest=max(commands, default=0.0),
+    )
 
 
 def _data(flown: Flown) -> dict[str, Any]:
@@ -182,19 +194,15 @@ def _columns(layout: Layout) -> Iterator[dict[str, Any]]:
     command best, while those of the other columns of its `kind` are 0.
     """
     columns = {name: one for name, one in columns_of_log(layout, None).items() if one.commands}
-    fins = {name: LogColumn(FRACTION, Entry(name), INPUTS if layout.mix else THRUSTERS) for name in layout.commands}
+    fins = {name: LogColumn.of(FRACTION, name, INPUTS if layout.mix else THRUSTERS) for name in layout.commands}
     for kind in (INPUTS, THRUSTERS):
         own = {name: one for name, one in (fins | columns).items() if one.commands == kind}
-        gains = [
-            {name: 1.0} if name in layout.commands else layout.gains[column.entry.name]
-            for name, column in own.items()
-            if column.entry
-        ]
+        gains = [{name: 1.0} if name in layout.commands else layout.gains[column.name] for name, column in own.items()]
         matrix = np.array([[row.get(command, 0.0) for command in layout.commands] for row in gains])
         shares = np.linalg.pinv(matrix, rcond=1e-9).T if gains else ()
         for (name, column), row, share in zip(own.items(), gains, shares, strict=True):
             by_command = dict(zip(layout.commands, map(float, share), strict=True))
-            yield {"name": name, "also": column.column.also, "kind": kind, "gains": row, "shares": by_command}
+            yield {"name": name, "also": column.also, "kind": kind, "gains": row, "shares": by_command}
 
 
 def _keys(layout: Layout) -> list[tuple[Axis, str]]:

@@ -21,9 +21,8 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.description import has_wrench
-from rov_fmu.tank.inspection.one_log import description_beside, one_log
+from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
-from rov_fmu.tank.quality import unwrapped
 from rov_fmu.tank.readers.parsers import one_parser, read_topics
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -95,16 +94,16 @@ def _signals(log: Log, axes: tuple[VehicleAxis, ...], start: float, end: float) 
         known = (quantity for quantity in QUANTITIES.values() if quantity.axis == axis)
         channels = (log.used(quantity.name) for quantity in sorted(known, key=lambda one: one.is_velocity))
         for channel in filter(None, channels):
-            is_meant = channel.there & (channel.time >= start) & (channel.time <= end)
+            times, values = channel.unwrapped
+            is_meant = (times >= start) & (times <= end)
             if np.count_nonzero(is_meant) < 2:
                 continue
             stride = -(-np.count_nonzero(is_meant) // _MOST_SAMPLES)
-            values = unwrapped(channel).values
             yield {
                 "axis": n,
                 "quantity": channel.quantity.name,
                 "isPosition": not channel.quantity.is_velocity,
-                "times": _rounded(channel.time[is_meant][::stride] - start),
+                "times": _rounded(times[is_meant][::stride] - start),
                 "values": _rounded(values[is_meant][::stride]),
             }
             break

@@ -12,13 +12,13 @@ from rov_fmu.identify.result import Prediction
 from rov_fmu.io.groups import grouped
 from rov_fmu.report.plots.svg import LIGHT, draw_commands, name_axes
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.log import Channel, Log
-from rov_fmu.tank.quality import gaps, unwrapped
 from rov_fmu.vehicle.uncertainty import NORMAL
 
 MOST_SAMPLES = 400
 """More samples than this would not be visible."""
-_PANEL, _EDGES = 1.1, 1.4
+_PANEL, _EDGES = 1.1, 1.8
 """The height of a panel, and of the commands with the axis of time, inches."""
 _NARROW = 5.0
 """In a figure of at most this width, inches, the legend has a second row."""
@@ -40,8 +40,8 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
     groups = grouped(((p.quantity, p.span), p) for p in predictions).values()
     channels = _unpredicted(log, predictions) if log and measured else []
     commands = log.commands if log else None
-    heights = [1.0] * (len(groups) + len(channels)) + [0.6] * bool(commands)
-    panels = figure.subplots(len(heights), sharex=True, squeeze=False, height_ratios=heights)[:, 0]
+    count = len(groups) + len(channels) + bool(commands)
+    panels = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     for panel, own in zip(panels, groups, strict=False):
         for n, p in enumerate(own):
             _draw_prediction(panel, p, is_named=not n)
@@ -55,11 +55,11 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
         is_force = any(name.endswith("_ext") for name in values)
         named = {name if name == "command" or is_force else f"u_{name}": own for name, own in values.items()}
         draw_commands(panels[-1], time, named, "N, N.m" if is_force and _is_absolute(log) else "1")
+    panels[-1].set_xlabel("time (s)")
     if predictions:
         panels[-1].set_xlim(min(p.time[0] for p in predictions), max(p.time[-1] for p in predictions))
-    panels[-1].set_xlabel("time (s)")
-    columns = 4 if figure.get_figwidth() > _NARROW else 2
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
+        columns = 4 if figure.get_figwidth() > _NARROW else 2
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
 
 
 def _is_absolute(log: Log | None) -> bool:
@@ -76,10 +76,10 @@ def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:
 
 def _draw_channel(ax: Axes, channel: Channel) -> None:
     factor, unit = in_degrees(channel.quantity.unit)
-    time, values = unwrapped(channel).samples
+    time, values = channel.unwrapped
     some = slice(None, None, max(1, len(time) // (5 * MOST_SAMPLES)))
     time, values = time[some], factor * values[some]
-    breaks = np.searchsorted(time, [start for start, _ in gaps(channel.time, channel.values)], side="right")
+    breaks = np.searchsorted(time, [start for start, _ in gaps(*channel.samples)], side="right")
     ax.plot(np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan), color=LIGHT["orange"], label="measured")
     ax.margins(x=0.0, y=0.12)
     name_axes(ax, channel.quantity.name, unit)

@@ -41,6 +41,8 @@ KNOTS = 3600.0 / 1852.0
 """Knots in 1 m/s."""
 _IN_KNOTS: Any = partial(mul, KNOTS), partial(mul, 1.0 / KNOTS)
 """The functions from m/s to knots and back."""
+BROAD, NARROW = 7.2, 3.7
+"""The width of the large picture of a page, and of all other plots, inches. Text of plots of a width has one size."""
 _FONTS = "system-ui, sans-serif"
 STYLE: Any = {
     **rc_params_from_file(Path(__file__).with_name("plots.mplstyle"), use_default_template=False),
@@ -80,6 +82,15 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str =
     for role, color in LIGHT.items():
         svg = svg.replace(color, f"var(--{role})")
     return Markup(svg)
+
+
+def in_both_widths(plot: Callable[..., Markup], height: float) -> Markup:
+    """Return a picture twice, broad and for phones, of which the page shows one. `plot` draws it, given its size in
+    inches and a salt."""
+    sizes = {"broad": (BROAD, height), "narrow": (NARROW, height)}
+    return Markup("").join(
+        Markup('<div class="{}">{}</div>').format(key, plot(size=size, salt=key)) for key, size in sizes.items()
+    )
 
 
 def name_axes(ax: Axes, quantity: str, unit: str, x: str = "", *, gap: float = 0.0) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.io.messages import brief, did_you_mean, shown
+from rov_fmu.io.messages import RovError, brief, did_you_mean, shown
 
 TIME = "t"
 """The times of the communication points, in an expression."""
@@ -39,11 +39,11 @@ _VALUES = "_values"
 """The name that the values of variables and constants have in the code."""
 
 
-class ExpressionError(ValueError):
+class ExpressionError(RovError, ValueError):
     """A text is not an expression that a figure may have; the message is the reason."""
 
 
-class BeyondError(IndexError):
+class BeyondError(RovError, IndexError):
     """An array has no such index; `length` is its length."""
 
     def __init__(self, index: int, length: int) -> None:
@@ -194,6 +194,8 @@ class _Reader:
                 return _constant(value)
             case ast.Name(id=name):
                 return self._variable(name)
+            case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
+                return self._variable(f"{component}.{name}")
             case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
                 return self._variable(variable)
             case ast.Subscript(

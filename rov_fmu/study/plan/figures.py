@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from rov_fmu.equation.alone import RISE
-from rov_fmu.io.messages import brief, reason_of
+from rov_fmu.io.messages import RovError, brief, reason_of
 from rov_fmu.study.plan.expression import (
     BY_NAME,
     CONSTANTS,
@@ -28,7 +28,7 @@ _BAND = 0.05
 """The share of the whole change within which a response has settled."""
 
 
-class TimeError(ValueError):
+class TimeError(RovError, ValueError):
     """A call names a time that a run does not have."""
 
 
@@ -160,7 +160,7 @@ class Figures:
         return found, "; ".join(reasons)
 
 
-class _NoNumberError(Exception):
+class _NoNumberError(RovError):
     """The value of an expression is not one finite number; the text is the reason."""
 
 

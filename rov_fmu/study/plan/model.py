@@ -1,18 +1,25 @@
-"""The FMU that a study runs, and its variables."""
+"""The FMU or the vehicle that a study runs, and its variables."""
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from io import BytesIO
 from math import inf
 from pathlib import Path
 from typing import Any
 
+from rov_fmu.c.compile import LANES_FILE
+from rov_fmu.c.library import engine_sources
+from rov_fmu.fmu.variables import variables
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, did_you_mean, shown
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.prove.description import read_description
 from rov_fmu.prove.runs import NUMBERS
 from rov_fmu.prove.unpacking import unpack_fmu
+from rov_fmu.vehicle.vehicle import Vehicle
 
 TYPES = {
     2: {"Real": "f8", "Integer": "i4", "Enumeration": "i4", "Boolean": "i4"},
@@ -68,15 +75,23 @@ class Variable:
 
 @dataclass(frozen=True)
 class Model:
-    """An FMU for Co-Simulation."""
+    """An FMU for Co-Simulation, or a vehicle with the variables of its FMU."""
 
     name: str
     """The name of its file."""
     content: bytes
+    """The FMU; or of a vehicle, everything that its motion depends on."""
     version: int
     """The version of FMI, 2 or 3."""
     variables: Mapping[str, Variable]
     """The numeric variables, by name."""
+    vehicle: Vehicle | None = None
+    """The vehicle that the engine runs without an FMU."""
+
+    @cached_property
+    def digest(self) -> str:
+        """SHA-256 of the content."""
+        return sha256(self.content).hexdigest()
 
     def unpack(self, folder: Path) -> None:
         """Unpack the FMU into a folder. Raises FileError."""
@@ -95,9 +110,42 @@ def read_model(path: Path) -> Model:
     if description.coSimulation is None:
         raise FileError(f"{path}: is not for Co-Simulation")
     variables = {
-        v.name: _variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
+        v.name: variable(v) for v in description.modelVariables if v.type in TYPES[version] and not v.dimensions
     }
     return Model(path.name, content, version, variables)
+
+
+def vehicle_fmu(vehicle: Vehicle) -> Model:
+    """Build the FMU of a vehicle for this machine, and read it. Raises BuildError."""
+    from rov_fmu.build import build
+
+    with temporary_folder("fmu-") as folder:
+        return read_model(build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"]).path)
+
+
+def vehicle_model(vehicle: Vehicle) -> Model:
+    """Return a vehicle that runs in the engine, with the variables that its FMU of FMI 2.0 has.
+
+    A quaternion cannot be set, because the FMU computes the attitude at the start from the Euler angles.
+    """
+    has = {
+        v.name: Variable(
+            v.name,
+            v.value_reference,
+            "Real",
+            v.causality,
+            v.causality == "input" or v.initial == "exact",
+            v.variability == "continuous",
+            -inf if v.minimum is None else v.minimum,
+            inf if v.maximum is None else v.maximum,
+            v.unit,
+            v.start or 0.0,
+            v.description,
+        )
+        for v in variables(vehicle)
+    }
+    parts = [engine_sources(vehicle.layout, LANES_FILE), {name: vehicle[name] for name in vehicle.layout.coefficients}]
+    return Model(f"{vehicle.identifier}.fmu", json.dumps(parts).encode(), 2, has, vehicle)
 
 
 def unsettable(name: str, has: Mapping[str, Variable]) -> str:
@@ -112,7 +160,8 @@ def unknown(name: str, names: Mapping[str, object]) -> str:
     return f"the FMU has no variable {shown(name)} that is a number{did_you_mean(name, names, 3)}"
 
 
-def _variable(v: Any) -> Variable:
+def variable(v: Any) -> Variable:
+    """Return a variable of FMPy's."""
     can_be_set = v.causality == "input" or (v.variability != "constant" and v.initial in ("exact", "approx"))
     declared = v.declaredType
     low, high, unit = (getattr(v, key) or getattr(declared, key, None) for key in ("min", "max", "unit"))

@@ -18,6 +18,7 @@ from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     AS_TUPLE,
     NOT_BLANK,
+    Beside,
     Finite,
     Name,
     Strict,
@@ -28,6 +29,8 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.study.plan.figures import read_expression
 
+RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
+"""The columns that the results of every study have."""
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
@@ -170,19 +173,10 @@ class Signal(Strict):
             last = time, value
 
 
-def _beside(name: str, info: ValidationInfo) -> str:
-    inside(folder_of(info), name)
-    return name
-
-
-_Beside = Annotated[str, AfterValidator(_beside)]
-"""A file in the folder of the plan, or in a folder inside it."""
-
-
 class InputFile(Strict):
     """A CSV file with the column `time` (s) and one for each input."""
 
-    path: _Beside
+    path: Beside
     """A file in the folder of the plan, or in a folder inside it."""
     between: Literal["steps", "ramps"] = "ramps"
     """steps: a row is held until the next one; ramps: there are straight lines between the rows."""
@@ -221,14 +215,16 @@ def _expression(text: str) -> str:
 
 
 class Plan(Strict):
-    """A study: many runs of one FMU."""
+    """A study: many runs of one vehicle, of one FMU, or of one system of FMUs."""
 
     title: Name | None = None
     """The heading of the page."""
     fmu: Annotated[str, AfterValidator(_file)] | None = None
-    """An FMU for Co-Simulation in the folder of the plan. A plan has this or `vehicle`."""
-    vehicle: _Beside | None = None
-    """A vehicle file beside the plan, or the name of a vehicle that ships. Its FMU is built for this machine."""
+    """An FMU for Co-Simulation in the folder of the plan. A plan has this, `vehicle` or `system`."""
+    vehicle: Beside | None = None
+    """A vehicle file beside the plan, or the name of a vehicle that ships. It runs without an FMU."""
+    system: Annotated[str, AfterValidator(_file)] | None = None
+    """A system (SSP) in the folder of the plan. Its variables are "component.variable"."""
     start_time: Finite = 0.0
     """s."""
     stop_time: Finite
@@ -238,7 +234,7 @@ class Plan(Strict):
     tolerance: Positive | None = None
     """The relative tolerance, for an FMU whose solver uses one."""
     time_limit: Annotated[float, Field(gt=0.0, le=1e6)] = 300.0
-    """The time that a run may take, s; a run that takes longer fails."""
+    """The time that a run of an FMU may take, s; a run that takes longer fails."""
     runs: Annotated[int, Field(ge=1, le=_MOST_RUNS)] | None = None
     """The number of runs. A grid has one for each of its points. saltelli rounds it up to a multiple of (varied
     variables + 2), where correlated ones count as one."""
@@ -246,7 +242,7 @@ class Plan(Strict):
     """The parameters of a run depend only on this and on the run's number."""
     sampler: Literal["grid", "sobol", "latin-hypercube", "random", "saltelli"] = "sobol"
     """The method by which the values are drawn. Sobol indices need saltelli."""
-    vary_from: _Beside | None = None
+    vary_from: Beside | None = None
     """A vehicle file or name. Its coefficients vary with their errors and correlations, except for those in [vary] and
     [set]."""
     vary: dict[str, Varied] = Field({}, max_length=_MOST_NAMED)
@@ -306,7 +302,7 @@ class Plan(Strict):
         The number of runs is included only for a Latin hypercube. With other samplers, it does not change the values of
         a run.
         """
-        left_out = {"title", "fmu", "vehicle", "vary_from", "time_limit", "input_file"}
+        left_out = {"title", "fmu", "vehicle", "system", "vary_from", "time_limit", "input_file"}
         if self.sampler != "latin-hypercube":
             left_out.add("runs")
         mark = self.model_dump(mode="json", by_alias=True, exclude_none=True, exclude=left_out)
@@ -322,8 +318,9 @@ def load_plan(path: Path) -> Plan:
     """Read a plan. Contradictions between its keys are left to `prepare`. Raises PlanError."""
     check_suffix(path, PLAN, PlanError)
     plan = read_checked(path, PLAN, Plan, PlanError)
-    if (plan.fmu is None) == (plan.vehicle is None):
-        raise PlanError(*(f"{path}: {words}" for words in ("must have either fmu or vehicle", *check_plan(plan))))
+    if [plan.fmu, plan.vehicle, plan.system].count(None) != 2:
+        words = "must have one of fmu, vehicle and system"
+        raise PlanError(*(f"{path}: {line}" for line in (words, *check_plan(plan))))
     return plan
 
 

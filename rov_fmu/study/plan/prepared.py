@@ -9,22 +9,52 @@ from uuid import uuid4
 import numpy as np
 
 from rov_fmu.io.csv_table import read_series
-from rov_fmu.io.messages import FileError, did_you_mean, lines_on, shown
+from rov_fmu.io.messages import FileError, lines_on, shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.estimates import Estimates, some_of
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
 from rov_fmu.study.plan.figures import Array, meaning, read_expression, unusable
 from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
-from rov_fmu.study.plan.plan import Plan, PlanError, Signal, Varied, check_plan
+from rov_fmu.study.plan.plan import (
+    REASON,
+    RUN,
+    STATUS,
+    TIME,
+    Plan,
+    PlanError,
+    Signal,
+    Varied,
+    check_plan,
+)
 from rov_fmu.study.plan.sampling import Design
-from rov_fmu.study.run.simulator import Job
-from rov_fmu.study.run.worker import REASON, RUN, STATUS, TIME
-from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
+_MOST_DRAWN = 50_000_000
+"""The largest number of values in a Latin hypercube, which is drawn as a whole: they take 2 GB for some time."""
 _TRIALS = 8
 """The number of runs that are tried until one ends, to find out whether the FMU can be reset."""
+
+
+@dataclass(frozen=True)
+class Job:
+    """Everything that a worker must know about a study; it is sent to each worker once."""
+
+    key: str
+    """Distinguishes this study from others on the same workers."""
+    model: Model
+    plan: Plan
+    varied: Sequence[str]
+    """The variables that get other values in each run."""
+    inputs: Mapping[str, Array]
+    """The values that are set at the beginning of each step, by variable."""
+    recorded: Sequence[str]
+    """The variables that are read before the first step and after every step."""
+    angles: Sequence[str]
+    """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
+    trials: Array
+    """The values of the first runs, with which it is found out whether the FMU can be reset."""
 
 
 @dataclass(frozen=True)
@@ -82,14 +112,7 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
 
 def vehicle_file(key: str, given: str, path: Path) -> Path:
     """Return the vehicle file that a key names: one in the folder of the plan, or one that ships. Raises PlanError."""
-    beside = path.parent / given
-    if beside.is_file():
-        return beside
-    if given not in SHIPPED:
-        ships = ", ".join(SHIPPED)
-        reason = f"there is no such file beside the plan, and no vehicle of this name ships, only {ships}"
-        raise PlanError(f"{path}: {key_line(key, reason, given)}{did_you_mean(given, SHIPPED)}")
-    return SHIPPED[given]
+    return named_in(path, key, given, PlanError)
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal], Sequence[int]]:
@@ -132,8 +155,7 @@ def _check(
                 if reason := has[name].wrong(value):
                     yield key_line(key, reason, value)
                     break
-    if not (known or plan.vary or plan.vary_from) and plan.sampler != "grid":
-        yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+    yield from _check_size(plan, len({*known, *plan.vary}))
     for name, value in plan.set.items():
         if reason := unsettable(name, has) or has[name].wrong(value):
             yield key_line(f"set.{name}", reason, value)
@@ -142,6 +164,15 @@ def _check(
         if name not in has:
             yield key_line("keep.outputs", unknown(name, has))
     yield from _check_figures(plan, has, {*known, *plan.vary}, times)
+
+
+def _check_size(plan: Plan, varied: int) -> Iterator[str]:
+    """Yield a line if nothing varies, or if too much is drawn at once."""
+    if not (varied or plan.vary_from) and plan.sampler != "grid":
+        yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+    if plan.sampler == "latin-hypercube" and (plan.runs or 0) * varied > _MOST_DRAWN:
+        most = f"at most {_MOST_DRAWN // varied} runs with {varied} variables"
+        yield key_line("runs", f"a Latin hypercube is drawn as a whole, {most}", plan.runs)
 
 
 def _extremes(varied: Varied) -> Sequence[float]:

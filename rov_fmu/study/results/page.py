@@ -9,12 +9,11 @@ import pandas as pd
 
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.templates import inline_script, number, page
+from rov_fmu.study.plan.figure_units import unit_of
+from rov_fmu.study.plan.plan import REASON, STATUS
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
-from rov_fmu.study.run.worker import REASON, STATUS
 
-PAGE = "study.html"
-"""The mark of a page of a study, by which an existing file is recognised."""
 _POINTS = 400
 """The number of points of a band that are drawn; more would not be visible."""
 _NUMBERS = 6
@@ -26,6 +25,8 @@ _ROWS = 60
 _FEW = 16
 """With fewer blocks, even the intervals of Sobol indices are unreliable. With 2 blocks, the interval of a true index of
 0.5 was 0.6 to 1.1."""
+_FEW_FIGURES = 4
+"""The number of figures at the head of the page; the table has all of them."""
 _SURE = 0.1
 """An interval with a smaller half width is narrow enough to show that an index is small."""
 _CONSTANT = 1e-6
@@ -58,6 +59,7 @@ def study_page(results: Results) -> str:
         ],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         few=_FEW,
+        few_figures=_FEW_FIGURES,
         bands=[_band(results, name) for name in outputs],
         script=inline_script("plots.js"),
         correlated=[group for group in results.groups if len(group) > 1],
@@ -81,16 +83,25 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     quantiles, mean, sd = statistics(there, QUANTILES)
     is_still = bool(there.size) and _is_constant(there)
     expression = results.plan["figures"][name]
-    found = {"name": name, "expression": expression, "runs": there.size, "is_still": is_still, "plot": None}
+    unit = unit_of(expression, results.units)
+    found = {
+        "name": name,
+        "expression": expression,
+        "unit": unit,
+        "runs": there.size,
+        "is_still": is_still,
+        "plot": None,
+    }
     if there.size and not is_still:
         if grid:
-            draw = partial(draw_lines, name=name, results=results, grid=grid)
+            draw = partial(draw_lines, name=name, unit=unit, results=results, grid=grid)
             label = f"{name} over {' and '.join(grid)}"
         else:
-            draw = partial(draw_distribution, values=there, quantiles=quantiles)
+            draw = partial(draw_distribution, values=there, quantiles=quantiles, unit=unit)
             label = f"Distribution of {name}"
         found["plot"] = plot(label, draw, name, expression)
-    return {**found, "quantiles": quantiles, "mean": mean, "sd": sd}
+    ends = (float(there.min()), float(there.max())) if there.size else None
+    return {**found, "quantiles": quantiles, "mean": mean, "sd": sd, "ends": ends}
 
 
 def _is_constant(values: Any) -> bool:

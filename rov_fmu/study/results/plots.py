@@ -37,7 +37,7 @@ def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEI
     return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
 
 
-def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> None:
+def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit: str = "") -> None:
     """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
     ax = figure.subplots()
     low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
@@ -47,11 +47,11 @@ def draw_distribution(figure: Figure, values: Any, quantiles: list[float]) -> No
     _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
     bars.set_label("share")  # type: ignore[union-attr]
     ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(ylabel="runs (%)")
+    ax.set(xlabel=with_unit("", unit), ylabel="runs (%)")
     _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
 
 
-def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str]) -> None:
+def draw_lines(figure: Figure, name: str, unit: str, results: Results, grid: Sequence[str]) -> None:
     """Draw a figure over the variable with more values, with a line for some values of the other one."""
     ax = figure.subplots()
     along, *others = grid
@@ -66,7 +66,7 @@ def draw_lines(figure: Figure, name: str, results: Results, grid: Sequence[str])
     for other in others:
         title = with_unit(other, results.units[other])
         figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    ax.set_xlabel(with_unit(along, results.units[along]))
+    ax.set(xlabel=with_unit(along, results.units[along]), ylabel=with_unit("", unit))
     _set_ticks(ax)
 
 

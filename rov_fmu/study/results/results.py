@@ -11,12 +11,12 @@ import pandas as pd
 import pyarrow.dataset as ds
 
 from rov_fmu.io.messages import FileError, shown
+from rov_fmu.study.plan.plan import RUN, STATUS, TIME
 from rov_fmu.study.results.store import RUNS, TRAJECTORIES, Store
-from rov_fmu.study.run.child import FAILED, INCOMPLETE
-from rov_fmu.study.run.worker import RUN, STATUS, TIME
+from rov_fmu.study.run.run import FAILED, INCOMPLETE
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
-_AT_ONCE = 20_000_000
+_AT_ONCE = 5_000_000
 """The number of trajectory values in memory at a time."""
 
 

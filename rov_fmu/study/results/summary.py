@@ -4,9 +4,9 @@ import numpy as np
 
 from rov_fmu.report.console import console, paragraph, print_table, shell_words, table, text
 from rov_fmu.report.progress import per_second
+from rov_fmu.study.plan.plan import REASON
 from rov_fmu.study.results.results import Results, statistics
-from rov_fmu.study.run.cluster import Spent
-from rov_fmu.study.run.worker import REASON
+from rov_fmu.study.run.work import Spent
 
 _SHOWN = (0.05, 0.5, 0.95)
 _FAILURES = 5

@@ -1,38 +1,23 @@
 """Runs in a child process: when the FMU ends the process, or does not return, only that run fails."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import fmpy
 import numpy as np
-import numpy.typing as npt
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.prove.description import budget
 from rov_fmu.prove.runs import Array, RunError
-from rov_fmu.study.plan.figures import Figures
-from rov_fmu.study.run.simulator import Job, LoadError, Simulator
+from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.plan.system_model import SystemModel
+from rov_fmu.study.run.run import Evaluation, LoadError, Run, failed_run
+from rov_fmu.study.run.simulator import Simulator
+from rov_fmu.study.run.system_simulator import SystemSimulator
 
-DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
-"""The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
 _MANY = 10.0
 """The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""
-
-
-@dataclass(frozen=True)
-class Run:
-    """What a run gave."""
-
-    status: str
-    reason: str
-    """Why a figure is missing, or why the run did not end; otherwise empty."""
-    figures: Sequence[float]
-    kept: Sequence[npt.NDArray[Any]] = ()
-    """The values of each kept output, if the run ended."""
-    turned: bool = False
-    """True if the vehicle turned over: it rolled or pitched by more than 90 degrees."""
 
 
 class Child:
@@ -51,7 +36,7 @@ class Child:
         except ChildError as error:
             if len(rows) > 1:
                 return [run for n in range(len(rows)) for run in self.runs(rows[n : n + 1])]
-            return [_failed(self._job, f"the FMU {_predicate(error, limit)}")]
+            return [failed_run(self._job, f"the FMU {_predicate(error, limit)}")]
         return found
 
     def close(self) -> None:
@@ -60,7 +45,12 @@ class Child:
             self._process.close()
 
     def _can_be_reset(self) -> bool:
-        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends."""
+        """True if a run after a reset is bit-identical to one of a new instance, in the first trial that ends.
+
+        A system gets new instances for each run.
+        """
+        if isinstance(self._job.model, SystemModel):
+            return False
         for values in self._job.trials:
             try:
                 return bool(self._call("can_be_reset", values, self._job.trials[-1], time=self._job.plan.time_limit))
@@ -90,17 +80,17 @@ def _predicate(error: ChildError, limit: float) -> str:
     return f"did not return within time_limit = {limit:g} s" if exceeds_time else str(error)
 
 
-def _failed(job: Job, reason: str) -> Run:
-    return Run(FAILED, reason, [np.nan] * len(job.plan.figures))
-
-
 class _Runner:
     """The object in the child process: an instance of the FMU, and the figures."""
 
     def __init__(self, folder: str, job: Job) -> None:
         self._job = job
-        self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
-        self._figures = Figures(job.plan.figures, job.plan.times)
+        self._simulator: Simulator | SystemSimulator
+        if isinstance(job.model, SystemModel):
+            self._simulator = SystemSimulator(folder, job, job.model)
+        else:
+            self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+        self._evaluation = Evaluation(job)
 
     def can_be_reset(self, values: Array, others: Array) -> bool:
         """Repeat a run in the same instance, after a run with other values, and compare it. Raises RunError."""
@@ -114,20 +104,16 @@ class _Runner:
 
     def runs(self, rows: Array, resets: bool) -> list[Run]:
         """Run once with each row of values."""
-        plan = self._job.plan
-        points = np.array(plan.kept_points, int)
-        return [self._run(values, points, resets) for values in rows.tolist()]
+        return [self._run(values, resets) for values in rows.tolist()]
 
-    def _run(self, values: Sequence[float], points: npt.NDArray[Any], resets: bool) -> Run:
+    def _run(self, values: Sequence[float], resets: bool) -> Run:
         try:
-            run = self._simulator.run(values)
+            outputs = self._simulator.run(values)
         except RunError as error:
-            return _failed(self._job, str(error))
-        figures, reason = self._figures.of({**dict(zip(self._job.varied, values, strict=True)), **run})
-        kept = [run[name][points] for name in self._job.plan.kept]
-        turned = any(np.any(np.abs(run[name]) > 0.5 * np.pi) for name in self._job.angles)
+            return failed_run(self._job, str(error))
+        run = self._evaluation.run(values, outputs)
         if resets:
             self._simulator.reset()
         else:
             self._simulator.renew()
-        return Run(INCOMPLETE if reason else DONE, reason, figures, kept, turned)
+        return run

@@ -3,14 +3,12 @@
 import asyncio
 import logging
 import sys
-from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 from math import ceil
 from pathlib import Path
-from threading import Event, Thread
 from time import perf_counter
 from typing import Any
 
@@ -22,10 +20,10 @@ from distributed.utils import silence_logging_cmgr
 from rov_fmu.io.interrupts import ctrl_c_withheld, temporary_folder
 from rov_fmu.io.messages import FileError, StudyError, brief, reason_of
 from rov_fmu.io.output import WriteError
-from rov_fmu.study.plan.sampling import Design
-from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.simulator import Job, LoadError
-from rov_fmu.study.run.worker import Delivery, Part, do_runs
+from rov_fmu.study.run.rows import Rows
+from rov_fmu.study.run.run import LoadError
+from rov_fmu.study.run.work import Work
+from rov_fmu.study.run.worker import Delivery, do_runs
 
 _TASK = 1.0
 """The seconds that a task should take."""
@@ -36,54 +34,16 @@ _AHEAD = 3
 _GONE = (CancelledError, CommClosedError)
 """Exceptions of Dask when the scheduler is gone."""
 _GUARD = 'a script calls study under `if __name__ == "__main__":`, for each worker begins by importing it'
-_WATCH = 2.0
-"""The seconds after which it is asked again whether workers are there."""
 _WAIT = 10.0
-"""The seconds within which a scheduler or a worker must answer."""
+"""The seconds within which a scheduler must answer."""
 
 
-@dataclass(frozen=True)
-class Progress:
-    """The progress of a study."""
+def do_on_cluster(work: Work, workers: int | None, scheduler: str | None) -> None:
+    """Do all missing runs, on so many workers of this machine or on those of a scheduler.
 
-    done: int
-    """The number of runs that are done, including those of earlier calls."""
-    total: int
-    failed: int
-    """The number of runs that failed in this call."""
-    dashboard: str
-    """The address of Dask's page about its workers, or an empty text."""
-    has_workers: bool = True
-    """False while no worker is there, so that nothing is done."""
-
-
-@dataclass
-class Spent:
-    """The runs that one call did, and the time that it took."""
-
-    runs: int = 0
-    failed: int = 0
-    turned: int = 0
-    """The number of these runs in which the vehicle turned over."""
-    started: float = 0.0
-    """The seconds until the workers had started."""
-    elapsed: float = 0.0
-    """The seconds from then until the last run was done."""
-
-
-def execute(
-    job: Job,
-    design: Design,
-    store: Store,
-    workers: int | None,
-    scheduler: str | None,
-    on_progress: Callable[[Progress], None],
-) -> Spent:
-    """Do the runs that are missing in the store. Raises FileError, StudyError, WriteError, and KeyboardInterrupt."""
-    spent, begin = Spent(), perf_counter()
-    missing = deque(store.missing(design.runs))
-    if not missing:
-        return spent
+    Raises FileError, LoadError, StudyError, WriteError, and KeyboardInterrupt.
+    """
+    job, spent, begin = work.job, work.spent, perf_counter()
     with _client(workers, scheduler) as client:
         try:
             client.register_plugin(Delivery(job, own_cluster=scheduler is None))
@@ -92,9 +52,11 @@ def execute(
             raise StudyError(f"{needs}: {brief(reason_of(error))}") from error
         spent.started = perf_counter() - begin
         begin += spent.started
+        work.dashboard = client.dashboard_link or ""
         try:
-            _Runs(client, job, design, store, missing, spent, on_progress).do()
-        except (FileError, StudyError, WriteError):
+            with work.watched(lambda: len(client.nthreads())):
+                _Tasks(client, work).do()
+        except (FileError, LoadError, StudyError, WriteError):
             raise
         except Exception as error:  # a client that has lost its scheduler raises various exceptions
             if isinstance(error, _GONE) or client.status != "running":
@@ -105,20 +67,14 @@ def execute(
             if scheduler is not None:
                 with suppress(Exception):  # that scheduler may be gone
                     client.unregister_worker_plugin(job.key)
-    return spent
 
 
 @dataclass
-class _Runs:
+class _Tasks:
     """Gives the missing runs to the workers and writes their rows."""
 
     client: Client
-    job: Job
-    design: Design
-    store: Store
-    missing: deque[tuple[int, int]]
-    spent: Spent
-    on_progress: Callable[[Progress], None]
+    work: Work
     seconds: float = _TASK
     """The time of a run, by the last task; the first tasks have one run each."""
     futures: dict[Any, tuple[int, int]] = field(default_factory=dict)
@@ -126,35 +82,28 @@ class _Runs:
 
     def do(self) -> None:
         """Do all missing runs."""
-        self.done_before = self.design.runs - sum(end - first for first, end in self.missing)
-        self._report()
-        coming, ended = as_completed(loop=self.client.loop), Event()
-        Thread(target=self._watch, args=(ended,), daemon=True).start()
+        coming = as_completed(loop=self.client.loop)
         try:
-            self._submit_tasks(coming)
+            self._submit(coming)
             for future in coming:
                 self._take(future)
                 del future  # otherwise its rows stay in memory
-                self._submit_tasks(coming)
+                self._submit(coming)
         finally:
-            ended.set()
             with suppress(Exception):  # a client that is closed raises
                 self.client.cancel(list(self.futures), force=True)
 
-    def _submit_tasks(self, coming: Any) -> None:
+    def _submit(self, coming: Any) -> None:
         """Submit tasks until every thread has enough."""
+        work = self.work
         try:
             threads = sum(self.client.nthreads().values()) or 1
         except OSError as error:
             raise CommClosedError("no answer") from error
-        while self.missing and len(self.futures) < _AHEAD * threads:
-            first, end = self.missing.popleft()
-            remaining = sum(b - a for a, b in self.missing) + end - first
-            size = max(min(ceil(_TASK / self.seconds), ceil(remaining / threads)), ceil(_LEAST / self.seconds))
-            if end - first > size:
-                self.missing.appendleft((first + size, end))
-                end = first + size
-            future = self.client.submit(do_runs, self.job.key, first, self.design.rows(first, end), pure=False)
+        while work.missing and len(self.futures) < _AHEAD * threads:
+            size = max(min(ceil(_TASK / self.seconds), ceil(work.left / threads)), ceil(_LEAST / self.seconds))
+            first, end = work.take(size)
+            future = self.client.submit(do_runs, work.job.key, first, work.design.rows(first, end), pure=False)
             self.futures[future] = first, end
             coming.add(future)
 
@@ -162,30 +111,13 @@ class _Runs:
         """Write the rows of a task. Dask itself repeats a task whose worker died."""
         first, end = self.futures.pop(future)
         try:
-            part: Part = future.result()
-        except LoadError as error:
-            raise FileError(f"{self.job.model.name}: cannot be run: {error}") from error
-        except _GONE:
+            rows: Rows = future.result()
+        except (LoadError, *_GONE):
             raise
         except Exception as error:  # the cluster raises various exceptions
             raise StudyError(f"the workers are lost: {brief(reason_of(error))}") from error
-        self.store.write(first, end, part.runs, part.trajectories)
-        self.spent.runs += end - first
-        self.spent.failed += part.failed
-        self.spent.turned += part.turned
-        self.seconds = max(part.seconds / (end - first), 1e-6)
-        self._report()
-
-    def _watch(self, ended: Event) -> None:
-        """Report again and again while no worker is there, until the runs end."""
-        with suppress(Exception):  # a client that is closed, or has lost its scheduler, raises
-            while not ended.wait(_WATCH):
-                if not self.client.nthreads() and not ended.is_set():
-                    self._report(has_workers=False)
-
-    def _report(self, *, has_workers: bool = True) -> None:
-        done, link = self.done_before + self.spent.runs, self.client.dashboard_link or ""
-        self.on_progress(Progress(done, self.design.runs, self.spent.failed, link, has_workers))
+        self.work.write(first, end, rows)
+        self.seconds = max(rows.seconds / (end - first), 1e-6)
 
 
 @contextmanager
@@ -194,10 +126,6 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Client]:
     if scheduler is not None:
         _check_scheduler(scheduler)
         with silence_logging_cmgr(logging.CRITICAL), Client(scheduler, timeout=_WAIT, set_as_default=False) as client:
-            try:
-                client.wait_for_workers(1, timeout=_WAIT)
-            except TimeoutError:
-                raise FileError(f"--scheduler {scheduler}: it has no workers") from None
             yield client
         return
     settings = {

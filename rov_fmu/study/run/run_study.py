@@ -2,21 +2,25 @@
 
 import sys
 from collections.abc import Callable
-from hashlib import sha256
 from multiprocessing import current_process
 from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
 
-from rov_fmu.build import build
-from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.output import Output, write_whole
-from rov_fmu.io.reading import read_bytes
-from rov_fmu.study.plan.model import Model, read_model
+from rov_fmu.io.messages import FileError
+from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, load_plan
-from rov_fmu.study.plan.prepared import prepare, vehicle_file
-from rov_fmu.study.results.results import Results
-from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.cluster import Progress, Spent, execute
+from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
+from rov_fmu.study.plan.system_model import read_system
+from rov_fmu.study.results.store import RUNS, Part, Store
+from rov_fmu.study.run.lanes import do_in_lanes
+from rov_fmu.study.run.run import LoadError
+from rov_fmu.study.run.work import Progress, Spent, Work
 from rov_fmu.vehicle.vehicle import load_vehicle
+
+if TYPE_CHECKING:
+    from rov_fmu.study.results.results import Results
+
+Engine = Literal["lanes", "fmu"]
 
 
 def study(
@@ -25,26 +29,44 @@ def study(
     *,
     workers: int | None = None,
     scheduler: str | None = None,
+    engine: Engine | None = None,
+    part: tuple[int, int] | None = None,
+    merge: bool = False,
     on_progress: Callable[[Progress], None] = lambda _: None,
-) -> Results:
+) -> "Results":
     """Do the missing runs of a study, and open its results.
 
     - `plan`, `folder`: the plan (TOML), and the folder of the results, which the same call continues.
-    - `workers`: the number of processes on this machine, by default the number of cores.
+    - `workers`: the number of processes on this machine, or of threads for a vehicle; by default the number of cores.
     - `scheduler`: the address of a Dask scheduler that is used instead.
+    - `engine`: "lanes" for a vehicle in this process, the default for a plan with `vehicle` and no scheduler; "fmu" for
+      its FMU on Dask workers. The rows are equal within rounding.
+    - `part`: (3, 64) for the third of 64 parts, whose results are in `folder`/parts/3-of-64.
+    - `merge`: True to do no run, and move those of all parts into `folder`.
     - `on_progress`: called with the state of the runs.
 
-        study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
+        rov_fmu.run_study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
 
-    Worker processes import the calling script, so a script must call this below `if __name__ == "__main__":`.
+    Dask's workers import the calling script, so a script must call this below `if __name__ == "__main__":`.
 
-    Raises FileError with a line for each reason, BuildError if the FMU of a vehicle cannot be built, StudyError if the
-    workers are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.
+    Raises FileError with a line for each reason, BuildError if a vehicle cannot be compiled, StudyError if the workers
+    are lost, WriteError, and KeyboardInterrupt. Finished runs are kept, and the same call continues from there.
     """
     if getattr(current_process(), "_inheriting", False):
         sys.exit(1)  # a worker imports a script without that line; its parent prints the message
-    _, results = run_study(Path(plan), Path(folder), workers, scheduler, on_progress)
-    return results
+    from rov_fmu.study.results.results import Results
+
+    _, store = run_study(
+        Path(plan),
+        Path(folder),
+        workers,
+        scheduler,
+        on_progress,
+        engine=engine,
+        part=part and Part(*part),
+        merge=merge,
+    )
+    return Results(store.folder)
 
 
 def run_study(
@@ -52,54 +74,82 @@ def run_study(
     folder: Path,
     workers: int | None,
     scheduler: str | None,
-    on_progress: Callable[[Progress], None],
+    on_progress: Callable[[Progress], None] = lambda _: None,
     on_warning: Callable[[str], None] = lambda _: None,
     *,
+    engine: Engine | None = None,
+    part: Part | None = None,
+    merge: bool = False,
     force: bool = False,
-) -> tuple[Spent, Results]:
-    """Do the missing runs; return their times and the results. `on_warning` is called with each warning.
+) -> tuple[Spent, Store]:
+    """Do the missing runs, or merge parts; return the times, and the folder of the results.
 
-    `force` allows replacing the work of others that has the name of a file of the results.
+    `on_warning` is called with each warning. `force` allows replacing the work of others that has the name of a file of
+    the results.
     """
     plan = load_plan(path)
-    store = Store(folder, force=force)
-    model = _model(plan, path)
+    engine = engine or ("lanes" if plan.vehicle and scheduler is None else "fmu")
+    model = _model(plan, path, engine)
     prepared = prepare(plan, path, model)
     for warning in prepared.warnings:
         on_warning(warning)
+    whole, runs = Store(folder, force=force), prepared.design.runs
+    store = part.store(folder, force=force) if part else whole
+    if part and (folder / RUNS).is_dir() and whole.done():
+        raise FileError(f"{folder}: has runs that are no parts: choose another folder, or leave --part out")
+    description = _description(plan, prepared, model, engine)
     with store.held():
-        job, design = prepared.job, prepared.design
-        named = [model.variables[name] for name in (*design.names, *job.recorded)]
-        store.belongs_to(
-            prepared.mark,
-            sha256(model.content).hexdigest(),
-            plan.vehicle,
-            design.runs,
-            columns={"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
-            points=len(plan.kept_points),
-            model=model.name,
-            title=plan.title,
-            units={variable.name: variable.unit for variable in named},
-            descriptions={variable.name: variable.description for variable in named},
-            groups=design.groups,
-            warnings=prepared.warnings,
-        )
-        if plan.vehicle:
-            fmu = Output(folder / model.name, model.content)
-            write_whole(fmu, force=force, is_ours=lambda there: read_bytes(there) == fmu.content)
-        spent = execute(job, design, store, workers, scheduler, on_progress)
-        if spent.turned:
-            count = f"in {spent.turned} of {spent.runs} runs"
-            on_warning(f"{count} the vehicle turned over: phi or theta passed 90 degrees")
-        return spent, Results(folder)
+        if merge:
+            store.merge(description)
+            return Spent(), store
+        store.describe(description)
+        work = Work(prepared.job, prepared.design, store, *(part.runs(runs) if part else (0, runs)), on_progress)
+        try:
+            if not work.missing:
+                pass
+            elif model.vehicle:
+                do_in_lanes(work, model.vehicle, workers)
+            else:
+                from rov_fmu.study.run.cluster import do_on_cluster
+
+                do_on_cluster(work, workers, scheduler)
+        except LoadError as error:
+            raise FileError(f"{model.name}: cannot be run: {error}") from error
+    if work.spent.turned:
+        count = f"in {work.spent.turned} of {work.spent.runs} runs"
+        on_warning(f"{count} the vehicle turned over: phi or theta passed 90 degrees")
+    return work.spent, store
 
 
-def _model(plan: Plan, path: Path) -> Model:
-    """Read the FMU that the plan names, or build that of its vehicle."""
+def _description(plan: Plan, prepared: Prepared, model: Model, engine: Engine) -> dict[str, Any]:
+    """Return the description of the study in its results, as JSON values."""
+    job, design = prepared.job, prepared.design
+    named = [model.variables[name] for name in (*design.names, *job.recorded)]
+    return {
+        "runs": design.runs,
+        "plan": dict(prepared.mark),
+        "fmu": model.digest,
+        "engine": engine,
+        "vehicle": plan.vehicle,
+        "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
+        "points": len(plan.kept_points),
+        "model": model.name,
+        "title": plan.title,
+        "units": {variable.name: variable.unit for variable in named},
+        "descriptions": {variable.name: variable.description for variable in named},
+        "groups": design.groups,
+        "warnings": prepared.warnings,
+    }
+
+
+def _model(plan: Plan, path: Path, engine: Engine) -> Model:
+    """Read the FMU or the system that the plan names, or the vehicle, whose FMU is built if the engine is "fmu"."""
+    if engine == "lanes" and not plan.vehicle:
+        raise FileError(f"{path}: --engine lanes: the plan must have `vehicle`, which runs without an FMU")
     if plan.fmu:
         return read_model(path.parent / plan.fmu)
+    if plan.system:
+        return read_system(path.parent / plan.system)
     assert plan.vehicle
     vehicle = load_vehicle(vehicle_file("vehicle", plan.vehicle, path))
-    with temporary_folder("fmu-") as folder:
-        built = build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"])
-        return read_model(built.path)
+    return vehicle_model(vehicle) if engine == "lanes" else vehicle_fmu(vehicle)

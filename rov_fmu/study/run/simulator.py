@@ -14,37 +14,14 @@ import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
 from fmpy.simulation import instantiate_fmu
 
-from rov_fmu.io.messages import brief, reason_of
+from rov_fmu.io.messages import RovError, brief, reason_of
 from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
-from rov_fmu.study.plan.model import TYPES, Model, Variable
-from rov_fmu.study.plan.plan import Plan
+from rov_fmu.study.plan.model import TYPES, Variable
+from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.run.run import LoadError
 
 _Call = Callable[..., int]
 """A function of the FMU, which returns a status."""
-
-
-class LoadError(Exception):
-    """The FMU cannot be instantiated on this machine."""
-
-
-@dataclass(frozen=True)
-class Job:
-    """Everything that a worker must know about a study; it is sent to each worker once."""
-
-    key: str
-    """Distinguishes this study from others on the same workers."""
-    model: Model
-    plan: Plan
-    varied: Sequence[str]
-    """The variables that get other values in each run."""
-    inputs: Mapping[str, Array]
-    """The values that are set at the beginning of each step, by variable."""
-    recorded: Sequence[str]
-    """The variables that are read before the first step and after every step."""
-    angles: Sequence[str]
-    """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
-    trials: Array
-    """The values of the first runs, with which it is found out whether the FMU can be reset."""
 
 
 @dataclass(frozen=True)
@@ -207,7 +184,7 @@ def _loading() -> Iterator[None]:
         os.chdir(here)
 
 
-class _FailedError(Exception):
+class _FailedError(RovError):
     """A call of the FMU failed."""
 
 

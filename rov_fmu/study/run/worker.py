@@ -1,42 +1,22 @@
 """The work of a Dask worker: it unpacks the FMU, and returns the rows of many runs, done in a child process."""
 
-import io
 import shutil
 import signal
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from threading import current_thread, main_thread
 from time import perf_counter
 
-import numpy as np
-import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
-import pyarrow as pa
-import pyarrow.parquet as pq
 from distributed import Worker
 from distributed.diagnostics.plugin import WorkerPlugin
 
-from rov_fmu.prove.runs import Array
-from rov_fmu.study.run.child import FAILED, Child, Run
-from rov_fmu.study.run.simulator import Job
-
-RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
-"""The columns that every study has."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """The rows of consecutive runs, as Parquet files."""
-
-    runs: bytes
-    trajectories: bytes | None
-    failed: int
-    turned: int
-    """The number of runs in which the vehicle turned over."""
-    seconds: float
-    """The time that the runs took."""
+from rov_fmu.study.plan.figures import Array
+from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.run.child import Child
+from rov_fmu.study.run.rows import Rows, rows_of
 
 
 class _Pool:
@@ -85,48 +65,11 @@ class Delivery(WorkerPlugin):
             pool.close()
 
 
-def do_runs(key: str, first: int, rows: Array) -> Part:
+def do_runs(key: str, first: int, values: Array) -> Rows:
     """Do the runs from number `first` on, one for each row of values. Raises LoadError."""
     pool = _POOLS[key]
     with pool.lent() as child:
         began = perf_counter()
-        found = child.runs(rows)
+        found = child.runs(values)
         seconds = perf_counter() - began
-    trajectories = _trajectories(pool.job, first, found) if pool.job.plan.kept else None
-    failed, turned = sum(run.status == FAILED for run in found), sum(run.turned for run in found)
-    return Part(_runs(pool.job, first, rows, found), trajectories, failed, turned, seconds)
-
-
-def _runs(job: Job, first: int, rows: Array, found: Sequence[Run]) -> bytes:
-    """Return the table with one row for each run.
-
-    Missing figures are null, because DuckDB and Polars skip it in a median but treat NaN as a large number.
-    """
-    figures = np.array([run.figures for run in found], float).T
-    columns = [
-        np.arange(first, first + len(rows)),
-        *rows.T,
-        *(pa.array(column, mask=np.isnan(column)) for column in figures),
-        [run.status for run in found],
-        [run.reason or None for run in found],
-    ]
-    numbers = [(name, pa.float64()) for name in (*job.varied, *job.plan.figures)]
-    schema = pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
-    return _parquet(pa.table([pa.array(column) for column in columns], schema=schema))
-
-
-def _trajectories(job: Job, first: int, found: Sequence[Run]) -> bytes:
-    """Return the table with a row for each kept time of each run that ended."""
-    times = job.plan.times[np.array(job.plan.kept_points, int)]
-    ended = [n for n, run in enumerate(found) if run.status != FAILED]
-    table = {RUN: np.repeat(np.array(ended, int) + first, len(times)), TIME: np.tile(times, len(ended))}
-    for index, name in enumerate(job.plan.kept):
-        none = np.empty(0, job.model.variables[name].dtype(job.model.version))
-        table[name] = np.concatenate([none, *(found[n].kept[index] for n in ended)])
-    return _parquet(pa.table(table))
-
-
-def _parquet(table: pa.Table) -> bytes:
-    file = io.BytesIO()
-    pq.write_table(table, file, compression="zstd")
-    return file.getvalue()
+    return rows_of(pool.job, first, values, found, seconds)

@@ -5,16 +5,19 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
 from pathlib import Path
+from typing import Any
 
 import tomlkit
 from tomlkit.items import AbstractTable, AoT, InlineTable, Table
 
 from rov_fmu.equation.catalogue import ARM, AXES, BODY, EXTERNAL
+from rov_fmu.equation.parts import SourcedVector
 from rov_fmu.io.messages import brief, first_of, listed, one_line
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection
+from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, RADIUS, Moved
 from rov_fmu.tank.readers.ardusub_frames import config_of, fitting_frames
 from rov_fmu.tank.readers.parsers import format_of
 from rov_fmu.vehicle.description import why_no_identifier
@@ -23,6 +26,23 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 
 _HARDWARE = ("base", "body", "arm", "curves", "thruster", "axes", "known", "against")
 """The tables and keys of a draft that describe the vehicle. A rov.toml that has a vehicle needs none of them."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """What nobody has told of a vehicle, but logs and its mass let guess."""
+
+    moved: Moved = NOTHING_MOVED
+    mass: float | None = None
+    """m_rov, kg, where rov.toml tells it."""
+
+    @property
+    def inertia(self) -> str:
+        """The moment of inertia about the vertical axis in words, kg m²; empty without a mass."""
+        return f"{self.mass * RADIUS**2:.2g}" if self.mass else ""
+
+
+NO_GUESS = Guess()
 
 
 @dataclass(frozen=True)
@@ -55,11 +75,18 @@ def likely_vehicle(inspections: Sequence[Inspection], curves: Collection[str]) -
 
 
 def draft(
-    name: str, inspections: Sequence[Inspection], tables: TableHeaders, likely: LikelyVehicle, *, asks: bool = True
+    name: str,
+    inspections: Sequence[Inspection],
+    tables: TableHeaders,
+    likely: LikelyVehicle,
+    guess: Guess = NO_GUESS,
+    *,
+    asks: bool = True,
 ) -> str:
     """Return a draft of rov.toml, with `"?"` for what an owner has to decide.
 
-    It asks nothing if `asks` is false. It is a complete rov.toml then if a vehicle that ships has such thrusters.
+    It asks nothing if `asks` is false. It is a complete rov.toml then if a vehicle that ships has such thrusters. It
+    marks what is a guess.
     """
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     vehicle = load_vehicle(SHIPPED[likely.base]) if likely.base else None
@@ -78,7 +105,12 @@ def draft(
         name=name,
         identifier=f"rov_{word}".rstrip("_") if why_no_identifier(word) else word,
         curves=tables.curves or ["all"],
+        measured=tables.curves,
+        guesses=guess.moved.thrusters,
+        inertia=guess.inertia,
+        vector=_vector,
         axes=AXES.values(),
+        undriven=guess.moved.undriven,
         signals={row.name for one in inspections for row in one.channels},
         body=[*BODY, *ARM],
         vehicle=vehicle,
@@ -92,11 +124,13 @@ def draft(
 def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     """Return the tables and keys of a draft that a rov.toml lacks, as TOML. Both texts must be TOML.
 
-    Where the file has the vehicle of the logs, nothing is added to one with a base, and only the mass to one with
-    thrusters, so that what a user has described stays as it is.
+    A value with a `"?"` is lacking if the draft has one without. Where the file has the vehicle of the logs, nothing
+    else is added to one with a base, and only the mass and the axes to one with thrusters, so that what a user has
+    described stays as it is.
     """
     document, more = tomlkit.parse(own).unwrap(), tomlkit.parse(draft)
-    has_vehicle = has_vehicle or not {"base", "thruster"}.isdisjoint(document)  # it may have mistakes
+    is_undecided = is_open(document.get("base"))
+    has_vehicle = has_vehicle or "thruster" in document or ("base" in document and not is_undecided)
     tables = {name: value for name, value in document.items() if isinstance(value, dict)}
     body = {"m_rov", *(["I_r"] if "yaw" in tables.get("axes", {}) else [])} if "thruster" in document else {*()}
     body -= {*tables.get("body", {}), *tables.get("known", {})}
@@ -104,15 +138,24 @@ def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     files = [name for names in dives if isinstance(names, list) for name in names]
     told = tomlkit.document()
     for name, table in more.items():
-        if has_vehicle and name in _HARDWARE and name != "body":
+        if isinstance(table, AoT) and name in document:
+            if thrusters := _lacking_thrusters(document[name], table):
+                told.add(name, thrusters)
             continue
         if not isinstance(table, AbstractTable) or not isinstance(document.get(name, {}), dict):
-            if name not in document:
+            is_missing = name not in document and not (has_vehicle and name in _HARDWARE)
+            if is_missing or (not isinstance(table, AbstractTable) and _is_told(document.get(name), table)):
                 told.add(name, table)
             continue
-        keys = {key: value for key, value in table.items() if key not in tables.get(name, {})}
-        if has_vehicle and name == "body":
-            keys = {key: value for key, value in keys.items() if key in body}
+        there = tables.get(name, {})
+        keys = {
+            key: value
+            for key, value in table.items()
+            if key not in there or (not isinstance(value, Table) and _is_told(there[key], value))
+        }
+        if has_vehicle and name in _HARDWARE:
+            added = {"body": body, "axes": table if "thruster" in document else ()}.get(name, ())
+            keys = {key: value for key, value in keys.items() if key in there or key in added}
         if name == "dives":  # a dive of the same files may have any name
             keys = {key: value for key, value in keys.items() if not any(file in files for file in value["files"])}
         if keys:
@@ -122,28 +165,114 @@ def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     return tomlkit.dumps(told).strip()
 
 
+def is_open(value: object) -> bool:
+    """Return True for a value with a `"?"`, which the owner has to decide."""
+    if isinstance(value, Mapping | list):
+        return any(map(is_open, value.values() if isinstance(value, Mapping) else value))
+    return value == "?"
+
+
+def _is_told(own: object, value: object) -> bool:
+    """Return True if a draft tells what a file leaves open."""
+    return is_open(own) and not is_open(value)
+
+
+def _lacking_thrusters(own: object, draft: AoT) -> AoT | None:
+    """Return the thrusters of a draft that a file leaves open, with the keys that it lacks, and those that it has not,
+    as long as it leaves others open; None if it lacks nothing."""
+    if not isinstance(own, list) or not is_open(own):
+        return None
+    by_name = _by_name(own)
+    told = tomlkit.aot()
+    for thruster in draft:
+        there = by_name.get(thruster["name"])
+        keys = {
+            key: value
+            for key, value in thruster.items()
+            if there is None or _is_told(there.get(key), value) or (key not in there and is_open([*there.values()]))
+        }
+        if keys:
+            told.append(rest := tomlkit.table())
+            for key, value in ({"name": thruster["name"]} | keys).items():
+                rest.add(key, value)
+    return told or None
+
+
+def _by_name(thrusters: Iterable[Any]) -> dict[str, Any]:
+    """Return thrusters by their names, without those that have none."""
+    tables = (one for one in thrusters if isinstance(one, Mapping))
+    return {one["name"]: one for one in tables if isinstance(one.get("name"), str)}
+
+
 def completed(own: str, lacks: str) -> str:
-    """Return a rov.toml with the tables and keys that it lacks. What was there stays as it is."""
+    """Return a rov.toml with the tables and keys that it lacks. What was there stays as it is, except a `"?"`."""
     if not own:
         return lacks
     document, more = tomlkit.parse(own), tomlkit.parse(lacks)
     head, tables = "", tomlkit.document()
+    if "thruster" in more and is_open(document.get("base")):
+        comment = document["base"].trivia.comment
+        head = f"{comment}\n" if comment else ""
+        del document["base"]
     for name, item in more.items():
-        if not isinstance(item, AbstractTable | AoT):
-            head += f"{name} = {item.as_string()}\n"
+        if name in document and isinstance(item, AoT):
+            _complete_thrusters(document[name], item)
+        elif not isinstance(item, AbstractTable | AoT):
+            if name in document:
+                _put(document, name, item)
+            else:
+                head += f"{name} = {item.as_string()}\n"
         elif name not in document or isinstance(item, AoT):
             tables.add(name, item)
         else:
             there = document[name]
             for key, value in item.items():
-                if isinstance(there, InlineTable):
-                    there[key] = value.unwrap()  # a table becomes an inline table there
-                elif isinstance(value, Table):  # keys without a header may follow the other tables of this one
+                if key in there or isinstance(there, InlineTable) or not isinstance(value, Table):
+                    _put(there, key, value)
+                else:  # keys without a header may follow the other tables of this one
                     tables.setdefault(name, tomlkit.table(is_super_table=True)).add(key, value)
-                else:
-                    there[key] = value
     text = f"{head}{tomlkit.dumps(document)}"
     return f"{text.rstrip()}\n\n{tomlkit.dumps(tables).strip()}".strip() + "\n"
+
+
+def _put(table: Any, key: str, value: Any) -> None:
+    """Give a key a value, which keeps the comment that is there, and is inline in an inline table."""
+    there = table.get(key)
+    if isinstance(table, InlineTable):
+        table[key] = value.unwrap()
+        return
+    table[key] = value
+    if there is not None and not value.trivia.comment.startswith(there.trivia.comment):
+        added = value.trivia.comment.removeprefix("#").strip()
+        value.trivia.comment = there.trivia.comment + (f"; {added}" if added else "")
+        value.trivia.comment_ws = there.trivia.comment_ws
+
+
+def _complete_thrusters(own: Any, more: AoT) -> None:
+    """Give thrusters in any form the keys that they lack, and add those that are not there."""
+    by_name = _by_name(own)
+    for thruster in more:
+        if there := by_name.get(thruster["name"]):
+            for key, value in thruster.items():
+                if key != "name":
+                    _put(there, key, value)
+        elif isinstance(own, AoT):
+            own.append(thruster)
+        else:
+            own.append(_inline(thruster.unwrap()))
+
+
+def _inline(values: Mapping[str, Any]) -> InlineTable:
+    """Return an inline table."""
+    table = tomlkit.inline_table()
+    table.update(values)
+    return table
+
+
+def _vector(vector: SourcedVector | None) -> str:
+    """Return a direction or a position as an array of TOML, with "?" in place of one that is not known."""
+    numbers = [f"{number:g}" for number in vector.value] if vector else ['"?"'] * 3
+    return f"[{', '.join(numbers)}]"
 
 
 def _fields(inspections: Iterable[Inspection]) -> dict[str, str]:

@@ -32,9 +32,9 @@ from rov_fmu.tank.catalogue import (
     unit_names,
     words_in,
 )
-from rov_fmu.tank.columns import columns_of, columns_of_log, has_column, known_columns
+from rov_fmu.tank.columns import columns_of, columns_of_log, has_column
 from rov_fmu.tank.commands import PULSE_RANGE
-from rov_fmu.tank.folder import kind_of_table, parts_of_name
+from rov_fmu.tank.folder import axis_in_name, kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
 from rov_fmu.tank.readers.parsers import header_of
 
@@ -118,11 +118,6 @@ def name_and_unit(title: str, units: Collection[str]) -> tuple[list[str], str | 
     return words, None if len(words) > 1 and words[-1] in _UNKNOWN_UNITS else ""
 
 
-def axis_in_name(path: Path) -> Axis | None:
-    """Return the axis that the name of a file contains."""
-    return next((AXES[word] for word in path.stem.lower().split("_") if word in AXES), None)
-
-
 def layout_of(thrusters: Iterable[str]) -> Layout:
     """Return a layout with all axes, and with thrusters of which only the names are known."""
     axes = tuple(VehicleAxis(axis) for axis in AXES.values())
@@ -164,7 +159,7 @@ def guessed(
     else:
         layout = fitting(names, layouts) or layout_of(names)
     known = [thruster.name for thruster in layout.thrusters]
-    is_column = KnownColumns(known_columns(columns_of_log(layout, axis))).has
+    is_column = KnownColumns(columns_of_log(layout, axis)).has
     columns = {title: f"{of.external} [{of.load}]" for title, of in forces.items() if not is_column(title)}
     if not forces and not all(map(is_column, commanding)):
         for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):

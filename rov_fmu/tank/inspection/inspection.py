@@ -13,18 +13,18 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import VehicleAxis
 from rov_fmu.io.columns import Column, KnownColumns, read_columns
 from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, known_columns, names_of
+from rov_fmu.tank.clocks import gaps
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
-from rov_fmu.tank.folder import kind_of_table
-from rov_fmu.tank.inspection.headers import axis_in_name, guessed, guessed_of_table, one_of_several
+from rov_fmu.tank.folder import axis_in_name, kind_of_table
+from rov_fmu.tank.inspection.headers import guessed, guessed_of_table, one_of_several
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, gaps, rate
+from rov_fmu.tank.quality import checked, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
@@ -110,17 +110,18 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         guess, columns = guessed([*own], own, axis, [described] if described else layouts)
         layout = described or guess
         known = columns_of_log(layout, axis)
-        name_of = partial(_known_name, KnownColumns(known_columns(known)))
+        named = KnownColumns(known)
+        name_of = partial(_known_name, named)
         told = {*map(name_of, own), ""}
         columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
         columns |= renamed
         names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
-        is_column, flags = KnownColumns(known_columns(known)).has, {*flag_columns(titles, known, names).values()}
+        flags = {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {
             title: ", ".join(filter(None, (ranges[title], one_of_several(title, numbers[title]))))
             for title in titles
-            if not (is_column(meant[title]) or title in flags)
+            if not (named.has(meant[title]) or title in flags)
         }
         count = sum(title not in unread for title in titles)
         has_time = has_column(meant.values(), {"time": TIME})
@@ -132,11 +133,6 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         names, _ = names_of(described, tables)
         axis = None
     logs = read_logs(path, layout, names, axis, is_part=True)
-    if not (described or open_stream or any(log.commands for log in logs)):
-        of_wrench = read_logs(path, Layout.of_wrench(map(VehicleAxis, AXES.values())), names, is_part=True)
-        if any(log.commands for log in of_wrench):  # it need not have all components
-            kept = (tuple(one for one in log.findings if one.kind != "missing column") for log in of_wrench)
-            logs = [replace(log, findings=own) for log, own in zip(of_wrench, kept, strict=True)]
     return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
 
 

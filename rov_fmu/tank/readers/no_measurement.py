@@ -41,7 +41,7 @@ from rov_fmu.tank.catalogue import (
 )
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
-from rov_fmu.tank.columns import Entry, LogColumn, Names, known_columns
+from rov_fmu.tank.columns import LogColumn, Names
 from rov_fmu.tank.findings import Finding, about
 
 _OUTERMOST, _LEAST_OTHERS = 2, 10
@@ -100,7 +100,7 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], field: str = "") -> d
 
 def flag_columns(titles: Iterable[str], known: Mapping[str, LogColumn], names: Names) -> dict[str, str]:
     """Return the headers of a table that are flags of validity, by the names under which they are read."""
-    is_column = KnownColumns(known_columns(known)).has
+    is_column = KnownColumns(known).has
     unknown = (title for title in dict.fromkeys(titles) if not is_column(names.columns.get(title, title)))
     return {f"flag {n}": title for n, title in enumerate(unknown) if flag_of(title, names.valid)}
 
@@ -124,7 +124,7 @@ class _Flag:
 
 
 def measured_only(
-    file: str, topics: Sequence[Topic], entries: Mapping[str, Entry], valid: Mapping[str, Sequence[str]]
+    file: str, topics: Sequence[Topic], entries: Mapping[str, LogColumn], valid: Mapping[str, Sequence[str]]
 ) -> tuple[list[Topic], list[Finding]]:
     """Return the topics with NaN in place of numbers that are no measurements, and findings about these.
 
@@ -178,7 +178,7 @@ def _denied(topic: Topic) -> Iterator[tuple[Collection[str], Flags, str]]:
             yield message.fields, np.abs(norm - 1.0) > _OFF_NORM, "the norm of the quaternion"
 
 
-def _measured(topic: Topic, entries: Mapping[str, Entry]) -> dict[str, _Meaning]:
+def _measured(topic: Topic, entries: Mapping[str, LogColumn]) -> dict[str, _Meaning]:
     """Return the quantities that each field of a topic tells, and the conversion of its numbers to SI units.
 
     Components of quaternions have no marks.

@@ -10,6 +10,7 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import wraps
 from io import StringIO
@@ -92,6 +93,9 @@ def format_of(path: Path) -> Format:
 
 # ---- The child process -----------------------------------------------------------------------------------------------
 
+_KEPT = 20_000_000
+"""The contents of files of so many bytes together are kept. They take a sixth of the memory that any file may take."""
+
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
@@ -140,6 +144,14 @@ def one_parser() -> Iterator[None]:
                 _PARSER.spent.clear()
 
 
+_Key = tuple[int, int, int, int]
+
+
+def _key(file: os.stat_result) -> _Key:
+    """Return what tells a file from another one, also from what it was before it was written anew."""
+    return file.st_dev, file.st_ino, file.st_mtime_ns, file.st_size
+
+
 class _Parser:
     """The child process that reads files, while there is a user of it."""
 
@@ -148,8 +160,10 @@ class _Parser:
         self.users = 0
         self.is_child = False
         """True in the child process."""
-        self.spent: dict[tuple[int, ...], float] = {}
-        """The time that was spent on each file, s. A file that was written anew is another one."""
+        self.spent: dict[_Key, float] = {}
+        """The time that was spent on each file, s."""
+        self.contents: dict[tuple[_Key, Path, frozenset[str]], Content] = {}
+        """In the child process: the contents of logs by the file, its path and the topics that are named."""
         self._child: ChildProcess | None = None
 
     def call(self, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
@@ -157,7 +171,7 @@ class _Parser:
         growth, file = format_of(path).growth, path.stat()
         limits = budget(growth * file.st_size)
         with self.lock:
-            key = (file.st_dev, file.st_ino, file.st_mtime_ns, file.st_size)
+            key = _key(file)
             left = replace(limits, time=limits.time and limits.time - self.spent.get(key, 0.0))
             if left.time is not None and left.time <= 0.0:
                 raise _exceeding(path, LimitError("time", limits))
@@ -229,8 +243,21 @@ def open_table(path: Path) -> OpenStream | None:
 
 
 def read_content(path: Path, named: Collection[str]) -> Content:
-    """Return the content of a log that is no table. What a parser prints is about damage. Raises DataFileError."""
+    """Return the content of a log that is no table. Raises DataFileError.
+
+    The process keeps it for the next function that uses it, unless it has kept much already.
+    """
     assert _PARSER.is_child, "only a guarded function may read a file"
+    contents, key = _PARSER.contents, (_key(path.stat()), path, frozenset(named))
+    content = contents.get(key) or _parsed(path, named)
+    if sum(size for (*_, size), *_ in {*contents, key}) > _KEPT:
+        return content
+    contents[key] = content
+    return deepcopy(content)
+
+
+def _parsed(path: Path, named: Collection[str]) -> Content:
+    """Return the content of a log by the parser of its format. What the parser prints is about damage."""
     kind, printed = format_of(path), StringIO()
     try:
         with redirect_stdout(printed), redirect_stderr(printed), TemporaryDirectory() as folder:

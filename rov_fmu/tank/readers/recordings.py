@@ -18,6 +18,8 @@ from tempfile import TemporaryDirectory
 from typing import IO, Any
 from zlib import crc32
 
+from rov_fmu.io.messages import RovError
+
 ZSTD = b"\x28\xb5\x2f\xfd"
 """The first bytes of what zstd compressed. A message of ROS 2 begins with 0."""
 WAL = "-wal"
@@ -60,7 +62,7 @@ Raw = tuple[Stream, int, bytes]
 """A message: its stream, when it was recorded, ns, and its bytes."""
 
 
-class _DamagedError(Exception):
+class _DamagedError(RovError):
     """There is no whole record where one is expected."""
 
 

@@ -48,11 +48,9 @@ from rov_fmu.tank.columns import (
     SLIPS,
     THRUSTERS,
     WELL_KNOWN,
-    Entry,
     LogColumn,
     Names,
     columns_of_log,
-    known_columns,
     refuse_slips,
 )
 from rov_fmu.tank.findings import Finding, about, refusal
@@ -117,7 +115,7 @@ def read_table(
     open_stream: OpenStream,
     *,
     is_part: bool = False,
-) -> tuple[Content, dict[str, Entry]]:
+) -> tuple[Content, dict[str, LogColumn]]:
     """Read a table, and return its columns, with the meaning of each. Raises DataFileError.
 
     The numbers are in SI units, but pulses whose neutral nobody states are as they stand in the file. `open_stream`
@@ -127,11 +125,11 @@ def read_table(
     start = read_start(path, open_stream, FIRST_ROWS)
     names = replace(names, columns={**time_columns(start, names.columns), **names.columns})
     flags = flag_columns(start[0], known, names)
-    known |= dict.fromkeys(flags, LogColumn(FLAG))
+    known |= dict.fromkeys(flags, LogColumn.of(FLAG))
     check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
-        known_columns(known),
+        known,
         others=True,
         loose=True,
         grown=grown_rows,
@@ -144,7 +142,7 @@ def read_table(
     table = replace(table, headers=headers)
     commanding = [name for name in table.values if known[name].commands]
     refuse_slips(table, commanding)
-    pulses = _pulses(table, commanding)
+    pulses = {name: np.frombuffer(table.numbers[name]) for name in commanding if table.units[name].split()[0] in PULSES}
     unstated = [name for name in pulses if table.units[name] in PULSES] if names.keys.neutral is None else []
     values = {name: np.frombuffer(table.values[name]) for name in table.headers}
     if (times := times_of_day(table)) is not None:
@@ -160,7 +158,7 @@ def read_table(
     _tell_headers(content, table, known)
     if unlikely:
         content.findings.append(unlikely)
-    entries = {name: entry for name in table.headers if (entry := known[name].entry)}
+    entries = {name: known[name] for name in table.headers if known[name].name}
     entries |= {name: replace(entries[name], convert=table.conversions[name], is_pulse=True) for name in unstated}
     return content, {table.headers[name]: entry for name, entry in entries.items()}
 
@@ -201,7 +199,7 @@ def _no_motion(
 ) -> Iterator[str]:
     """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
     axes = [axis] if axis else layout.bare_axes
-    quantities = {name: one.entry.quantity for name, one in known.items() if one.entry and one.entry.quantity}
+    quantities = {name: one.quantity for name, one in known.items() if one.quantity}
     wanted = {name: quantity.unit for name, quantity in quantities.items() if quantity.axis in axes}
     if not headers.keys() & {*wanted, "pressure"}:
         titles = " or ".join(f"'{name} [{unit}]'" for name, unit in wanted.items())
@@ -218,7 +216,7 @@ def _no_commands(
     near |= dict.fromkeys(shown(title) for title in others if title.endswith(_IN_PULSES))
     hint = f"; is it the column {' or '.join(near)}?" if near else ""
     hint += " Units stand in square brackets." if any("(" in title for title in near) else ""
-    units = dict.fromkeys(f"[{unit}]" for one in known.values() if one.commands for unit in one.column.units)
+    units = dict.fromkeys(f"[{unit}]" for one in known.values() if one.commands for unit in one.units)
     if loads := [title for name, title in unread.items() if name in EXTERNAL]:
         hint = f"; {listed(loads)} are forces on the body, if wrench = true stands in [logs] of rov.toml"
     every = "each in [%], [1] or [us]" if "[%]" in units else f"in {listed(units, 'or')}"
@@ -307,26 +305,17 @@ def _tell_cells(content: Content, table: Columns, pulses: Mapping[str, Array], n
         content.count("no pulse", int(is_none.sum()), column=table.headers[name])
 
 
-def _pulses(table: Columns, commanding: Sequence[str]) -> dict[str, Array]:
-    """Return the pulses of each column that has pulses, as they stand in the file, µs; NaN for blank cells."""
-    names = [name for name in commanding if table.units[name].split()[0] in PULSES]
-    rows = np.fromiter(
-        (float(text or "nan") for texts in (table.texts(*names) if names else ()) for text in texts), float
-    )
-    return dict(zip(names, rows.reshape(-1, max(len(names), 1)).T, strict=False))
-
-
 def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColumn]) -> None:
     """Add each header that would name a measurement if it had a unit."""
     wanted = {
         title.casefold(): column
         for name, column in known.items()
-        if name not in table.values and column.entry and column.entry.quantity
-        for title in (name, *column.column.also)
+        if name not in table.values and column.quantity
+        for title in (name, *column.also)
     }
     for title in table.header:
         if title not in table.headers.values() and (column := wanted.get(title.strip().casefold())):
-            better = shown(f"{title.strip()} [{next(iter(column.column.units))}]")
+            better = shown(f"{title.strip()} [{next(iter(column.units))}]")
             content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
 
 

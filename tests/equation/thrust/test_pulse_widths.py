@@ -37,7 +37,7 @@ def pulses_of(rng: random.Random, rov: Vehicle) -> tuple[dict[str, float], dict[
 
 def test_every_step_is_that_of_the_fractions_bit_for_bit(rov: Vehicle) -> None:
     rng, of_pulses = random.Random(1), pulsed(rov, PULSE)
-    lines = of_pulses.delay_line(), rov.delay_line()
+    lines = of_pulses.memory(), rov.memory()
     state = random_state(rng, rov)
     for n in range(12):
         pulses, fractions = pulses_of(rng, rov)

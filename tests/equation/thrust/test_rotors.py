@@ -117,7 +117,7 @@ def test_commands_that_arrive_after_the_dead_time_turn_rotors_back_within_steps(
             y = rigid_vehicle.step(rov, held, state, h)
     tables = {name: np.array([one[name] for one in inputs]) for name in rov.layout.inputs}
     in_c = simulate(late, np.array(times), tables, workers=1).values[:, 0, -1].tolist()
-    line, state = late.delay_line(), at_rest(late)
+    line, state = late.memory(), at_rest(late)
     for t, held in zip(times[:-1], inputs, strict=False):
         state = line.step(late, held, state, t, 0.02)
     for found in (dict(zip(rov.layout.state, in_c, strict=True)), state):

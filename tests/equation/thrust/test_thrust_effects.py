@@ -69,12 +69,12 @@ def test_a_table_gives_the_measured_forces_and_rises_between_them() -> None:
     _, bow, _ = ROV.layout.curves
     (table,) = bow.tables
     for command, force in points:
-        assert table.force(command) == pytest.approx(force, rel=1e-15)
+        assert table.value(command) == pytest.approx(force, rel=1e-15)
     commands = np.linspace(-1.0, 1.0, 2001)
-    forces = [table.force(c) for c in commands]
+    forces = [table.value(c) for c in commands]
     assert forces == pytest.approx(PchipInterpolator(*zip(*points, strict=True))(commands), rel=1e-13, abs=1e-13)
     assert (np.diff(forces) >= 0.0).all()
-    assert {table.force(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
+    assert {table.value(c) for c in (-0.07, -0.03, 0.0, 0.05)} == {0.0}
 
 
 @pytest.mark.parametrize("rov", [VIDEORAY, SIX, NOW], ids=["one curve for two", "by coefficients", "by tables"])
@@ -92,9 +92,10 @@ def test_the_health_of_a_thruster_multiplies_its_force_alone(rov: Vehicle) -> No
 def test_the_health_comes_after_all_variables_that_were_there_before_it() -> None:
     """Otherwise, the value references of FMI would change."""
     for layout in (VIDEORAY.layout, SIX.layout, ROV.layout):
-        count = len(layout.thrusters)
-        assert layout.variables[-count:] == tuple(f"health_{thruster.name}" for thruster in layout.thrusters)
-        assert not any(name.startswith("health_") for name in layout.variables[:-count])
+        first = len(layout.variables) - len(layout.added) - len(layout.thrusters)
+        healths = [f"health_{thruster.name}" for thruster in layout.thrusters]
+        assert layout.variables[first:] == (*healths, *layout.added)
+        assert not any(name.startswith("health_") for name in layout.variables[:first])
 
 
 def test_a_fin_steers_by_the_square_of_the_speed_and_in_reverse_backwards() -> None:
@@ -195,7 +196,7 @@ def test_commands_act_exactly_after_the_dead_time() -> None:
     state = at_rest(NOW)
     for t, following, values in zip(union, union[1:], immediate_inputs, strict=False):
         state = NOW.step(values, state, following - t)
-    line, delayed = ROV.delay_line(), at_rest(ROV)
+    line, delayed = ROV.memory(), at_rest(ROV)
     for t, following, values in zip(times, times[1:], inputs, strict=False):
         delayed = line.step(ROV, values, delayed, t, following - t)
     tables = {name: np.array([values[name] for values in inputs]) for name in ROV.layout.inputs}
@@ -207,14 +208,14 @@ def test_commands_act_exactly_after_the_dead_time() -> None:
 @pytest.mark.parametrize(("units", "waits"), [(-1, False), (0, False), (8, False), (9, True)])
 def test_a_change_acts_at_its_time_to_within_the_rounding_of_the_times(units: int, waits: bool) -> None:
     inputs = ROV.layout.usual_inputs | {"u_l": 0.5}
-    line = ROV.delay_line()
+    line = ROV.memory()
     line.waiting = [Change(0.5 + units * 2.0**-52, {name: inputs[name] for name in ROV.layout.commands})]
     line.step(ROV, inputs, at_rest(ROV), 0.5, 0.5)
     assert (bool(line.waiting), line.acting["u_l"]) == (waits, 0.0 if waits else 0.5)
 
 
 def test_no_more_changes_wait_than_the_fmu_has_room_for() -> None:
-    inputs, line = ROV.layout.usual_inputs, ROV.delay_line()
+    inputs, line = ROV.layout.usual_inputs, ROV.memory()
     line.waiting = [Change(0.09, dict.fromkeys(ROV.layout.commands, 1.0))] * 1023
     line.step(ROV, inputs, at_rest(ROV), 0.0, 1e-3)
     assert len(line.waiting) == 1024
@@ -228,13 +229,13 @@ def test_a_dead_time_that_ends_inside_a_step_is_as_exact_late_in_a_run() -> None
     ends = []
     for start in (0.0, 2.0**20):
         times = start + np.array([0.0, 0.03125, 0.28125, 0.78125])  # late times of these lengths are exact
-        line, state = ROV.delay_line(), at_rest(ROV)
+        line, state = ROV.memory(), at_rest(ROV)
         for t, following in pairwise(times.tolist()):
             state = line.step(ROV, inputs, state, t, following - t)
         in_c = simulate(ROV, times, inputs, [*state], workers=1).values[:, 0, -1].tolist()
         ends.append([*state.values(), *in_c])
     assert ends[1] == ends[0]
-    line, h = ROV.delay_line(), ROV["T_d"] / 300
+    line, h = ROV.memory(), ROV["T_d"] / 300
     acting = simulate(ROV, h * np.arange(301), inputs, ["delayed_u_l"]).values[0, 0]
     assert acting.tolist() == [0.0] * 300 + [
         0.5

@@ -39,7 +39,7 @@ def test_the_conventions_put_a_vehicle_at_these_places(convention: str) -> None:
 @pytest.mark.parametrize("convention", ["carried", "passes"])
 def test_a_vehicle_is_where_its_convention_puts_it(convention: str) -> None:
     rov = passed(SIX_AXES) if convention == "passes" else SIX_AXES
-    inputs, line, state = rov.layout.usual_inputs, rov.delay_line(), rov.layout.at_rest
+    inputs, line, state = rov.layout.usual_inputs, rov.memory(), rov.layout.at_rest
     for n, V_N in enumerate((0.0, 0.5)):
         state = line.step(rov, inputs | {"V_N": V_N}, state, 5.0 * n, 5.0)
     assert state["x"] == pytest.approx(north(convention), abs=1e-11)

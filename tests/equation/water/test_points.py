@@ -50,7 +50,7 @@ def test_a_point_is_where_the_attitude_turns_it_and_moves_over_ground(name: str)
     inputs, state = random_inputs(rng, rov), random_state(rng, rov)
     exact = calculated(rov, {**rov.coefficients, **inputs, **state}, float)
     found = rov.calculated(inputs, state)
-    of_points = [form.format(f"{x}_{point}") for point in POINTS for form in ("{}", "der({})") for x in "xyz"]
+    of_points = [f"{name}_{point}" for point in POINTS for name in (*"xyz", "vg_N", "vg_E", "vg_D")]
     assert [*rov.layout.motion_of_points] == of_points
     assert [found[name] for name in of_points] == pytest.approx(
         [float(exact[x]) for x in of_points], rel=1e-13, abs=1e-13
@@ -72,9 +72,7 @@ def test_a_pull_ahead_of_the_centre_turns_the_vehicle_into_its_direction() -> No
     """With a long tow, the tow point is ahead of the vehicle, which heads east, and moves as fast as it."""
     rov = tied(UNTIED["level"], bow=(0.4, 0.0, 0.0)).with_(F_0_u=0.0, F_0_r=0.0)
     inputs = rov.layout.usual_inputs | {"F_E_bow": 20.0}
-    run = simulate(
-        rov, [0.0, 600.0], inputs, ["psi", "x_bow", "x", "y_bow", "y", "der(y_bow)", "der(y)", "u"], workers=1
-    )
+    run = simulate(rov, [0.0, 600.0], inputs, ["psi", "x_bow", "x", "y_bow", "y", "vg_E_bow", "vg_E", "u"], workers=1)
     psi, x_bow, x, y_bow, y, *speeds = run.values[:, 0, -1]
     assert psi == pytest.approx(np.pi / 2.0, abs=1e-9)
     assert (x_bow - x, y_bow - y) == pytest.approx((0.0, 0.4), abs=1e-9)

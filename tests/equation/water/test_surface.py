@@ -145,7 +145,8 @@ def test_it_is_written_and_read_and_what_it_cannot_have_is_one_line() -> None:
     height = '[surface]\nheight = {value = 0.2, unit = "m", source = "a drawing"}\n'
     text = text.partition("[surface]")[0] + text.partition("[surface]")[2].partition("\n\n")[2]
     read = read_vehicle(path, (text + height).encode())
-    assert (read["height"], read.layout.surface, read.layout.variables[-1]) == (0.2, True, "height")
+    last = read.layout.variables[-1 - len(read.layout.added)]
+    assert (read["height"], read.layout.surface, last) == (0.2, True, "height")
     assert read_vehicle(path, vehicle_text(read, path.parent).encode()) == read
     for added, words in (
         ("[surface]\n", "surface.height: this key is missing"),

@@ -33,7 +33,6 @@ def run_threads(sources: Mapping[str, str], folder: Path, sanitizers: str, calls
     ("fmi", "sanitizers", "calls"),
     [
         pytest.param(3, "thread", 20_000, marks=pytest.mark.long),
-        pytest.param(3, "address,undefined", 40_000, marks=pytest.mark.long),  # the corpus test has it, too
         *(
             pytest.param(fmi, sanitizers, 2_000_000, marks=pytest.mark.weekly)
             for fmi in (2, 3)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
-from rov_fmu.fmu.card import card, card_text, read_card
+from rov_fmu.fmu.card import card, card_text, read_card, with_speeds
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, VEHICLES, VIDEORAY, a_vehicle, tied
 
@@ -18,7 +18,7 @@ def test_a_card_is_read_as_it_was_written(name: str) -> None:
     rov = replace(_ROVS[name], limits=(f"Words: {'long' * 20}{' and short' * 20}.", "long" * 30))
     text = card_text(rov)
     assert [line for line in text.splitlines() if len(line) > 100] == [f"- {'long' * 30}"]
-    assert read_card(text) == {f"Model card of {rov.name}": [], **card(rov)}
+    assert read_card(text) == {f"Model card of {rov.name}": [], **with_speeds(rov)}
 
 
 def _holds(rov: Vehicle) -> list[str]:

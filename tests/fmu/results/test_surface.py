@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.equation.words import LEFT_WATER
 from rov_fmu.fmu.variables import interface_header
 from tests.fmi import Fmu
 from tests.fmu.calls.conftest import of_both_versions
@@ -12,7 +13,6 @@ from tests.fmu.test_python_flavour import Slave
 from tests.vehicles import HEAVY, VIDEORAY, a_vehicle, surfaced
 
 fmu = of_both_versions("videoray_dir", "videoray3_dir")
-WORDS = "the vehicle has left the water, and this model has no surface: it goes on as under water"
 
 
 def test_it_is_told_once(fmu: Fmu) -> None:
@@ -22,7 +22,7 @@ def test_it_is_told_once(fmu: Fmu) -> None:
             rov.step(0.5 * n, 0.5)
             assert len(rov.log.of_water) == (0 if rov.get(["z"])[0] > 0.0 else 1)
         (message,) = rov.log.of_water
-        assert message.text.endswith(f": {WORDS}. Logged once.")
+        assert message.text.endswith(f": {LEFT_WATER.format(0.5)}; logged once.")
         assert not rov.log
 
 
@@ -30,7 +30,7 @@ def test_the_flavour_in_python_tells_it_once(tmp_path: Path, monkeypatch: pytest
     slave = Slave(replace(a_vehicle(HEAVY), identifier="rising"), tmp_path, monkeypatch)
     slave.rov.exit_initialization_mode()
     slave.put(Z_ext=-20.0)
-    assert [slave.step(0.1 * n, 0.1)[1] for n in range(2)] == [[f"{WORDS}; logged once."], []]
+    assert [slave.step(0.1 * n, 0.1)[1] for n in range(2)] == [[f"{LEFT_WATER.format(0.1)}; logged once."], []]
 
 
 def test_a_vehicle_with_a_surface_may_float() -> None:

@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from lxml import html
 
 from rov_fmu.bridges import mcap
 from rov_fmu.cli import main
+from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -39,6 +41,16 @@ def replay(tmp_path: Path, fly: Callable[..., Any]) -> Callable[..., Any]:
         return page
 
     return page
+
+
+def test_the_page_of_a_recording_says_what_was_flown(csv: Path, vehicle: Vehicle) -> None:
+    page = html.fromstring(fly_page([Flown(vehicle, b"")], recording=recording_of(csv, vehicle)))
+    assert page.findtext(".//title") == page.findtext(".//h1") == "dive.csv, flown by VideoRay Pro 4"
+    _, *rows = csv.read_text("utf-8").splitlines()
+    end, *commands = np.array([row.split(",")[:4] for row in rows], float).T
+    assert f"{end[-1]:.3g} s of recorded commands, at most {np.abs(commands).max():.0f} %." in page.findtext(
+        ".//header/p"
+    )
 
 
 ERRORS = "live.flight.replay.errors.map((list) => Math.max(...list.map(Math.abs)))"

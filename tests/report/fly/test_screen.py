@@ -100,6 +100,51 @@ def test_the_frame_on_the_first_page_of_the_site_shows_all_of_itself(
     assert page.evaluate("live.picture.instruments.boxes.length") == (4 if kind == "bluerov2_heavy" else 3)
 
 
+_FAR_FROM_ITS_OWN = """azimuth => {
+    const { picture, flight, vehicle } = live;
+    picture.camera = { azimuth, elevation: 0.6 };
+    live.draw();
+    const { model } = flight.pilot;
+    const body = viewOfFrame(picture.look(positionOf(model)), rotationOf(model), [0, 0, 0]);
+    const texts = drawnTexts.get(picture.board);
+    const shown = new Map(texts.map(([words, x, y, width, height]) => [words, { x, y, width, height }]));
+    const { shape } = picture.pilot;
+    const places = vehicle.thrusters.map(({ label, force, most }, n) => {
+        const { at, along } = shape.thrusters[n];
+        const jet = jetOf(model.get(force) / most, shape.radius, vehicle.size);
+        return { label, ends: [at, plus(at, [jet, along])].map((point) => seen(body, point)) };
+    });
+    const far = (box, points) => Math.min(...points.map(([x, y]) => Math.hypot(
+        Math.max(box.x - x, 0, x - box.x - box.width), Math.max(box.y - y, 0, y - box.y - box.height))));
+    const labelled = places.filter(({ label }) => shown.has(label));
+    return {
+        shown: labelled.length / places.length,
+        wrong: labelled.filter(({ label, ends }) => {
+            const box = shown.get(label);
+            return places.some((other) => far(box, other.ends) + 4 < far(box, ends));
+        }).map(({ label }) => label),
+    };
+}"""
+"""Returns the share of thrusters with a label, and the labels that are nearer to another thruster or its jet."""
+
+
+@pytest.mark.parametrize("kind", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_a_label_stands_nearest_to_its_own_thruster(kind: str, fly: Callable[..., Any]) -> None:
+    page = fly(kind, width=1280)
+    record_drawn_texts(page)
+    page.evaluate(FLOWN_FOR_6_S)
+    found = [page.evaluate(_FAR_FROM_ITS_OWN, azimuth / 4.0) for azimuth in range(25)]
+    assert [one["wrong"] for one in found if one["wrong"]] == []
+    assert min(one["shown"] for one in found) >= 0.5
+    words = page.evaluate(
+        "[...drawnTexts].map(([board, texts]) => [board.canvas.id, texts.map((text) => text[0]).join()])"
+    )
+    through = [name for name, text in words if name.startswith("live-chart") and "through the water" in text]
+    assert through == [
+        f"live-chart-{name}" for name in ("surge", "sway", "heave") if f"live-chart-{name}" in dict(words)
+    ]
+
+
 def test_there_is_one_north(page: Any) -> None:
     """The rose, the picture from above and the track turn together, wherever the camera is."""
     for azimuth in (0.0, 0.5, -2.0):

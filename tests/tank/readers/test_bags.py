@@ -42,7 +42,7 @@ def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) 
     assert told(log) == (
         "dive.db3: the commands of the thrusters are those of /thrusters",
         "dive.db3: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
-        "push ahead above its neutral pulse",
+        "push ahead above its neutral pulse. [logs] in rov.toml may name those that do not: reversed = [...]",
     )
 
 

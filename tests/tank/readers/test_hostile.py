@@ -6,7 +6,7 @@ import sqlite3
 import struct
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from rov_fmu.io.child_process import Limits
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers import parsers
+from rov_fmu.tank.readers.content import Content
 from rov_fmu.tank.readers.parsers import budget, format_of, header_of, one_parser, read_topics
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
@@ -123,6 +124,32 @@ def test_all_that_reads_a_file_shares_one_budget(tmp_path: Path) -> None:
         assert header_of(path) == ["time [s]", "depth [m]"]
 
 
+@pytest.mark.parametrize(("kept", "counts"), [(10**6, (1, 2)), (0, (3, 4))])
+def test_a_log_that_several_functions_use_is_parsed_once(
+    kept: int, counts: tuple[int, int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Each gets a content of its own. What is too large is not kept, nor is what stood in the file before."""
+    path, parsed, parse = flash(tmp_path, DIVE), [], parsers._parsed
+
+    def counted(path: Path, named: Collection[str]) -> Content:
+        parsed.append(path)
+        return parse(path, named)
+
+    parser = parsers._Parser()
+    parser.is_child = True
+    monkeypatch.setattr(parsers, "_PARSER", parser)
+    monkeypatch.setattr(parsers, "_KEPT", kept)
+    monkeypatch.setattr(parsers, "_parsed", counted)
+    whole = len(read_topics(path, ()).pieces[0].topics)
+    read_topics(path, ()).pieces[0].topics.clear()
+    assert whole
+    assert len(read_topics(path, ()).pieces[0].topics) == whole
+    assert len(parsed) == counts[0]
+    os.utime(path, (0.0, 0.0))
+    assert read_topics(path, ()).pieces
+    assert len(parsed) == counts[1]
+
+
 def test_what_is_packed_must_be_a_log(tmp_path: Path) -> None:
     path = tmp_path / "dive.zstd"
     for content, told in (
@@ -171,6 +198,7 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
 ) -> None:
     path = flash(tmp_path, DIVE)
     assert read_topics(path, ()).pieces  # from then on the process has imported the parser
+    os.utime(path, (0.0, 0.0))  # it is another file then, of which the process has no content
     with monkeypatch.context() as patch:
         patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:

@@ -175,7 +175,8 @@ static void PLAY(GetReal)(slot *s)
     for (size_t i = 0; i < n && vr != NULL; i++) {
         const unsigned place = place_of(vr[i]);
         good = good && place < N_VARIABLES + (FMI_VERSION == 3); /* the time */
-        derived = derived || (place >= FIRST_CALCULATED && place < (MAY_OVERFLOW ? FIRST_COEFFICIENT : FIRST_OTHER));
+        derived = derived || (place >= FIRST_CALCULATED && place < (MAY_OVERFLOW ? FIRST_COEFFICIENT : FIRST_OTHER))
+                  || (place >= FIRST_ADDED && place < N_VARIABLES);
     }
     verdict wanted = legal(s, WHICH(GetReal), good);
     if (wanted == ALLOWED && derived && !is_moderate(s->f)) {
@@ -254,21 +255,16 @@ typedef struct {
     double *seed, *result;
 } partial;
 
-/* Take a reference, mostly to one of the places from `first` to before `end`. */
-static unsigned take_reference_among(unsigned first, unsigned end)
-{
-    const unsigned n = take_byte();
-    return n < 230 ? FIRST_REFERENCE + first + n % (end - first) : take_reference();
-}
-
 static unsigned take_known(void)
 {
-    return take_reference_among(0, FIRST_CALCULATED);
+    const unsigned n = take_byte();
+    return n < 230 ? FIRST_REFERENCE + n % FIRST_CALCULATED : take_reference();
 }
 
 static unsigned take_unknown(void)
 {
-    return take_reference_among(FIRST_STATE, FIRST_COEFFICIENT);
+    const unsigned n = take_byte(), place = FIRST_STATE + n % (FIRST_COEFFICIENT - FIRST_STATE + N_ADDED);
+    return n >= 230 ? take_reference() : FIRST_REFERENCE + (place < FIRST_COEFFICIENT ? place : place - FIRST_COEFFICIENT + FIRST_ADDED);
 }
 
 TAKE_LIST(take_knowns, unsigned, take_known)

@@ -47,7 +47,7 @@ static double turning_of(const double v[N_VELOCITIES])
 static bool is_coupled(int a)
 {
     for (int b = 0; b < N_VELOCITIES; b++) {
-        if (b != a && COMPONENT_OF[a] == COMPONENT_OF[b]) {
+        if (b != a && STRUCTURE.component_of[a] == STRUCTURE.component_of[b]) {
             return true;
         }
     }
@@ -79,7 +79,7 @@ static void strongest(const fmu *f, double C[N_VELOCITIES])
 {
     double y[N_SERIES] = {0.0}, size[N_SERIES];
     for (int i = N_VELOCITIES; i < N_USED; i++) { /* the remaining part of a lag has at most the progress 1 */
-        y[i] = COMPONENT_OF[i] < N_DYNAMIC ? 1.0 : 0.0;
+        y[i] = STRUCTURE.component_of[i] < STRUCTURE.dynamic ? 1.0 : 0.0;
     }
     sizes_at(f, y, 0, size);
     memcpy(C, size, sizeof(double[N_VELOCITIES]));
@@ -134,7 +134,7 @@ static double changes_of(const fmu *f, double h)
     rates = turning_of(v) + rates_up_to(f, v);
     sizes_at(f, y, 0, size);
     for (int i = N_VELOCITIES; i < N_USED; i++) {
-        rates += COMPONENT_OF[i] < N_DYNAMIC ? size[i] : 0.0; /* rates of the lags */
+        rates += STRUCTURE.component_of[i] < STRUCTURE.dynamic ? size[i] : 0.0; /* rates of the lags */
     }
     return rates * h;
 }
@@ -388,10 +388,11 @@ static void check_first_derivative(fmu *f, unsigned state, double derivative)
 /* Check the numbers and the mode of an instance, and that its states and thrusts can be read and are finite. */
 static void check_instance(const slot *s)
 {
-    unsigned vr[N_STATES + N_OTHER];
-    double values[N_STATES + N_OTHER];
-    for (unsigned i = 0; i < N_STATES + N_OTHER; i++) {
-        vr[i] = FIRST_REFERENCE + FIRST_STATE + i + (i < N_STATES ? 0 : N_STATES);
+    enum { ADDED = N_STATES + N_OTHER, ALL = ADDED + N_ADDED };
+    unsigned vr[ALL];
+    double values[ALL];
+    for (unsigned i = 0; i < ALL; i++) {
+        vr[i] = FIRST_REFERENCE + i + (i < N_STATES ? FIRST_STATE : i < ADDED ? FIRST_CALCULATED : FIRST_ADDED - ADDED);
     }
     if (s->f == NULL) {
         return;
@@ -401,7 +402,7 @@ static void check_instance(const slot *s)
     PROPERTY(memcmp(&numbers, &s->f->numbers, sizeof numbers) == 0, "the numbers are those of other coefficients");
     PROPERTY(s->f->now.mode == s->at.mode && s->f->now.type == s->at.type, "in %s instead of %s",
              mode_name(s->f->now.mode), mode_name(s->at.mode));
-    const unsigned n = MAY_OVERFLOW && !is_moderate(s->f) ? N_STATES : N_STATES + N_OTHER; /* a torque may overflow */
+    const unsigned n = is_moderate(s->f) ? ALL : MAY_OVERFLOW ? N_STATES : ADDED; /* others may overflow */
     before_call();
     PROPERTY(FMI(GetReal)(s->f, vr, n, values AND(n)) == 0, "the outputs cannot be read");
     PROPERTY(is_same(s, true), "to read changes the instance");

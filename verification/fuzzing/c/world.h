@@ -139,7 +139,7 @@ static unsigned take_reference(void)
         return FIRST_REFERENCE + n % FIRST_STATE; /* an input */
     }
     if (n < 150) {
-        return FIRST_REFERENCE + N_VARIABLES - 1 - n % 8; /* a tuning parameter */
+        return FIRST_REFERENCE + FIRST_ADDED - 1 - n % 8; /* a tuning parameter */
     }
     if (n < 245) {
         return FIRST_REFERENCE + n % N_VARIABLES;
@@ -178,7 +178,8 @@ static void copy_instance(unsigned char *to, const fmu *from)
     memcpy(to, from, sizeof *from);
     ((fmu *)(void *)to)->function = NULL;
     memset(&((fmu *)(void *)to)->now.values[FIRST_CALCULATED], 0,
-           (N_STATES + N_OTHER - HAS_DEAD_TIME * N_COMMANDS) * sizeof(double)); /* the commands that act are remembered */
+           (N_STATES + N_OTHER - N_MEMORY) * sizeof(double));
+    memset(((fmu *)(void *)to)->now.values + FIRST_ADDED, 0, N_ADDED * sizeof(double));
 }
 
 static fmu *before(const slot *s)

@@ -7,7 +7,7 @@ from typing import Any
 
 from ecospy import EcosSimulation, EcosSimulationStructure
 
-from examples.systems import PARAMETER_SET, write_ssp
+from rov_fmu.bridges.system.ssp import PARAMETER_SET, ssp_content
 from verification.interoperability.runners.flight import FMU, OUTPUTS, Step, fly, parameters
 from verification.interoperability.runners.system import dive
 
@@ -19,7 +19,7 @@ with ExitStack() as stack:
         structure.add_parameter_set(PARAMETER_SET, {f"rov::{name}": value for name, value in parameters().items()})
         source = {"structure": structure}
     else:
-        write_ssp(Path("dive.ssp"), dive())
+        Path("dive.ssp").write_bytes(ssp_content(dive()))
         source = {"ssp_path": "dive.ssp"}
     simulation = stack.enter_context(EcosSimulation(step_size=0.1, **source))
     simulation.init(parameter_set=PARAMETER_SET)

@@ -12,7 +12,7 @@ from libcosimpy.CosimManipulator import CosimManipulator
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
-from examples.systems import write_osp, write_ssp
+from rov_fmu.bridges.system.ssp import ssp_content, write_osp
 from verification.interoperability.runners.flight import AT_START, FMU, OUTPUTS, Step, fly, parameters
 from verification.interoperability.runners.system import dive
 
@@ -25,7 +25,7 @@ match sys.argv[1]:
         slave = CosimLocalSlave(fmu_path=FMU, instance_name="rov")  # must live as long as the execution
         execution.add_local_slave(slave)
     case "ssp":
-        write_ssp(Path("dive.ssp"), dive())
+        Path("dive.ssp").write_bytes(ssp_content(dive()))
         execution = CosimExecution.from_ssp_file("dive.ssp", STEP)
     case "osp":
         write_osp(Path("OspSystemStructure.xml"), dive())

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from examples.systems import Component, System
+from rov_fmu.bridges.system.ssp import Component, System
 from verification.interoperability.runners.flight import FMU, OUTPUTS, parameters, steps
 
 
 def dive() -> System:
     """Return the system, whose FMU is in this folder."""
-    rov = Component(Path(FMU), parameters(), list(steps()[0].inputs), OUTPUTS)
+    rov = Component(FMU, Path(FMU).read_bytes(), parameters(), list(steps()[0].inputs), OUTPUTS)
     return System("dive", {"rov": rov}, step=0.1, stop=30.0)

@@ -2,8 +2,7 @@
 
 Each sample takes depth and heading from the sensors and gives the three thruster commands one sample later. A loop
 works on force (N) or torque (N.m) and follows a reference model, which starts where the vehicle is when the hold is
-switched on, so that nothing jumps. The thrust curve (2), inverted, turns force into command. PythonFMU writes no units;
-they are in the descriptions.
+switched on, so that nothing jumps. The thrust curve (2), inverted, turns force into command.
 """
 
 from dataclasses import dataclass
@@ -13,46 +12,47 @@ from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2
 
 FULL_TURN = 2.0 * pi
 
-# name: start, description
-_INPUTS: dict[str, tuple[float | bool, str]] = {
-    "z": (0.0, "Measured depth (m)"),
-    "psi": (0.0, "Measured heading (rad), wrapped or not"),
-    "z_ref": (0.0, "Depth to hold (m)"),
-    "psi_ref": (0.0, "Heading to hold (rad)"),
-    "surge": (0.0, "Stick forward, -1 ... 1: command of both rear thrusters"),
-    "heave": (0.0, "Stick down, -1 ... 1: command of the top thruster while depth hold is off"),
-    "yaw": (0.0, "Stick to starboard, -1 ... 1: opposite commands of the rear thrusters while heading hold is off"),
-    "depth_hold": (False, "Depth hold is on"),
-    "heading_hold": (False, "Heading hold is on"),
-    "sag": (0.0, "Drop of the battery's voltage, by which the largest command falls (1)"),
-}
-_OUTPUTS = {
-    "u_l": (0.0, "Left thruster command, positive forward"),
-    "u_r": (0.0, "Right thruster command, positive forward"),
-    "u_t": (0.0, "Top thruster command, positive down"),
-    "z_d": (0.0, "Depth that the reference model wants now (m)"),
-    "psi_d": (0.0, "Heading that the reference model wants now (rad)"),
-}
-_PARAMETERS = {
-    "K_p_z": (60.0, "Depth hold: proportional gain (N/m)"),
-    "K_i_z": (30.0, "Depth hold: integral gain (N/(m.s))"),
-    "K_d_z": (45.0, "Depth hold: derivative gain (N.s/m)"),
-    "omega_z": (0.6, "Depth hold: natural frequency of the reference model (rad/s)"),
-    "w_max": (0.25, "Depth hold: most heave velocity of the reference (m/s)"),
-    "K_p_psi": (1.5, "Heading hold: proportional gain (N.m/rad)"),
-    "K_i_psi": (0.8, "Heading hold: integral gain (N.m/(rad.s))"),
-    "K_d_psi": (0.8, "Heading hold: derivative gain (N.m.s/rad)"),
-    "omega_psi": (1.0, "Heading hold: natural frequency of the reference model (rad/s)"),
-    "r_max": (0.3, "Heading hold: most yaw velocity of the reference (rad/s)"),
-    "T_t": (1.0, "Tracking time of the anti-windup (s)"),
-    "u_max": (1.0, "Most of a command with a full battery, 0 ... 1"),
-    "u_rate": (4.0, "Most change of a command (1/s)"),
-    "a_t_rear": (42.9, "Quadratic thrust coefficient of the rear pair (N)"),
-    "b_t_rear": (2.711, "Linear thrust coefficient of the rear pair (N)"),
-    "a_t_top": (6.494, "Quadratic thrust coefficient of the top thruster (N)"),
-    "b_t_top": (0.0513, "Linear thrust coefficient of the top thruster (N)"),
-    "R": (0.22, "Distance from the centre of mass to a rear thruster (m)"),
-    "gamma": (0.423, "Angle of the rear thrusters' force about the centre of mass (rad)"),
+# name: causality, start, unit, description
+VARIABLES: dict[str, tuple[str, float | bool, str, str]] = {
+    "z": ("input", 0.0, "m", "Measured depth"),
+    "psi": ("input", 0.0, "rad", "Measured heading, wrapped or not"),
+    "z_ref": ("input", 0.0, "m", "Depth to hold"),
+    "psi_ref": ("input", 0.0, "rad", "Heading to hold"),
+    "surge": ("input", 0.0, "1", "Stick forward, -1 ... 1: command of both rear thrusters"),
+    "heave": ("input", 0.0, "1", "Stick down, -1 ... 1: command of the top thruster while depth hold is off"),
+    "yaw": (
+        "input",
+        0.0,
+        "1",
+        "Stick to starboard, -1 ... 1: opposite commands of the rear thrusters while heading hold is off",
+    ),
+    "depth_hold": ("input", False, "1", "Depth hold is on"),
+    "heading_hold": ("input", False, "1", "Heading hold is on"),
+    "sag": ("input", 0.0, "1", "Drop of the battery's voltage, by which the largest command falls"),
+    "u_l": ("output", 0.0, "1", "Left thruster command, positive forward"),
+    "u_r": ("output", 0.0, "1", "Right thruster command, positive forward"),
+    "u_t": ("output", 0.0, "1", "Top thruster command, positive down"),
+    "z_d": ("output", 0.0, "m", "Depth that the reference model wants now"),
+    "psi_d": ("output", 0.0, "rad", "Heading that the reference model wants now"),
+    "K_p_z": ("parameter", 60.0, "N/m", "Depth hold: proportional gain"),
+    "K_i_z": ("parameter", 30.0, "N/(m.s)", "Depth hold: integral gain"),
+    "K_d_z": ("parameter", 45.0, "N.s/m", "Depth hold: derivative gain"),
+    "omega_z": ("parameter", 0.6, "rad/s", "Depth hold: natural frequency of the reference model"),
+    "w_max": ("parameter", 0.25, "m/s", "Depth hold: most heave velocity of the reference"),
+    "K_p_psi": ("parameter", 1.5, "N.m/rad", "Heading hold: proportional gain"),
+    "K_i_psi": ("parameter", 0.8, "N.m/(rad.s)", "Heading hold: integral gain"),
+    "K_d_psi": ("parameter", 0.8, "N.m.s/rad", "Heading hold: derivative gain"),
+    "omega_psi": ("parameter", 1.0, "rad/s", "Heading hold: natural frequency of the reference model"),
+    "r_max": ("parameter", 0.3, "rad/s", "Heading hold: most yaw velocity of the reference"),
+    "T_t": ("parameter", 1.0, "s", "Tracking time of the anti-windup"),
+    "u_max": ("parameter", 1.0, "1", "Most of a command with a full battery, 0 ... 1"),
+    "u_rate": ("parameter", 4.0, "1/s", "Most change of a command"),
+    "a_t_rear": ("parameter", 42.9, "N", "Quadratic thrust coefficient of the rear pair"),
+    "b_t_rear": ("parameter", 2.711, "N", "Linear thrust coefficient of the rear pair"),
+    "a_t_top": ("parameter", 6.494, "N", "Quadratic thrust coefficient of the top thruster"),
+    "b_t_top": ("parameter", 0.0513, "N", "Linear thrust coefficient of the top thruster"),
+    "R": ("parameter", 0.22, "m", "Distance from the centre of mass to a rear thruster"),
+    "gamma": ("parameter", 0.423, "rad", "Angle of the rear thrusters' force about the centre of mass"),
 }
 
 
@@ -125,6 +125,8 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
     author = "rov-fmu"
     description = "Depth hold and heading hold: two PID loops from depth and heading to thruster commands"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
+    variables = VARIABLES
+    terminals = (("pose", ("z", "psi")), ("thrusters", ("u_l", "u_r", "u_t")))
 
     u_l: float
     u_r: float
@@ -134,15 +136,13 @@ class Autopilot(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
         self.depth = Hold()
         self.heading = Hold(FULL_TURN)
-        for causality, variability, variables in (
-            (Fmi2Causality.input, Fmi2Variability.continuous, _INPUTS),
-            (Fmi2Causality.output, Fmi2Variability.discrete, _OUTPUTS),
-            (Fmi2Causality.parameter, Fmi2Variability.tunable, _PARAMETERS),
-        ):
-            for name, (start, text) in variables.items():
-                setattr(self, name, start)
-                kind, changes = (Boolean, Fmi2Variability.discrete) if start is False else (Real, variability)
-                self.register_variable(kind(name, description=text, causality=causality, variability=changes))
+        changes = {"input": Fmi2Variability.continuous, "output": Fmi2Variability.discrete}
+        for name, (causality, start, _, text) in VARIABLES.items():
+            setattr(self, name, start)
+            variability = changes.get(causality, Fmi2Variability.tunable)
+            kind, variability = (Boolean, Fmi2Variability.discrete) if start is False else (Real, variability)
+            how = {"causality": Fmi2Causality[causality], "variability": variability}
+            self.register_variable(kind(name, description=text, **how))
 
     def do_step(self, current_time: float, step_size: float) -> bool:  # noqa: ARG002
         """Sample the sensors at the start of the step; the commands are there at its end."""

@@ -1,0 +1,145 @@
+"""Step the FMUs of a system with FMPy: all pass on their outputs, then all take a step with what they got (Jacobi).
+
+So an input gets the output that another FMU had at the beginning of the step. The error is of first order in the step,
+and the result does not depend on the order of the FMUs. Ecos and libcosim do the same.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from types import MappingProxyType
+from typing import Any
+
+from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.part import Value
+from rov_fmu.io.groups import grouped
+from rov_fmu.io.messages import brief, reason_of
+from rov_fmu.prove.runs import RunError, forget_message, keep_message, last_message
+
+Name = tuple[str, str]
+"""A component and a variable."""
+_Values = dict[Name, Any]
+_TYPES = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
+"""The types whose functions have the name of another type."""
+
+
+class Master:
+    """The instances of a system, which are stepped together."""
+
+    def __init__(self, folders: Mapping[str, str], connections: Sequence[Connection], read: Sequence[Name]) -> None:
+        """`folders` has the unpacked FMU of each component, and `read` names the variables that are returned."""
+        import fmpy
+
+        self._folders, self._sources, self._read = folders, {c.end: (c.start, c.factor) for c in connections}, read
+        self._descriptions = {
+            name: fmpy.read_model_description(folder, validate=False) for name, folder in folders.items()
+        }
+        self._variables = {
+            (name, v.name): v for name, description in self._descriptions.items() for v in description.modelVariables
+        }
+        self._wanted = {*read, *(c.start for c in connections)}
+        self._fmus: dict[str, Any] = {}
+
+    def begin(
+        self,
+        values: Mapping[str, Mapping[str, Value]],
+        step: float,
+        stop: float,
+        start: float = 0.0,
+        inputs: Mapping[Name, Sequence[Any]] = MappingProxyType({}),
+    ) -> list[float]:
+        """Make and initialize the instances, and return the variables at the start. Raises RunError.
+
+        `inputs` has the values of inputs that are not connected, one for each step.
+        """
+        self.end()
+        self._start, self._step, self._done = start, step, 0
+        for name in self._folders:
+            with _reasons(name, "the initialization", self._folders):
+                self._initialize(name, values.get(name, {}), start, stop)
+        self._getters = self._calls("get", self._wanted)
+        self._setters = self._calls("set", self._sources)
+        self._inputs, self._given = inputs, self._calls("set", inputs)
+        self._now = self._outputs()
+        return self._row()
+
+    def step(self, count: int) -> list[list[float]]:
+        """Take some steps, and return the variables after each one. Raises RunError."""
+        rows = []
+        for _ in range(count):
+            t = self._start + self._done * self._step
+            for name, names, put in self._given:
+                with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
+                    put([self._inputs[one][self._done] for one in names])
+            for name, ends, put in self._setters:
+                with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
+                    put([self._passed(end) for end in ends])
+            for name, fmu in self._fmus.items():
+                with _reasons(name, f"the step at {t:.6g} s", self._folders):
+                    returned = fmu.doStep(currentCommunicationPoint=t, communicationStepSize=self._step)
+                    if returned and returned[1]:
+                        raise RunError("the FMU ended the run")
+            self._done += 1
+            self._now = self._outputs()
+            rows.append(self._row())
+        return rows
+
+    def end(self) -> None:
+        """End the instances. The libraries stay loaded, because loading one again has crashed processes."""
+        for name, fmu in self._fmus.items():
+            with suppress(Exception):
+                fmu.terminate()
+            getattr(fmu, f"fmi{self._version(name)}FreeInstance")(fmu.component)
+        self._fmus = {}
+
+    def _version(self, name: str) -> int:
+        return int(self._descriptions[name].fmiVersion[:1])
+
+    def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
+        from fmpy.simulation import instantiate_fmu
+
+        forget_message()
+        fmu = instantiate_fmu(self._folders[name], self._descriptions[name], "CoSimulation", logger=keep_message)
+        self._fmus[name] = fmu
+        times = {"startTime": start, "stopTime": stop}
+        if self._version(name) == 2:
+            fmu.setupExperiment(**times)
+            times = {}
+        for _, names, put in self._calls("set", [(name, variable) for variable in values]):
+            put([values[variable] for _, variable in names])
+        fmu.enterInitializationMode(**times)
+        fmu.exitInitializationMode()
+
+    def _calls(self, verb: str, names: Iterable[Name]) -> list[tuple[str, list[Name], Callable[..., Any]]]:
+        """Return functions that get or set all variables of a type of a component, with what they get or set."""
+        found: list[tuple[str, list[Name], Callable[..., Any]]] = []
+        for (component, kind), some in grouped(((name[0], self._variables[name].type), name) for name in names).items():
+            function = f"{verb}{_TYPES[self._version(component)].get(kind, kind)}"
+            references = [self._variables[name].valueReference for name in some]
+            found.append((component, some, partial(getattr(self._fmus[component], function), references)))
+        return found
+
+    def _passed(self, end: Name) -> Any:
+        """Return what an input gets."""
+        start, factor = self._sources[end]
+        return self._now[start] if factor == 1.0 else factor * self._now[start]
+
+    def _outputs(self) -> _Values:
+        now: _Values = {}
+        for name, names, get in self._getters:
+            with _reasons(name, "reading the outputs", self._folders):
+                now.update(zip(names, get(), strict=True))
+        return now
+
+    def _row(self) -> list[float]:
+        return [float(self._now[name]) for name in self._read]
+
+
+@contextmanager
+def _reasons(name: str, what: str, folders: Mapping[str, str]) -> Iterator[None]:
+    """Raise RunError, with the component and what it did, in place of what FMPy raises."""
+    try:
+        yield
+    except Exception as error:  # FMPy raises that itself
+        reason = brief(reason_of(error).replace(folders[name], "").rstrip("."), 240)
+        raise RunError(f"{name}: {what}: {reason}{brief(last_message(), 240)}") from error

@@ -1,0 +1,104 @@
+"""Run a system from its start to its end, in a child process, as a table and as a plot."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack, closing
+from io import BytesIO
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from rov_fmu.bridges.system.master import Master, Name
+from rov_fmu.bridges.system.part import kind_of
+from rov_fmu.bridges.system.ssp import Structure
+from rov_fmu.equation.units import in_degrees
+from rov_fmu.io.child_process import ChildError, ChildProcess
+from rov_fmu.io.groups import grouped
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError, Progress, silent
+from rov_fmu.prove.description import TIME_LIMIT, budget
+from rov_fmu.prove.runs import Array, RunError
+from rov_fmu.prove.unpacking import unpack_fmu
+from rov_fmu.report.plots.svg import name_axes, svg_file
+
+_CALL = 0.5
+"""The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
+
+_MOST = 100_000_000
+"""The most values of a run, which are in memory."""
+
+
+def recorded(structure: Structure) -> list[Name]:
+    """Return all outputs of a system that are numbers."""
+    return [
+        (component, name)
+        for component, part in structure.parts.items()
+        for name in part.names("output")
+        if kind_of(part.variables[name]) != "String"
+    ]
+
+
+def unpack_parts(structure: Structure, folder: str) -> dict[str, str]:
+    """Unpack the FMU of each component into a folder of its own, and return these folders."""
+    folders = {name: str(Path(folder, name)) for name in structure.parts}
+    for name, part in structure.parts.items():
+        unpack_fmu(BytesIO(part.content), Path(name), Path(folders[name]))
+    return folders
+
+
+def run_system(
+    structure: Structure, path: Path, read: Sequence[Name], step: float, steps: int, on_progress: Progress = silent
+) -> Array:
+    """Return the variables at the start and after each step, a row for each. Raises FileError about the path."""
+    if (count := (steps + 1) * len(read)) > _MOST:
+        raise FileError(
+            f"{path}: {steps} steps of {len(read)} variables give {count:,} values; at most {_MOST:,} are kept"
+        )
+    rows = list[Array]()
+    with temporary_folder("system-") as folder, ExitStack() as stack:
+        try:
+            folders = unpack_parts(structure, folder)
+            child = ChildProcess(Master, folders, structure.connections, read, limits=budget(TIME_LIMIT))
+            stack.enter_context(closing(child))
+            rows.append(np.array([child.call("begin", structure.values, step, step * steps)]))
+            done, count = 0, 1
+            while done < steps:
+                began = perf_counter()
+                rows.append(np.array(child.call("step", min(count, steps - done))))
+                done += len(rows[-1])
+                count = max(1, min(2 * count, int(count * _CALL / (perf_counter() - began + 1e-9))))
+                on_progress("running", done / steps)
+            child.call("end")
+        except (ChildError, RunError) as error:
+            raise FileError(f"{path}: the system cannot be run: {error}") from error
+    return np.concatenate(rows)
+
+
+def table(read: Sequence[Name], step: float, rows: Array) -> bytes:
+    """Return the rows as CSV, with the time first."""
+    header = ",".join(["time", *map(".".join, read)])
+    lines = (",".join(map(repr, [n * step, *row])) for n, row in enumerate(rows.tolist()))
+    return "\n".join([header, *lines, ""]).encode()
+
+
+def picture(structure: Structure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
+    """Return the plot of some variables, or of those that change and pass between the components: one panel a unit."""
+    columns = {".".join(name): n for n, name in enumerate(read)}
+    passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns
+    chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
+    units = {name: structure.parts[read[columns[name]][0]].unit(read[columns[name]][1])[0] for name in chosen}
+    panels = grouped((unit, name) for name, unit in units.items())
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots(max(1, len(panels)), sharex=True, squeeze=False)[:, 0]
+        for panel, (unit, some) in zip(axes, panels.items(), strict=False):
+            factor, printed = in_degrees(unit)
+            for name in some:
+                values = factor * rows[:, columns[name]]
+                panel.plot(step * np.arange(len(rows)), values, linewidth=1.2, label=name)
+            name_axes(panel, "", printed)
+            panel.legend(loc="center left", bbox_to_anchor=(1.1, 0.5))
+        axes[-1].set_xlabel("time (s)")
+
+    return svg_file(draw, (8.6, 1.0 + 1.9 * max(1, len(panels))), salt="system")

@@ -1,0 +1,213 @@
+"""Write a system of FMUs for co-simulation tools, as SSP 1.0 or as an OSP configuration, and read it from SSP."""
+
+import hashlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from io import BytesIO
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from lxml import etree
+
+from rov_fmu.bridges.system.connections import Connection, checked
+from rov_fmu.bridges.system.part import Part, Value, read_part
+from rov_fmu.fmu.archive import archive
+from rov_fmu.io.file_kinds import SYSTEM, check_suffix
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError, brief, shown
+from rov_fmu.io.paths import inside
+from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
+from rov_fmu.io.templates import render
+from rov_fmu.prove.unpacking import unpack_fmu
+
+PARAMETER_SET = "initial_values"
+"""The name of every component's parameter set. Ecos uses the sets of one name."""
+_STRUCTURE = "SystemStructure.ssd"
+_MOST_BYTES = 40_000_000
+"""The largest structure or parameter set that is read."""
+_MARK = b"rov-fmu system wrote this file. SHA-256 of what precedes its end: "
+_END = 22
+"""The bytes of the end of an archive without a comment (APPNOTE 4.3.16)."""
+
+
+@dataclass(frozen=True)
+class Component:
+    """An FMU, its start values and its connectors."""
+
+    fmu: str
+    """The name of its file."""
+    content: bytes
+    values: Mapping[str, Value]
+    inputs: Sequence[str]
+    outputs: Sequence[str]
+    types: Mapping[str, str] = field(default_factory=dict)
+    """The types of SSP of the connectors that are not Real."""
+
+
+@dataclass(frozen=True)
+class System:
+    """Components that are stepped together every `step` seconds until `stop`."""
+
+    name: str
+    components: Mapping[str, Component]
+    step: float
+    stop: float
+    connections: Sequence[Connection] = ()
+    groups: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    """The connections for OSP between variable groups of two components, which stand for all connections of the two."""
+
+    @property
+    def single_connections(self) -> list[Connection]:
+        """The connections that no group stands for."""
+        grouped = [{*pair} for pair in self.groups.values()]
+        return [one for one in self.connections if {one.start[0], one.end[0]} not in grouped]
+
+
+# ---- Writing ---------------------------------------------------------------------------------------------------------
+
+
+def ssp_content(system: System) -> bytes:
+    """Return the SSP archive: the structure, and for each component its FMU and a parameter set (SSV).
+
+    Its comment has a digest, by which `is_unchanged` knows the file.
+    """
+    files = {_STRUCTURE: _rendered("SystemStructure.ssd.j2", system=system).encode()}
+    for name, component in system.components.items():
+        files[f"resources/{component.fmu}"] = component.content
+        files[f"resources/{name}.ssv"] = parameter_set(component).encode()
+    packed = archive(files)
+    comment = _comment(packed)
+    return packed[:-2] + len(comment).to_bytes(2, "little") + comment
+
+
+def is_unchanged(path: Path) -> bool:
+    """Return True for an SSP of this program that nobody has changed since."""
+    content = read_bytes(path)
+    packed, mark, _ = content.rpartition(_MARK)
+    return bool(mark) and content == packed + _comment(packed)
+
+
+def _comment(packed: bytes) -> bytes:
+    """Return the comment for an archive, which tells that it is as it was written."""
+    return _MARK + hashlib.sha256(packed[:-_END]).hexdigest().encode()
+
+
+def parameter_set(component: Component) -> str:
+    """Return the parameter set (SSV) of a component."""
+    return _rendered("ParameterSet.ssv.j2", component=component)
+
+
+def write_osp(path: Path, system: System) -> None:
+    """Write the OSP configuration. The FMUs and their OSP model descriptions are in the same folder."""
+    path.write_text(_rendered("OspSystemStructure.xml.j2", system=system), encoding="utf-8")
+
+
+def _rendered(template: str, **content: Component | System) -> str:
+    return render(template, Path(__file__).parents[1] / "templates", parameter_set=PARAMETER_SET, **content)
+
+
+# ---- Reading ---------------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Structure:
+    """A system that was read."""
+
+    parts: Mapping[str, Part]
+    values: Mapping[str, Mapping[str, Value]]
+    """The start values of each component."""
+    connections: Sequence[Connection]
+    sources: Mapping[str, str] = field(default_factory=dict)
+    """The paths of the FMUs in the archive that was read."""
+
+
+def read_ssp(path: Path) -> Structure:
+    """Read an SSP 1.0 whose components are FMUs, without systems in the system. Raises FileError."""
+    check_suffix(path, SYSTEM)
+    with temporary_folder("ssp-") as unpacked:
+        folder = Path(unpacked)
+        unpack_fmu(BytesIO(read_bytes(path)), path, folder, SYSTEM)
+        try:
+            return _structure(folder, path)
+        except ValueError as error:
+            if isinstance(error, FileError):
+                raise
+            raise FileError(f"{path}: {error}") from error
+
+
+def _structure(folder: Path, path: Path) -> Structure:
+    """Return the system in a folder. Raises FileError, or ValueError with only the reason."""
+    root = _root(folder, _STRUCTURE)
+    parts: dict[str, Part] = {}
+    read: dict[str, Part] = {}
+    values: dict[str, dict[str, Value]] = {}
+    sources: dict[str, str] = {}
+    for element in root.iterfind("{*}System/{*}Elements/*"):
+        name = element.get("name", "")
+        if etree.QName(element).localname != "Component":
+            raise ValueError(f"{_STRUCTURE}: {shown(name)} is no component: systems in systems are not read")
+        source = sources[name] = element.get("source", "")
+        if source not in read:
+            read[source] = read_part(path, _file(folder, source).read_bytes(), f": {name}")
+        part = parts[name] = read[source]
+        values[name] = {}
+        for binding in element.iterfind("{*}ParameterBindings/{*}ParameterBinding"):
+            own = binding.get("source")
+            for given in (_root(folder, own) if own else binding).iterfind(".//{*}Parameters/{*}Parameter"):
+                key = given.get("name", "")
+                try:
+                    values[name][key] = part.start_value(key, _value(given))
+                except ValueError as error:
+                    raise ValueError(f"start value of {name}.{key}: {error}") from error
+    if not parts:
+        raise ValueError(f"{_STRUCTURE}: has no component")
+    connections = [_connection(one, parts) for one in root.iterfind("{*}System/{*}Connections/{*}Connection")]
+    return Structure(parts, values, connections, sources)
+
+
+def _file(folder: Path, name: str) -> Path:
+    """Return the path of a file of an unpacked system. Raises ValueError."""
+    try:
+        path = inside(folder, name)
+    except ValueError as error:
+        raise ValueError(f"source = {shown(name)}: {error}") from error
+    if not path.is_file():
+        raise ValueError(f"source = {shown(name)}: there is no such file in the archive")
+    return path
+
+
+def _root(folder: Path, name: str) -> Any:
+    """Return the root element of a file of an unpacked system. Raises ValueError."""
+    path = _file(folder, name)
+    if (size := path.stat().st_size) > _MOST_BYTES:
+        raise ValueError(f"{name} {too_large(size, _MOST_BYTES)}")
+    try:
+        return root_of_xml(path.read_bytes())
+    except etree.XMLSyntaxError as error:
+        raise ValueError(f"{name}: not XML: {brief(error.msg)}") from error
+
+
+def _value(parameter: Any) -> Value:
+    """Return the value of a parameter. Raises ValueError."""
+    for kind in parameter:
+        text = kind.get("value", "")
+        match etree.QName(kind).localname:
+            case "Boolean":
+                return bool(text in ("true", "1"))
+            case "String":
+                return str(text)
+            case "Real" | "Integer" | "Enumeration" if isfinite(number := float(text)):
+                return number
+    raise ValueError("must be a finite number, a Boolean or a text")
+
+
+def _connection(one: Any, parts: Mapping[str, Part]) -> Connection:
+    """Return a connection. Raises ValueError."""
+    keys = "startElement", "startConnector", "endElement", "endConnector"
+    start, output, end, name = (one.get(key, "") for key in keys)
+    changed = one.find("{*}LinearTransformation")
+    factor = 1.0 if changed is None else float(changed.get("factor", 1.0))
+    if (changed is not None and float(changed.get("offset", 0.0))) or not isfinite(factor):
+        raise ValueError(f"the connection from {start}.{output}: only a finite factor without an offset is read")
+    return checked(Connection((start, output), (end, name), factor), parts)

@@ -1,0 +1,147 @@
+"""A system from its plan: the FMUs are made or read, and everything that does not fit is told."""
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+
+from rov_fmu.bridges.system.companion import companion, lack
+from rov_fmu.bridges.system.connections import Connection, MismatchError, connected, loop
+from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
+from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
+from rov_fmu.bridges.system.ssp import Component, Structure, System
+from rov_fmu.build import build
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError, lines_on, listed
+from rov_fmu.io.paths import inside
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.io.toml_file import LARGEST, key_line
+from rov_fmu.vehicle.shipped import named_in
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle, read_vehicle
+
+_MOST_BYTES = 1_000_000_000
+"""The most bytes of all FMUs, which are in memory."""
+
+
+def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda _: None) -> Structure:
+    """Return the system of a plan, which was read from a path. `on_part` is called with each component.
+
+    Raises SystemPlanError with every reason, FileError about a vehicle, BuildError if its FMU cannot be built.
+    """
+    wrong = [
+        key_line(f"component.{name}.companion", reason, table.companion)
+        for name, table in plan.component.items()
+        if table.companion and (reason := lack(table.companion))
+    ]
+    if wrong:
+        raise SystemPlanError(*lines_on(path, wrong))
+    parts, unread, size = dict[str, Part](), list[str](), 0
+    ready: dict[str, Part] = {}
+    for name, table in plan.component.items():
+        on_part(name)
+        kind = table.model_dump_json(include={*SOURCES, "file", "point"})  # components of one kind have one FMU
+        try:
+            ready[kind] = parts[name] = ready.get(kind) or _part(name, table, path)
+        except FileError as error:
+            unread += str(error).split("\n")
+            continue
+        if (size := size + len(parts[name].content)) > _MOST_BYTES:
+            raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
+    if unread:
+        raise SystemPlanError(*unread)
+    values: dict[str, dict[str, Value]] = {}
+    wrong += _set_values(plan, path, parts, values)
+    connections = list[Connection]()
+    wrong += _connect(plan, parts, connections)
+    if not wrong and (around := loop(connections, parts)):
+        reason = "is a loop without delay, for each output follows its input at once: put an FMU with a state into it"
+        wrong.append(f"connect: {' -> '.join(around)} {reason}")
+    if wrong:
+        raise SystemPlanError(*lines_on(path, wrong))
+    return Structure(parts, values, connections)
+
+
+def _part(name: str, table: ComponentTable, path: Path) -> Part:
+    """Make or read the FMU of a component. Raises FileError, BuildError."""
+    key, folder = f"component.{name}", path.parent
+    if table.fmu:
+        file = inside(folder, table.fmu)
+        return read_part(file, read_bytes(file))
+    if table.companion:
+        content = companion(table.companion, inside(folder, table.file) if table.file else None)
+        return read_part(Path(table.companion), content, is_ours=True)
+    file = named_in(path, f"{key}.vehicle", table.vehicle or "", SystemPlanError)
+    points = "".join(
+        f'\n[[point]]\nname = "{point}"\n'
+        f'position = {{ value = {[*position]}, unit = "m", source = "the plan of a system" }}\n'
+        for point, position in table.point.items()
+    )
+    vehicle = read_vehicle(file, read_bytes(file, VehicleFileError, most=LARGEST) + points.encode())
+    with temporary_folder("system-") as made_in:
+        built = build(vehicle, Path(made_in, f"{vehicle.identifier}.fmu"), platforms="host", interface="cs").path
+        return read_part(file, built.read_bytes(), is_ours=True)
+
+
+def _set_values(
+    plan: SystemPlan, path: Path, parts: Mapping[str, Part], values: dict[str, dict[str, Value]]
+) -> Iterator[str]:
+    """Fill in the start values, and yield a line for each that does not fit."""
+    for name, table in plan.component.items():
+        values[name] = {}
+        key = f"component.{name}"
+        given: dict[str, tuple[str, Value]] = {}
+        if table.coefficients:
+            file = named_in(path, f"{key}.coefficients", table.coefficients, SystemPlanError)
+            own = load_vehicle(file).coefficients
+            given = {one: (f"{key}.coefficients: {one}", value) for one, value in own.items()}
+        given |= {one: (f"{key}.start.{one}", value) for one, value in table.start.items()}
+        for one, (where, value) in given.items():
+            try:
+                values[name][one] = parts[name].start_value(one, value)
+            except ValueError as error:
+                yield key_line(where, str(error), value)
+
+
+def _connect(plan: SystemPlan, parts: Mapping[str, Part], connections: list[Connection]) -> Iterator[str]:
+    """Fill in the connections, and yield a line for each that does not fit."""
+    lines: dict[tuple[str, str], int] = {}
+    for n, (first, second, factor) in enumerate(plan.connect, 1):
+        try:
+            found = connected(first, second, factor, parts)
+            for one in found:
+                if one.end in lines:
+                    before = lines[one.end]
+                    where = f"connect#{before} connects it too" if before < n else "this line connects it twice"
+                    raise MismatchError(f"{'.'.join(one.end)} takes one connection, and {where}")
+                lines[one.end] = n
+        except MismatchError as error:
+            yield key_line(f"connect#{n}", str(error), [first, second])
+            continue
+        connections += found
+    for component, name in plan.plotted:
+        has = parts[component].variables if component in parts else {}
+        if name not in has or kind_of(has[name]) == "String":
+            yield key_line("plot", "must name variables that are numbers, as component.variable", f"{component}.{name}")
+
+
+def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
+    """Yield a sentence for each component that has inputs which the plan neither connects nor sets."""
+    ends = {one.end for one in structure.connections}
+    for component, part in structure.parts.items():
+        set_here = plan.component[component].start
+        free = [name for name in part.names("input") if (component, name) not in ends and name not in set_here]
+        if free:
+            yield f"{component}: nothing is connected to {listed(free)}, which keep their start values"
+
+
+def files_of(plan: SystemPlan, structure: Structure, name: str) -> System:
+    """Return the system as the writers of SSP and OSP take it.
+
+    Only inputs that are connected are connectors, because FMPy sets every one of them at every step.
+    """
+    components = {}
+    for component, part in structure.parts.items():
+        inputs = [one.end[1] for one in structure.connections if one.end[0] == component]
+        outputs = part.names("output")
+        types = {name: kind_of(part.variables[name]) for name in (*inputs, *outputs)}
+        values = structure.values[component]
+        components[component] = Component(f"{component}.fmu", part.content, values, inputs, outputs, types)
+    return System(plan.title or name, components, plan.step, plan.stop_time, structure.connections)

@@ -1,0 +1,109 @@
+"""What an identification tells while it works: its stages, with their usual shares of the time, and first answers."""
+
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from math import exp, hypot, inf
+
+import numpy as np
+
+from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.units import in_degrees
+from rov_fmu.identify.assess import tested_commands
+from rov_fmu.identify.likelihood.filter import DivergedError
+from rov_fmu.identify.likelihood.objective import OUTLYING, Objective
+from rov_fmu.identify.likelihood.records import AHEAD
+from rov_fmu.identify.likelihood.search import SETTLING
+from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.result import LEAST_TESTED
+from rov_fmu.io.messages import Progress, silent
+
+OnAnswer = Callable[[str, str], None]
+"""A function that is called with the name of an axis, and with what is known about it so far."""
+
+_STAGES = {
+    "start 1": (0.10, 6.0),
+    "start 2": (0.04, 8.0),
+    "all samples": (0.14, 5.0),
+    "hypotheses": (0.38, 3.0),
+    "shape of the thrust": (0.05, 4.0),
+    "exact derivatives": (0.03, 1.0),
+    "quadratic thrust": (0.11, 5.0),
+    "predicting what was left out": (0.12, 5.0),
+    "what to measure next": (0.03, 2.0),
+}
+"""The stages in their order, each with its usual share of the work, and the number of steps in which 63 % of it are
+done, because nothing tells how many steps there will be. The numbers are about the means over recorded logs."""
+_USUAL = 0.5
+"""The command of which the speed is told, or the strongest tested one if that is weaker."""
+
+
+class Work:
+    """What an identification tells of its work."""
+
+    def __init__(self, on_progress: Progress = silent, on_answer: OnAnswer | None = None) -> None:
+        self._on_progress, self._on_answer = on_progress, on_answer
+        self._share, self._done = 0.0, dict[str, float]()
+        self._told: dict[str, str] = {}
+
+    def steps(self, stage: str, words: str = "") -> Callable[[float], None]:
+        """Return a function to call with the number of steps of a stage that are done. `words` name the stage.
+
+        The share of the work never goes back. A stage that is left out is no part of the work.
+        """
+        later = [*_STAGES][[*_STAGES].index(stage) + 1 :]
+        share, usual = _STAGES[stage]
+
+        def show(count: float) -> None:
+            self._done |= {name: _STAGES[name][0] for name in self._done} | {stage: share * (1.0 - exp(-count / usual))}
+            left = share - self._done[stage] + sum(_STAGES[name][0] for name in later)
+            done = sum(self._done.values())
+            self._share = max(self._share, done / (done + left))
+            self._on_progress(words or stage, self._share)
+
+        return show
+
+    def fits(self, objective: Objective, minimum: Minimum) -> None:
+        """Tell the answers of a fit, where they are others than before."""
+        for axis, words in so_far(objective, minimum) if self._on_answer else ():
+            if self._on_answer and self._told.get(axis.name) != words:
+                self._told[axis.name] = words
+                self._on_answer(axis.name, words)
+
+
+def so_far(objective: Objective, minimum: Minimum) -> Iterator[tuple[Axis, str]]:
+    """Yield what a fit tells of each axis, such as `heave 0.46 m/s at 50%, fits the depth to 2 cm`.
+
+    The speed is that at half the full command, or at the strongest tested one if that is weaker. The fit is judged by
+    the errors of predictions over 10 s.
+    """
+    with suppress(DivergedError):
+        vehicle, shapes = objective.table.model(minimum.z)
+        errors = _errors(objective, minimum)
+        for axis, (astern, ahead) in tested_commands(objective, minimum.z).items():
+            sign = 1.0 if ahead >= LEAST_TESTED else -1.0
+            command = sign * min(ahead if sign > 0.0 else astern, _USUAL)
+            speed = abs(float(shapes.motions(vehicle, axis, np.array([command])).response()[0][0]))
+            if abs(command) >= LEAST_TESTED and 0.0 < speed < inf:
+                fits = f", fits the {errors[axis]}" if axis in errors else ""
+                yield axis, f"{axis.name} {speed:.2g} {axis.unit} at {command:.0%}{fits}"
+
+
+def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
+    """Return by how much predictions over 10 s are wrong (RMS), in words, with the first quantity of each axis."""
+    squares: dict[Axis, tuple[str, str, float, int]] = {}
+    for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
+        off = objective.run(minimum.z, n, begin=SETTLING, span=AHEAD).innovations
+        usual = np.abs(minimum.data[n].normalised) < OUTLYING
+        for number, m in enumerate(sampled.measured):
+            own = off[usual & (record.sensor == number)]
+            name, unit, sum_, count = squares.get(m.sensor.axis, (m.channel.quantity.name, "", 0.0, 0))
+            if name == m.channel.quantity.name and len(own):
+                unit = m.channel.quantity.unit
+                squares[m.sensor.axis] = name, unit, hypot(sum_, float(np.linalg.norm(own))), count + len(own)
+    return {axis: _in_words(name, unit, size / count**0.5) for axis, (name, unit, size, count) in squares.items()}
+
+
+def _in_words(name: str, unit: str, error: float) -> str:
+    """Return the error of a quantity, such as `depth to 2 cm`."""
+    factor, unit = (100.0, "cm") if unit == "m" and error < 1.0 else in_degrees(unit)
+    return f"{name} to {factor * error:.2g} {unit}"

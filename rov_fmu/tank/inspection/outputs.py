@@ -1,0 +1,192 @@
+"""What each output of a log moves, by regression, and the thrusters that would do so: a guess for a draft of rov.toml.
+
+Each axis is taken alone, without what the others do to it: v' = sum b_i f(u_i) - d v + c, where f is the usual thrust
+at a command. Both sides are integrated with a smooth window w that vanishes at its ends together with two derivatives,
+so that no measurement is differentiated: the integral of w v' is that of -w' v, or of w'' z for a position z
+(modulating functions, Shinbrot 1957, Trans. ASME 79, 547).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.layout import Layout
+from rov_fmu.equation.parts import SourcedVector, Thruster, VehicleAxis
+from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.clocks import first_in_each
+from rov_fmu.tank.log import Channel, Log
+from rov_fmu.vehicle.full_thrust import usual_thrust
+from rov_fmu.vehicle.geometry import undriven_axes
+
+LINEAR = (SURGE, SWAY, HEAVE)
+GUESSED = (*LINEAR, YAW)
+"""The axes of which a draft guesses what moves the vehicle along them."""
+RADIUS = 0.14
+"""The usual radius of gyration about the vertical axis, m: 0.12 to 0.17 in the vehicles that ship."""
+_ARM, _LONGEST = 0.15, 0.4
+"""The arm of a thruster that turns the vehicle where nothing tells it, and the longest one, m."""
+_SPANS, _POINTS, _STEP, _GAP = (1.0, 2.0, 4.0), 41, 0.5, 1.0
+"""The lengths of the windows that are tried, s: a long one suits a slow axis and a noisy sensor. The number of their
+points, the time between two of them, s, and the longest time without a sample in one, s."""
+_MOST_WINDOWS, _LEAST_WINDOWS = 3000, 24
+"""The most windows of a log, and the least that tell anything."""
+_ALIKE = 0.1
+"""The least singular value, relative to the largest one, of combinations of commands that are told apart."""
+_CLEAR, _LEAST_PART = 3.0, 0.2
+"""An output moves an axis if its effect is so many standard errors, and this part of the largest one on this axis."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """The acceleration along each axis that the full command of an output causes, m/s² or rad/s²."""
+
+    shown: frozenset[Axis]
+    """The axes that the logs show."""
+    by_output: Mapping[str, Mapping[Axis, float]]
+    """The axes that each output clearly moves, with the accelerations."""
+    driven: frozenset[Axis] | None = None
+    """The axes along which known thrusters push alone; None where the outputs have to tell it."""
+
+    @cached_property
+    def thrusters(self) -> dict[str, Thruster]:
+        """The thrusters that would do so, without those of which no log shows what they move."""
+        found = ((name, self._thruster(name, effects)) for name, effects in self.by_output.items())
+        return {name: thruster for name, thruster in found if thruster}
+
+    @property
+    def undriven(self) -> list[Axis]:
+        """The axes that the logs show, and along which no output pushes alone."""
+        if self.driven is not None:
+            return [axis for axis in GUESSED if axis not in self.driven]
+        if len(self.thrusters) < len(self.by_output):
+            return []
+        layout = Layout(tuple(VehicleAxis(axis) for axis in GUESSED), (), tuple(self.thrusters.values()))
+        driven = {axis for effects in self.by_output.values() for axis in effects}
+        return [axis for axis in self.shown if axis not in driven or axis in dict(undriven_axes(layout))]
+
+    def _thruster(self, name: str, effects: Mapping[Axis, float]) -> Thruster | None:
+        """Return a thruster with the direction of its push, and beside the centre of mass if it turns the vehicle."""
+        push = np.array([effects.get(axis, 0.0) for axis in LINEAR])
+        turn, size = effects.get(YAW, 0.0), float(np.max(np.abs(push)))
+        if not (size or turn):
+            return None
+        arm = float(np.clip(RADIUS**2 * turn / size, -_LONGEST, _LONGEST)) if size else np.sign(turn) * _ARM
+        if not size:  # what pushes along an axis that a log shows would be seen there
+            push = np.array([0.0, 1.0, 0.0] if SURGE in self.shown and SWAY not in self.shown else [1.0, 0.0, 0.0])
+        along = np.round(push / np.max(np.abs(push)), 1)
+        at = np.round(np.cross(along / np.linalg.norm(along), [0.0, 0.0, arm]), 2) + 0.0
+        told = ", ".join(f"{axis.name} {by:+.2g} {axis.unit}2" for axis, by in effects.items())
+        source = f"A guess: its full command accelerates {told}"
+        x, y, z = along.tolist()
+        return Thruster(
+            name=name,
+            description="",
+            direction=SourcedVector((x, y, z), source),
+            position=SourcedVector((*at.tolist(),), source),
+            curve="",
+        )
+
+
+NOTHING_MOVED = Moved(frozenset(), {})
+
+
+def moved(logs: Sequence[Log]) -> Moved:
+    """Return what the outputs of logs of several axes move, where the logs show it."""
+    outputs = [name for log in logs if log.commands and not log.follows_axis for name in log.commands.thrusters]
+    effects: dict[str, dict[Axis, float]] = {name: {} for name in outputs}
+    shown = []
+    for axis in GUESSED:
+        fits = [fit for span in _SPANS for fit in _fits(logs, axis, [*effects], span)]
+        if fits:
+            shown.append(axis)
+            for name, by in max(fits, key=lambda fit: fit.clearest).clear(effects):
+                effects[name][axis] = by
+    return Moved(frozenset(shown), effects)
+
+
+def _fits(logs: Sequence[Log], axis: Axis, outputs: Sequence[str], span: float) -> Iterator["_Fit"]:
+    """Yield the regression for each quantity that shows an axis."""
+    for is_rate in (True, False):
+        rows = [
+            sides
+            for log in logs
+            for channel in log.channels
+            if channel.quantity.axis is axis and channel.quantity.is_velocity is is_rate and not channel.unused
+            for sides in _windows(log, channel, outputs, span)
+        ]
+        if rows:
+            left, right = (np.concatenate(side) for side in zip(*rows, strict=True))
+            yield _Fit.of(left, right, len(outputs), len(left) * _STEP / span)
+
+
+def _windows(log: Log, channel: Channel, outputs: Sequence[str], span: float) -> Iterator[tuple[Array, Array]]:
+    """Yield the sides of the equation for each window of a log: n, and n x outputs with a rate and a constant."""
+    time, values = channel.samples
+    if not log.commands or log.follows_axis or not len(time):
+        return
+    begins = time[first_in_each(time, 1.0 / _STEP)]
+    begins = begins[:: 1 + len(begins) // _MOST_WINDOWS]
+    begins = begins[begins + span <= min(time[-1], log.commands.end)]
+    begins = begins[begins >= log.commands.rows[0]]
+    gaps = np.append(0, np.cumsum(np.diff(time) > _GAP))
+    at = [np.searchsorted(time, begins, side="right") - 1, np.searchsorted(time, begins + span)]
+    begins = begins[gaps[at[0]] == gaps[at[1]]]
+    if len(begins) < _LEAST_WINDOWS:
+        return
+    part = np.linspace(0.0, 1.0, _POINTS)
+    window = np.polynomial.Polynomial([0.0, 1.0, -1.0]) ** 3
+    w, slope, bend = (window.deriv(n)(part) / span**n for n in range(3))
+    points = begins[:, None] + span * part
+    seen = np.interp(points, time, np.unwrap(values) if channel.quantity.wraps else values)
+    seen = seen - seen.mean(axis=1, keepdims=True)
+    commands = log.commands.at(points.ravel()).reshape(*points.shape, -1)
+    pushes = np.einsum("wpt,p->wt", usual_thrust(commands), w)
+    own = {name: pushes[:, n] for n, name in enumerate(log.commands.thrusters)}
+    is_rate = channel.quantity.is_velocity
+    rate = np.interp(points, time, values) @ w if is_rate else -(seen @ slope)
+    nothing = np.zeros(len(begins))
+    sides = [*(own.get(name, nothing) for name in outputs), rate, np.full(len(begins), w.sum())]
+    yield -(seen @ slope) if is_rate else seen @ bend, np.column_stack(sides)
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """The effects of outputs by a regression, and how clear each is: relative to its standard error."""
+
+    effects: Array
+    clearness: Array
+
+    @property
+    def clearest(self) -> float:
+        return float(np.max(self.clearness, initial=0.0))
+
+    @classmethod
+    def of(cls, left: Array, right: Array, outputs: int, independent: float) -> "_Fit":
+        """Fit n windows, of which so many are independent, because the others overlap with them.
+
+        Outputs that always get the same command share their effect: combinations of commands that hardly occur have
+        none.
+        """
+        scale = np.linalg.norm(right, axis=0)
+        scale[scale == 0.0] = 1.0
+        pushes, others = np.split(right / scale, [outputs], axis=1)
+        _, sizes, rows = np.linalg.svd(pushes, full_matrices=False)
+        occurring = rows[sizes > _ALIKE * sizes.max(initial=0.0)].T
+        sides = np.column_stack([pushes @ occurring, others])
+        inverse = np.linalg.pinv(sides)
+        errors = left - sides @ (inverse @ left)
+        of_row = float(errors @ errors) / max(min(independent, len(left)) - len(inverse), 1.0)
+        back = occurring @ inverse[: occurring.shape[1]]
+        deviation = np.sqrt(of_row * np.sum(back**2, axis=1))
+        found = back @ left
+        return cls(found / scale[:outputs], np.abs(found) / np.maximum(deviation, np.finfo(float).tiny))
+
+    def clear(self, outputs: Iterable[str]) -> Iterator[tuple[str, float]]:
+        """Yield the outputs that clearly move the axis, with the accelerations."""
+        largest = float(np.max(np.abs(self.effects), initial=0.0))
+        for name, effect, clearness in zip(outputs, self.effects.tolist(), self.clearness, strict=True):
+            if clearness > _CLEAR and abs(effect) >= _LEAST_PART * largest:
+                yield name, effect

@@ -1,0 +1,274 @@
+"""Plans of systems: what is connected, and what does not fit, in one line each; nothing is written then."""
+
+from functools import cache
+from pathlib import Path
+
+import pytest
+from fmpy.ssp.ssd import read_ssd
+
+from rov_fmu.bridges.system import companion as companions
+from rov_fmu.bridges.system import ssp, system
+from rov_fmu.bridges.system.connections import MismatchError, connected, loop
+from rov_fmu.bridges.system.part import Part, read_part
+from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
+from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
+from rov_fmu.cli import main
+from rov_fmu.fmu.terminals import port_of
+from rov_fmu.vehicle.shipped import VIDEORAY
+from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
+from tests.bridges.system.fmus import described, foreign, undescribed_build
+from tests.commands import without_progress
+
+PLAN = """
+step = 0.1
+stop_time = 1.0
+connect = [
+  ["rov.point_bow", "tether.bottom"],
+  ["water.current", "rov.current"],
+  ["water.profile", "tether.profile"],
+  ["rov.z", "water.z"],
+  ["a.y", "b.u"],
+]
+[component.rov]
+vehicle = "videoray"
+point = { bow = [0.2, 0.0, -0.1] }
+start = { z = 3.0 }
+[component.tether]
+companion = "tether"
+start = { length = 20.0 }
+[component.water]
+companion = "current"
+[component.a]
+fmu = "foreign.fmu"
+[component.b]
+fmu = "foreign.fmu"
+"""
+LAST = '["a.y", "b.u"],'
+
+
+_companion = cache(companions.companion)
+
+
+def _read_here(path: Path, content: bytes, where: str = "", **_: bool) -> Part:
+    return read_part(path, content, where, is_ours=True)
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The current folder, with FMUs, where vehicles are described and not compiled."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(system, "build", undescribed_build)
+    # It takes most of the time to start a process that reads an FMU of others: tests of `prove` do.
+    monkeypatch.setattr(system, "read_part", _read_here)
+    monkeypatch.setattr(ssp, "read_part", _read_here)
+    monkeypatch.setattr(system, "companion", _companion)
+    for name, content in {
+        "foreign": foreign(),
+        "feet": foreign("ft", m="1", factor="0.3048"),
+        "metres": foreign("metre", m="1"),
+        "unitless": foreign(""),
+        "switch": foreign("", "Boolean"),
+        "delayed": foreign(follows=False),
+        "broken": b"no FMU",
+        "ports": foreign(terminals="<x><Terminals><Terminal name='t'/>"),
+    }.items():
+        Path(f"{name}.fmu").write_bytes(content)
+
+
+def told(text: str, capsys: pytest.CaptureFixture[str]) -> list[str]:
+    """Write a plan, run the command, and return the lines of its error."""
+    Path("plan.toml").write_text(text, encoding="utf-8")
+    before = sorted(Path().iterdir())
+    assert main(["system", "plan.toml", "-o", "my.ssp"]) == 2
+    assert sorted(Path().iterdir()) == before, "nothing is half-written"
+    return without_progress(capsys.readouterr().err).splitlines()
+
+
+WRONG = {
+    "a component that is not there": (LAST, '["rovv.y", "b.u"],', "there is no component 'rovv', only rov, tether"),
+    "a variable that is not there": (LAST, '["a.yy", "b.u"],', "a: the FMU has no variable or terminal 'yy'"),
+    "no variable": (LAST, '["a", "b.u"],', "a: the FMU has no variable or terminal ''"),
+    "an input as a start": (LAST, '["a.u", "b.u"],', "a.u has causality input: a connection begins at an output"),
+    "an output as an end": (LAST, '["a.y", "b.y"],', "b.y has causality output"),
+    "a unit": ("foreign.fmu", "feet.fmu", "rov.z is in m, and a.u in ft: a third entry is the factor"),
+    "a type": ("foreign.fmu", "switch.fmu", "rov.z is of type Real, and a.u of type Boolean"),
+    "a terminal and a variable": (LAST, '["rov.pose", "b.u"],', "rov.pose is a terminal and b.u a variable"),
+    "a port of another kind": (LAST, '["rov.thrusters", "tether.top"],', "these terminals are of different kinds: rov"),
+    "two outputs": (LAST, '["rov.current", "rov.current"],', "member V_N is an input of rov.current and an input of"),
+    "an input twice": (LAST, '["rov.x", "water.z"],', "water.z takes one connection, and connect#4 connects it too"),
+    "a port twice": (LAST, '["tether.bottom", "rov.point_bow"],', "takes one connection, and connect#1 connects"),
+    "a loop": (LAST, '["a.y", "b.u"], ["b.y", "a.u"],', "connect: a.y -> b.u -> b.y -> a.u -> a.y is a loop without"),
+    "a loop of one": (LAST, '["a.y", "a.u"],', "connect: a.y -> a.u -> a.y is a loop without delay"),
+    "a start value of nothing": ("length = 20.0", "lenght = 20.0", "tether.start.lenght = 20.0: the FMU has no"),
+    "a calculated start": ("length = 20.0", "tension_top = 2.0", "cannot be set, because the FMU computes it"),
+    "a start that is text": ("length = 20.0", 'length = "20"', "must be a number"),
+    "a start out of bounds": ('fmu = "foreign.fmu"', 'fmu = "foreign.fmu"\nstart = { k = 11 }', "must be within 0"),
+    "a file that is no FMU": ("foreign.fmu", "broken.fmu", "broken.fmu: is not an FMU, or is damaged"),
+    "damaged terminals": ("foreign.fmu", "ports.fmu", "ports.fmu: terminalsAndIcons/terminalsAndIcons.xml: not XML"),
+    "a file that is not there": ("foreign.fmu", "gone.fmu", "gone.fmu: there is no such file"),
+    "a file elsewhere": ("foreign.fmu", "../foreign.fmu", "must lead to a place inside the folder of this file"),
+    "a vehicle that does not ship": ("videoray", "videorai", "component.rov.vehicle = 'videorai': there is no such"),
+    "a point with the name of another": ("bow =", "B =", "point"),
+    "two kinds": ('companion = "tether"', 'companion = "tether"\nfmu = "foreign.fmu"', "must have one of vehicle, fmu"),
+    "coefficients of another vehicle": (
+        "start = { z = 3.0 }",
+        'coefficients = "bluerov2_heavy"',
+        "component.rov.coefficients: ",
+    ),
+    "the time": ("stop_time = 1.0", "stop_time = 1.05", "stop_time = 1.05: must be a whole number of steps of 0.1 s"),
+    "a plot of nothing": ("step = 0.1", 'step = 0.1\nplot = ["rov.zz"]', "plot = 'rov.zz': must name variables"),
+    "the plan of a study": (PLAN, "vary = 3\nstep = 1", "must be the plan of a system (TOML), and not the plan of a"),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+@pytest.mark.usefixtures("folder")
+def test_what_does_not_fit_is_one_line(case: str, capsys: pytest.CaptureFixture[str]) -> None:
+    old, new, message = WRONG[case]
+    assert old in PLAN
+    # Of the two foreign FMUs, one is replaced, and is connected to the vehicle.
+    other = PLAN.replace(LAST, '["rov.z", "a.u"],') if old == "foreign.fmu" else PLAN
+    lines = told(other.replace(old, new, 1), capsys)
+    assert len(lines) == 1 or case in ("coefficients of another vehicle", "a port twice", "two kinds"), lines
+    assert lines[0].startswith("rov-fmu: ")
+    assert message in lines[0], lines
+
+
+@pytest.mark.usefixtures("folder")
+def test_every_mistake_is_told_at_once(capsys: pytest.CaptureFixture[str]) -> None:
+    text = PLAN.replace(LAST, '["x.y", "b.u"], ["a.y", "y.u"],').replace("length = 20.0", "lenght = 20.0")
+    keys = [line.split(": ")[2].split(" = ")[0] for line in told(text, capsys)]
+    assert keys == ["component.tether.start.lenght", "connect#5", "connect#6"]
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_package_that_is_missing_is_one_line(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(companions, "find_spec", lambda _: None)
+    (line,) = told(PLAN, capsys)
+    assert line.endswith("component.tether.companion = 'tether': needs moordyn: pip install 'rov-fmu[system]'")
+    assert main(["system", "--list"]) == 0
+    assert "needs moordyn" in capsys.readouterr().out
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_plan_becomes_a_system(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("plan.toml").write_text(PLAN.replace(LAST, '["a.y", "b.u", 2.0],'), encoding="utf-8")
+    assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
+    printed = capsys.readouterr()
+    assert "Wrote my.ssp" in printed.out
+    assert "rov: nothing is connected to u_l, u_r, u_t, X_ext, Z_ext and N_ext, which keep" in printed.err
+    found = read_ssp(Path("my.ssp"))
+    names = port_of(with_point().layout.points[0]).members
+    into = {variable for variable in names if found.parts["rov"].variables[variable].causality == "input"}
+    ends = {one.end: one.start for one in found.connections}
+    assert {("rov", name) for name in into} <= ends.keys()
+    assert {start[1] for start in ends.values() if start[0] == "rov"} == names.keys() - into | {"z"}
+    assert found.values["rov"] == {"z": 3.0}
+    assert [one.factor for one in found.connections if one.end == ("b", "u")] == [2.0]
+    # FMPy validates the structure and the parameter sets, and sets every input that is a connector.
+    elements = read_ssd("my.ssp").system.elements
+    connectors = {(e.name, c.name) for e in elements for c in e.connectors if c.kind == "input"}
+    assert connectors == {one.end for one in found.connections}
+    content = Path("my.ssp").read_bytes()
+    assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0, "it may replace its own file"
+    assert Path("my.ssp").read_bytes() == content
+    Path("my.ssp").write_bytes(content.replace(b"rov.fmu", b"Rov.fmu"))
+    assert not is_unchanged(Path("my.ssp"))
+    assert main(["system", "plan.toml", "-o", "my.ssp"]) == 2
+
+
+def with_point() -> Vehicle:
+    point = b'\n[[point]]\nname = "bow"\nposition = { value = [0.2, 0, -0.1], unit = "m", source = "drawing" }\n'
+    return read_vehicle(VIDEORAY, VIDEORAY.read_bytes() + point)
+
+
+def parts(**content: bytes) -> dict[str, Part]:
+    return {name: read_part(Path(name), one, is_ours=True) for name, one in content.items()}
+
+
+@pytest.mark.usefixtures("folder")
+def test_components_of_one_kind_share_an_fmu() -> None:
+    text = PLAN.replace(
+        "[component.a]", "[component.copy]\nvehicle = 'videoray'\npoint.bow = [0.2, 0.0, -0.1]\n[component.a]"
+    )
+    Path("plan.toml").write_text(text, encoding="utf-8")
+    found = system.made(load_system_plan(Path("plan.toml")), Path("plan.toml")).parts
+    assert found["copy"] is found["rov"]
+    assert found["a"] is found["b"]
+
+
+def test_units_are_alike_if_they_are_the_same_quantity() -> None:
+    has = parts(
+        m=foreign(), metre=foreign("metre", m="1"), none=foreign(""), feet=foreign("ft", m="1", factor="0.3048")
+    )
+    has["own"] = parts(own=foreign("m", m="1"))["own"]
+    for first, second in (("m", "own"), ("own", "metre"), ("m", "none"), ("none", "feet"), ("feet", "feet")):
+        connected(f"{first}.y", f"{second}.u", 1.0, has)
+    for first, second in (("own", "feet"), ("feet", "metre")):
+        with pytest.raises(MismatchError, match="a third entry is the factor"):
+            connected(f"{first}.y", f"{second}.u", 1.0, has)
+        connected(f"{first}.y", f"{second}.u", 0.3048, has)
+
+
+def test_a_loop_with_a_delay_is_allowed() -> None:
+    has = parts(a=foreign(), b=foreign(), late=foreign(follows=False))
+    around = [connected(f"{x}.y", f"{y}.u", 1.0, has)[0] for x, y in (("a", "b"), ("b", "late"), ("late", "a"))]
+    assert loop(around, has) == []
+    assert loop([*around[:1], *connected("b.y", "a.u", 1.0, has)], has) == ["a.y", "b.u", "b.y", "a.u", "a.y"]
+
+
+def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
+    """What a vehicle calls the members of its port is what a tether calls them."""
+    vehicle = with_point()
+    has = parts(rov=described(vehicle), tether=companions.companion("tether"))
+    for end in ("top", "bottom"):
+        found = connected("rov.point_bow", f"tether.{end}", 1.0, has)
+        assert len(found) == len(port_of(vehicle.layout.points[0]).members) == 9
+        assert {one.start[0] for one in found if one.end[0] == "rov"} == {"tether"}
+        assert {has["tether"].unit(one.end[1])[0] for one in found if one.end[0] == "tether"} == {"m", "m/s"}
+        assert {has["tether"].unit(one.start[1])[0] for one in found if one.start[0] == "tether"} == {"N"}
+    with pytest.raises(MismatchError, match=r"F_N is an input of rov.point_bow and an input of rov.point_bow"):
+        connected("rov.point_bow", "rov.point_bow", 1.0, has)
+
+
+@pytest.mark.parametrize("name", companions.COMPANIONS)
+def test_companions_have_units_and_the_same_bytes(name: str) -> None:
+    content = companions.companion(name)
+    assert companions.companion(name) == content
+    part = read_part(Path(name), content, is_ours=True)
+    slave = companions.slave_of(name)
+    assert part.variables.keys() == slave.variables.keys()
+    for variable, (causality, start, unit, text) in slave.variables.items():
+        v = part.variables[variable]
+        assert (v.causality, v.description) == (causality, text)
+        if v.type == "Real":
+            assert v.unit == unit
+            assert causality == "output" or float(v.start) == pytest.approx(start, rel=1e-15)
+    assert {member for one in part.terminals.values() for member in one.values()} <= part.variables.keys()
+    assert part.direct == {}, "outputs change with a step"
+
+
+def test_the_list_names_every_companion_with_its_variables(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["system", "--list"]) == 0
+    printed = capsys.readouterr().out
+    for name in companions.COMPANIONS:
+        assert f"{name}: {companions.slave_of(name).description}" in printed
+        assert all(variable in printed for variable in companions.slave_of(name).variables)
+
+
+@pytest.mark.usefixtures("folder")
+def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    many = "\n".join(f'[component.c{n}]\nfmu = "foreign.fmu"' for n in range(101))
+    (line,) = told(f"step = 1.0\nstop_time = 1.0\n{many}", capsys)
+    assert "component" in line
+    (line,) = told(PLAN.replace("step = 0.1", "step = 1e-9").replace("stop_time = 1.0", "stop_time = 1e9"), capsys)
+    assert "at most 10000000" in line
+    monkeypatch.setattr(system, "_MOST_BYTES", 100_000)
+    (line,) = told(PLAN, capsys)
+    assert "the FMUs have more than 100,000 bytes in all" in line
+    plan = Path("plan.toml")
+    plan.write_text(PLAN.replace("z = 3.0", f"z = {'9' * 400}"), encoding="utf-8")
+    with pytest.raises(SystemPlanError, match="must be a finite number"):
+        load_system_plan(plan)

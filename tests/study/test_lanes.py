@@ -1,0 +1,256 @@
+"""A vehicle runs in lanes as its FMU does, whatever it has."""
+
+import shutil
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pandas as pd
+import pytest
+
+from rov_fmu.cli import main
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.io.messages import FileError
+from rov_fmu.io.output import WriteError
+from rov_fmu.study import Progress, Results, study
+from rov_fmu.study.plan.model import variable, vehicle_model
+from rov_fmu.study.plan.plan import Plan
+from rov_fmu.study.plan.prepared import Prepared, prepare
+from rov_fmu.study.results.store import Store
+from rov_fmu.study.run.lanes import _Runs, simulated
+from rov_fmu.study.run.simulator import Simulator
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import without_progress
+from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, VIDEORAY, a_vehicle, passed, with_rotors
+
+KINDS: dict[str, Vehicle] = {
+    "videoray": VIDEORAY,
+    "heavy": HEAVY,
+    "everything": load_vehicle(EVERYTHING),
+    "thrust": load_vehicle(THRUST_EFFECTS),
+    "rotors": a_vehicle(with_rotors(SIX)),
+    "passed": a_vehicle(passed(HEAVY)),
+    "six": a_vehicle(SIX),
+}
+"""The vehicles whose FMUs the tests have in a folder (tests/conftest.py), by the name of that folder."""
+RUNS = 11
+
+
+def _prepared(rov: Vehicle, **keys: Any) -> Prepared:
+    """Return a plan in which all inputs change, and states, inputs and coefficients vary; every variable is kept."""
+    layout, model = rov.layout, vehicle_model(rov)
+    signals = {}
+    for n, (name, declared) in enumerate(layout.inputs.items()):
+        low, high = max(declared.minimum, declared.start - 0.3), min(declared.maximum, declared.start + 0.3)
+        signals[name] = {
+            "ramps": [[0.0, low + 0.05 * n * (high - low)], [0.7, high], [0.7, low], [1.5, declared.start]]
+        }
+    state, value = next(iter(layout.velocities)), rov["m_rov"]
+    plan: dict[str, Any] = {
+        "vehicle": "rov",
+        "stop_time": 2.0,
+        "step": 0.1,
+        "runs": RUNS,
+        "inputs": {name: signal for name, signal in signals.items() if model.variables[name].is_continuous},
+        "vary": {
+            "m_rov": {"uniform": [0.9 * value, 1.1 * value]},
+            state: {"uniform": [-0.1, 0.2]},
+            **({"psi_0": {"values": [0.0, 2.0]}} if layout.initial else {}),
+        },
+        "keep": {"outputs": list(model.variables)},
+        **keys,
+    }
+    return prepare(Plan.model_validate(plan), Path("plan.toml"), model)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: pytest.FixtureRequest) -> None:
+    """They are read before the first step and after each one, with the inputs of the step that ends there."""
+    rov, folder = KINDS[kind], str(request.getfixturevalue(f"{kind}_dir"))
+    prepared = _prepared(rov)
+    job, values = prepared.job, prepared.design.rows(0, RUNS)
+    fmu = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+    outputs, ended = simulated(job, rov, values)
+    assert ended.all()
+    worst: dict[str, float] = {}
+    for own, row in zip(outputs, values.tolist(), strict=True):
+        for name, found, told in zip(job.recorded, own, fmu.run(row).values(), strict=True):
+            worst[name] = max(worst.get(name, 0.0), np.abs(found - told).max() / max(1.0, np.abs(told).max()))
+        fmu.reset()
+    fmu.free()
+    assert max(worst.values()) < 1e-12, {n: v for n, v in worst.items() if v > 1e-12}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
+    prepared, rov = _prepared(KINDS[kind]), KINDS[kind]
+    values = prepared.design.rows(0, RUNS)
+    together, _ = simulated(prepared.job, rov, values, 1)
+    for order in ([0], [7, 3], [*range(RUNS)][::-1]):
+        assert np.array_equal(simulated(prepared.job, rov, values[order], 2)[0], together[order])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_vehicle_has_the_variables_of_its_fmu(kind: str, request: pytest.FixtureRequest) -> None:
+    folder = request.getfixturevalue(f"{kind}_dir")
+    description = fmpy.read_model_description(str(folder), validate=False)
+    own = {v.name: variable(v) for v in description.modelVariables}
+    computed = {name: replace(own[name], can_be_set=False) for name in QUATERNION if name in own}
+    assert vehicle_model(KINDS[kind]).variables == own | computed
+
+
+PLAN = """vehicle = "videoray"
+stop_time = 2.0
+step = 0.1
+runs = 40
+seed = 5
+[inputs]
+u_l = 0.3
+u_r.steps = [[0.0, 0.3], [1.0, -0.4]]
+[vary]
+m_rov.uniform = [6.0, 7.0]
+alpha_u.normal = { mean = 1.1, sd = 0.1 }
+[keep]
+outputs = ["u", "F_r"]
+every = 0.5
+[figures]
+end = "x[-1]"
+"""
+
+
+def _plan(folder: Path, text: str = PLAN) -> Path:
+    path = folder / "plan.toml"
+    path.write_text(text)
+    return path
+
+
+def _same(results: Results, other: Results) -> None:
+    pd.testing.assert_frame_equal(results.runs, other.runs, check_exact=True)
+    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), check_exact=True)
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "random", "latin-hypercube", "saltelli"])
+def test_parts_are_merged_to_the_bits_of_one_run(
+    sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Also with other numbers of runs and threads at a time."""
+    plan, parted = _plan(tmp_path, f'sampler = "{sampler}"\n{PLAN}'), tmp_path / "parted"
+    whole = study(plan, tmp_path / "whole", workers=1)
+    given = ["study", str(plan), "-o", str(parted)]
+    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 5)
+    for part in ("1/3", "3/3"):
+        assert main([*given, "--part", part]) == 0
+    assert not [*parted.glob("*.html")]
+    assert main([*given, "--merge"]) == 2
+    line = (
+        f"rov-fmu: {parted}: of 3 parts, these are missing or not complete: 2. Run them with --part, as in --part 2/3\n"
+    )
+    assert without_progress(capsys.readouterr().err) == line
+    assert not (parted / "study.json").exists()
+    assert len(study(plan, parted, part=(2, 3), workers=2).runs) in (13, 14)
+    assert main([*given, "--merge"]) == 0
+    _same(Results(parted), whole)
+    assert (parted / "study.html").exists()
+    assert not (parted / "parts").exists()
+    assert main(given) == 0, "it is a study like any other"
+    capsys.readouterr()
+    for more, reason in (
+        (["--part", "1/3"], "has runs that are no parts: choose another folder, or leave --part out"),
+        (["--merge"], "has no parts to merge: run each with --part, as in --part 1/8"),
+    ):
+        assert main([*given, *more]) == 2
+        assert capsys.readouterr().err.endswith(f"rov-fmu: {parted}: {reason}\n")
+
+
+def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, folder = _plan(tmp_path), tmp_path / "results"
+    whole = study(plan, tmp_path / "whole")
+    for number in (1, 2):
+        study(plan, folder, part=(number, 2))
+    for text, reason in (
+        (PLAN.replace("seed = 5", "seed = 6"), r"1-of-2: holds runs of another plan \(seed changed\): choose another"),
+        (PLAN.replace("runs = 40", "runs = 50"), "1-of-2: is a part of 40 runs, and not of 50: choose another"),
+        (
+            PLAN.replace("videoray", "videoray_refit"),
+            "1-of-2: holds runs of another FMU, for the vehicle videoray_refit",
+        ),
+    ):
+        changed = _plan(tmp_path, text)
+        for how in ({"merge": True}, {"part": (1, 2)}):
+            with pytest.raises(FileError, match=reason):
+                study(changed, folder, **how)
+    _plan(tmp_path)
+    study(plan, folder, part=(1, 3))
+    with pytest.raises(FileError, match="parts: has parts of 2 and of 3: remove those of one"):
+        study(plan, folder, merge=True)
+    shutil.rmtree(folder / "parts" / "1-of-3")
+    write, written = Store.write, list[int]()
+
+    def full(self: Store, first: int, *rest: Any) -> None:
+        if written:
+            raise WriteError(28, "No space left on device", "results")
+        written.append(first)
+        write(self, first, *rest)
+
+    with monkeypatch.context() as patched:
+        patched.setattr(Store, "write", full)
+        with pytest.raises(WriteError):
+            study(plan, folder, merge=True)
+    assert len(Results(folder).runs) == 20
+    _same(study(plan, folder, merge=True), whole)
+    study(plan, folder / "new", part=(1, 2))
+    study(plan, folder / "new", part=(2, 2))
+    shutil.copytree(folder / "new" / "parts", folder / "parts")
+    first = min((folder / "runs").iterdir())
+    first.rename(first.with_name("part-000000003-000000009.parquet"))
+    with pytest.raises(FileError, match=r"has runs that .*1-of-2 has, too: choose another folder"):
+        study(plan, folder, merge=True)
+
+
+def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    plan, progress = _plan(tmp_path), list[Progress]()
+    whole = study(plan, tmp_path / "whole")
+    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 7)
+
+    def interrupt(now: Progress) -> None:
+        progress.append(now)
+        if now.done == 21:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        study(plan, tmp_path / "results", on_progress=interrupt)
+    assert [*Results(tmp_path / "results").runs.index] == [*range(21)]
+    monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 4)
+    _same(study(plan, tmp_path / "results", on_progress=progress.append), whole)
+    assert [now.done for now in progress] == [0, 7, 14, 21, 21, 25, 29, 33, 37, 40]
+    assert {now.total for now in progress} == {40}
+
+
+def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(
+    six_dir: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rov = KINDS["six"]
+    prepared = _prepared(
+        rov,
+        vary={"m_a_uq": {"values": [rov["m_a_uq"], 1e3]}, "u": {"values": [0.1, 1e200]}},
+        sampler="grid",
+        runs=None,
+        keep={"outputs": ["x"]},
+        figures={"end": "x[-1]"},
+    )
+    values = prepared.design.rows(0, 4)
+    with ExitStack() as stack:
+        runs = _Runs(prepared.job, rov, None, stack)
+        monkeypatch.setattr(runs, "_unpacked", lambda: six_dir)
+        found = runs.do(values)
+    assert [run.status for run in found] == ["done", "failed", "failed", "failed"]
+    assert found[1].reason.startswith("the step at 0 s: ")
+    assert found[2].reason == found[3].reason
+    assert "the mass matrix of these parameters is not positive definite" in found[2].reason
