@@ -67,11 +67,13 @@ LARGER_FOLDERS = {
     "rov_fmu/interface": 13,
     "rov_fmu/tank": 13,
     "rov_fmu/tank/readers": 13,
+    "rov_fmu/vehicle": 13,
     "tests/identify": 13,
     "tests/tank": 13,
     "tests/tank/readers": 13,
     "tests/report": 13,
     "tests/fmu/calls": 16,
+    "tests/study": 14,
 }
 """The folders that have more than a dozen modules, without their __init__.py."""
 

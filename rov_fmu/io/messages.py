@@ -54,6 +54,7 @@ class RovError(Exception):
             InputError
                 UnknownNameError
             LoadError *
+            MismatchError *
             ProofError
             RunError *
             StudyError
@@ -61,8 +62,9 @@ class RovError(Exception):
             TuningError
             WriteError
 
-    FileError, InputError, OptionError and TuningError are also a ValueError, UnknownNameError is a KeyError, and
-    WriteError an OSError. Those with a star are internal: they become one of the others before they reach a caller.
+    FileError, InputError, MismatchError, OptionError and TuningError are also a ValueError, UnknownNameError is a
+    KeyError, and WriteError an OSError. Those with a star are internal: they become one of the others before they reach
+    a caller.
     """
 
 

@@ -336,7 +336,7 @@ def test_a_log_with_faults_gives_the_vehicle(change: Change, near: float, share:
     (heave,) = identify(load_tests(path), lambda _, share: shares.append(share)).axes
     assert shares == sorted(shares), "progress"
     assert (shares[0], 0.85 <= shares[-1] <= 1.0) == (0.0, True)
-    assert max(np.diff(shares)) < 0.4, "it does not stand still"
+    assert max(np.diff(shares)) < 0.5, "it does not stand still"
     check_answers(heave, near)
     by = {p.by: (p.time[0], p.time[-1]) for p in heave.predictions}
     assert by["the first half"][0] > by["the second half"][1] > 25.0, "each half is predicted from the other one"

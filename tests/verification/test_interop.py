@@ -165,7 +165,7 @@ def test_the_page_of_the_importers_has_all_of_them() -> None:
 
 def test_the_readme_names_only_importers_that_were_run() -> None:
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    (named,) = re.findall(r"which ([\w, ]+) and\s\[many other tools\]\(docs/importers.md\) read", readme)
+    (named,) = re.findall(r"battery in ([\w, ]+) and\s\[other tools\]\(docs/importers.md\)", readme)
     assert {*named.split(", ")} <= {importer.title for importer in IMPORTERS}
 
 

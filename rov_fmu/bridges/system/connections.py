@@ -5,7 +5,7 @@ from itertools import dropwhile
 from typing import NamedTuple
 
 from rov_fmu.bridges.system.part import Part, kind_of
-from rov_fmu.io.messages import listed, only, shown
+from rov_fmu.io.messages import RovError, listed, only, shown
 
 _CAUSALITIES = ("output", "input")
 
@@ -19,7 +19,7 @@ class Connection(NamedTuple):
     """By what the value is multiplied on its way."""
 
 
-class MismatchError(ValueError):
+class MismatchError(RovError, ValueError):
     """Two ends cannot be connected; the message is the reason."""
 
 
