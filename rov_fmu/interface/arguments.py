@@ -94,6 +94,14 @@ def checked_values(
     return arrays
 
 
+def checked_number(key: str, given: ArrayLike) -> float:
+    """Return one finite number. Raises InputError for anything else."""
+    values = _numbers(key, given)
+    if values.ndim:
+        raise InputError(f"{key}: must be one number, and has the shape {values.shape}")
+    return float(values)
+
+
 def name_at_start(name: str, layout: Layout) -> str:
     """Return the name of what sets a variable at the start: psi_0 for psi of a vehicle with roll or pitch.
 

@@ -256,9 +256,11 @@ class VehicleModel(Vehicle):
 
             rov_fmu.load("bluerov2").response("surge", 0.3)
 
-        Raises InputError if the vehicle has no such axis.
+        Raises InputError if the vehicle has no such axis, or if the command is not a finite number.
         """
-        return super().response(self._axis(axis), command)
+        from rov_fmu.interface.arguments import checked_number
+
+        return super().response(self._axis(axis), checked_number("command", command))
 
     def find(self, axis: Axis | str, velocity: float, inputs: Mapping[str, float] = _NONE) -> Steady:
         """Return the command, thrust and electric power that hold a steady velocity along an axis alone.
@@ -269,19 +271,27 @@ class VehicleModel(Vehicle):
 
             rov_fmu.load("bluerov2").find("surge", 1.0).thrust  # N
 
-        Raises InputError if no command gives this velocity, with the largest one in its direction.
+        Raises InputError if no command gives this velocity, with the largest one in its direction, and about an input
+        that is unknown, is a command or has no number.
         """
-        kind = self._axis(axis)
+        from rov_fmu.interface.arguments import checked_number, checked_values
+
+        kind, velocity = self._axis(axis), checked_number("velocity", velocity)
+        given = checked_values("inputs", inputs, self.layout.inputs, many=False)
+        for name in given:
+            if name in self.layout.commands:
+                raise InputError(f"inputs[{name!r}]: the commands are what is found")
         if kind in self.unidentified:
             raise InputError(f"{kind.name} was not identified, so no number of its motion is told")
-        return steady_with(self, kind, velocity, inputs)
+        return steady_with(self, kind, velocity, {name: float(value) for name, value in given.items()})
 
     def _axis(self, axis: Axis | str) -> Axis:
         """Return an axis of the vehicle. Raises InputError if it has no axis of this name."""
         kinds = {name: kind.axis for name, kind in self.layout.by_name.items()}
-        if isinstance(axis, str) and axis not in kinds:
-            raise InputError(f"axis = {shown(axis)}: the vehicle has no such axis{only(axis, [*kinds])}")
-        return kinds[axis] if isinstance(axis, str) else axis
+        name = axis.name if isinstance(axis, Axis) else axis
+        if not isinstance(name, str) or name not in kinds:
+            raise InputError(f"axis = {shown(name)}: the vehicle has no such axis{only(str(name), [*kinds])}")
+        return kinds[name]
 
     def _all_inputs(self, inputs: Mapping[str, float]) -> dict[str, float]:
         """Return the values of all inputs. What is kept between steps, such as commands that act, stays as it is."""

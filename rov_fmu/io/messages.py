@@ -50,6 +50,7 @@ class RovError(Exception):
                     UnreadableFileError
                 NoResultsError
                 PlanError
+                SystemPlanError *
                 VehicleFileError
             InputError
                 UnknownNameError

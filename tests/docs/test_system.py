@@ -162,7 +162,7 @@ def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.Mo
     assert {start[0] for start, _, _ in found.connections} == {"rov", "tether", "water", "autopilot"}
     assert [*system.unconnected(plan, found)] == [
         "rov: nothing is connected to X_ext, Z_ext and N_ext, which keep their start values",
-        "tether: nothing is connected to y_top, z_top, v_N_top, v_E_top and v_D_top, which keep their start values",
+        "tether: nothing is connected to y_top, z_top, vg_N_top, vg_E_top and vg_D_top, which keep their start values",
         "autopilot: nothing is connected to heave, yaw and sag, which keep their start values",
     ]
 

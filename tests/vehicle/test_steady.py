@@ -2,8 +2,9 @@
 
 import re
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -61,6 +62,24 @@ def test_the_engine_reaches_the_speed_that_was_found() -> None:
     assert found.power == pytest.approx(16.0 * 2.0 * (ahead + astern))
     assert rov.find("surge", 1.0, {"X_ext": -20.0}).thrust == pytest.approx(42.21)
     assert rov.find("heave", 0.0).thrust == pytest.approx(2.0), "against its buoyancy"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "reason"),
+    [
+        (("surge", "fast"), "velocity = 'fast': must be a number"),
+        (("surge", nan), "velocity = nan: must be a finite number"),
+        (("surge", [0.3, 0.5]), "velocity: must be one number"),
+        ((None, 0.1), "axis = None: the vehicle has no such axis"),
+        (("surge", 0.5, {"X_etx": 1.0}), "did you mean X_ext?"),
+        (("surge", 0.5, {"X_ext": "x"}), "inputs['X_ext'] = 'x': must be a number"),
+        (("surge", 0.5, {"u_1": 0.9}), "inputs['u_1']: the commands are what is found"),
+    ],
+)
+def test_what_is_no_speed_or_no_load_is_refused(arguments: tuple[Any, ...], reason: str) -> None:
+    with pytest.raises(InputError) as error:
+        rov_fmu.load("bluerov2").find(*arguments)
+    assert reason in str(error.value)
 
 
 def test_a_speed_that_no_command_gives_is_refused_with_the_largest_one(capsys: pytest.CaptureFixture[str]) -> None:

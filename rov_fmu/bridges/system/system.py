@@ -35,18 +35,22 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         raise SystemPlanError(*lines_on(path, wrong))
     parts, unread, size = dict[str, Part](), list[str](), 0
     ready: dict[str, Part] = {}
-    for name, table in plan.component.items():
+    for name, table in sorted(plan.component.items(), key=lambda item: item[1].vehicle is not None):
+        if table.vehicle and unread:
+            break  # vehicles are built last, because this takes the time
         on_part(name)
         kind = table.model_dump_json(include={*SOURCES, "file", "point"})  # components of one kind have one FMU
         try:
             ready[kind] = parts[name] = ready.get(kind) or _part(name, table, path)
         except FileError as error:
-            unread += str(error).split("\n")
+            where = f"{path}: component.{name}.fmu: " if table.fmu else ""
+            unread += [f"{where}{line}" for line in str(error).split("\n")]
             continue
         if (size := size + len(parts[name].content)) > _MOST_BYTES:
             raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
     if unread:
         raise SystemPlanError(*unread)
+    parts = {name: parts[name] for name in plan.component}
     values: dict[str, dict[str, Value]] = {}
     wrong += _set_values(plan, path, parts, values)
     connections = list[Connection]()
@@ -123,11 +127,16 @@ def _connect(plan: SystemPlan, parts: Mapping[str, Part], connections: list[Conn
 
 
 def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
-    """Yield a sentence for each component that has inputs which the plan neither connects nor sets."""
+    """Yield a sentence for each port, and each component with other inputs, that the plan neither connects nor sets."""
     ends = {one.end for one in structure.connections}
     for component, part in structure.parts.items():
         set_here = plan.component[component].start
         free = [name for name in part.names("input") if (component, name) not in ends and name not in set_here]
+        for terminal, members in part.terminals.items():
+            own = {name for name in members.values() if name in part.names("input")}
+            if own and own <= {*free} and not own.issuperset(members.values()):
+                yield f"{component}: the port {terminal} is not connected, so its inputs keep their start values"
+                free = [name for name in free if name not in own]
         if free:
             yield f"{component}: nothing is connected to {listed(free)}, which keep their start values"
 

@@ -153,6 +153,14 @@ def test_a_package_that_is_missing_is_one_line(
 
 
 @pytest.mark.usefixtures("folder")
+def test_a_port_that_is_forgotten_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+    lines = [line for line in PLAN.replace(LAST, "").splitlines() if "point_" not in line]
+    Path("plan.toml").write_text("\n".join(lines), encoding="utf-8")
+    assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
+    assert "rov: the port point_bow is not connected, so its inputs keep" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("folder")
 def test_a_plan_becomes_a_system(capsys: pytest.CaptureFixture[str]) -> None:
     Path("plan.toml").write_text(PLAN.replace(LAST, '["a.y", "b.u", 2.0],'), encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0

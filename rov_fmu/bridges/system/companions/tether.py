@@ -32,7 +32,9 @@ VARIABLES: dict[str, tuple[str, float, str, str]] = {
 for end, words in ENDS.items():
     VARIABLES |= {f"F_{d}_{end}": ("output", 0.0, "N", f"Force at the {words} end, positive {to}") for d, _, to in AXES}
     VARIABLES |= {f"{x}_{end}": ("input", 0.0, "m", f"Position of the {words} end, {to}") for _, x, to in AXES}
-    VARIABLES |= {f"v_{d}_{end}": ("input", 0.0, "m/s", f"Velocity of the {words} end, {to}") for d, _, to in AXES}
+    VARIABLES |= {
+        f"vg_{d}_{end}": ("input", 0.0, "m/s", f"Velocity over ground, {words} end, {to}") for d, _, to in AXES
+    }
     VARIABLES[f"tension_{end}"] = ("output", 0.0, "N", f"Size of the force at the {words} end")
 PROFILE = {
     f"{name}_{n}": ("input", 0.0, unit, f"{what} at level {n} of the water, level 1 at the top")
@@ -102,7 +104,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
             levels = [[getattr(self, f"{name}_{n}") for name in ("depth", "V_N", "V_E")] for n in LEVELS]
             water = [current(levels, -z) for _, _, z in nodes]
             moordyn.ExternalWaveKinSet(self.system, water, [[0.0, 0.0, 0.0]] * len(nodes), t)
-            forces = moordyn.Step(self.system, places, self._of_ends("NED", "v_{}_{}"), t, h)
+            forces = moordyn.Step(self.system, places, self._of_ends("NED", "vg_{}_{}"), t, h)
         except (ImportError, RuntimeError) as error:
             self.log(f"MoorDyn: {error}", Fmi2Status.error)
             return False
