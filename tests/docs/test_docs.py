@@ -183,7 +183,10 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 @pytest.fixture
 def workplace(tmp_path: Path, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
-    """What a reader has at hand: both FMUs, a folder of tank tests, the command (it builds for this machine alone)."""
+    """What a reader has at hand: both FMUs, a folder of tank tests, the command (it builds for this machine alone), and
+    the plan that docs/system.md begins with."""
+    plan, *_ = blocks(ROOT / "docs" / "system.md", "toml")
+    (tmp_path / "tether.toml").write_text(plan, encoding="utf-8")
     shutil.copy(videoray_fmu, tmp_path)
     shutil.copy(videoray3_fmu, tmp_path)
     shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
