@@ -225,7 +225,7 @@ def test_every_platform_runs_as_linux64_does(
     binaries: Binaries, folder: Path, trajectory: np.ndarray, name: str
 ) -> None:
     other = _run(binaries, name, folder)
-    assert trajectory.shape == (400, 11)
+    assert trajectory.shape == (400, 14)  # 7 states, 4 forces and torques, 3 velocities over ground
     assert np.isfinite(trajectory).all()
     scale = np.maximum.accumulate(np.abs(trajectory))
     assert np.all(np.abs(other - trajectory) <= 1e-12 * scale + 1e-300)

@@ -32,9 +32,7 @@ VARIABLES: dict[str, tuple[str, float, str, str]] = {
 for end, words in ENDS.items():
     VARIABLES |= {f"F_{d}_{end}": ("output", 0.0, "N", f"Force at the {words} end, positive {to}") for d, _, to in AXES}
     VARIABLES |= {f"{x}_{end}": ("input", 0.0, "m", f"Position of the {words} end, {to}") for _, x, to in AXES}
-    VARIABLES |= {
-        f"vg_{d}_{end}": ("input", 0.0, "m/s", f"Velocity over ground, {words} end, {to}") for d, _, to in AXES
-    }
+    VARIABLES |= {f"vg_{d}_{end}": ("input", 0.0, "m/s", f"Velocity of the {words} end, {to}") for d, _, to in AXES}
     VARIABLES[f"tension_{end}"] = ("output", 0.0, "N", f"Size of the force at the {words} end")
 PROFILE = {
     f"{name}_{n}": ("input", 0.0, unit, f"{what} at level {n} of the water, level 1 at the top")
