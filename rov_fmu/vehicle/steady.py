@@ -46,22 +46,9 @@ def steady_at(vehicle: Vehicle, axis: Axis, command: float, inputs: Mapping[str,
     coasting = vehicle.alone(axis, {**vehicle.held_inputs(axis, 0.0), **inputs})
     inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
     thrust = -inertia * coasting.acceleration(velocity) if isfinite(velocity) else velocity
-    return Steady(axis, velocity, command, thrust, _power(vehicle, held))
-
-
-def _power(vehicle: Vehicle, held: Mapping[str, float]) -> float | None:
-    """Return the electric power of all thrusters under some commands, W; None without electric currents."""
     layout = vehicle.layout
-    curves = {thruster: curve.electric_current for thruster, curve in layout.curve_of.items()}
-    if not curves or None in curves.values():
-        return None
-    fractions = {name: layout.fraction_of(held[name]) for name in layout.commands}
-    power = 0.0
-    for thruster, table in curves.items():
-        assert table
-        given = sum(gain * fractions[name] for name, gain in layout.gains[thruster].items())
-        power += table.voltage * table.value(given)
-    return power
+    power = vehicle.calculated(held, layout.at_rest)["electric_power"] if layout.electric else None
+    return Steady(axis, velocity, command, thrust, power)
 
 
 def beyond_stated(vehicle: Vehicle) -> Iterator[str]:
