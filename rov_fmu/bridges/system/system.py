@@ -1,6 +1,7 @@
-"""A system from its plan: the FMUs are made or read, and everything that does not fit is told."""
+"""A system from its plan: everything that does not fit is told, and then the FMUs of vehicles are built."""
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.bridges.system.companion import companion, lack
@@ -9,13 +10,15 @@ from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
 from rov_fmu.build import build
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.content import native_content
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, lines_on, listed
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line
 from rov_fmu.vehicle.shipped import named_in
-from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle, read_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 
 _MOST_BYTES = 1_000_000_000
 """The most bytes of all FMUs, which are in memory."""
@@ -35,22 +38,28 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         raise SystemPlanError(*lines_on(path, wrong))
     parts, unread, size = dict[str, Part](), list[str](), 0
     ready: dict[str, Part] = {}
-    for name, table in sorted(plan.component.items(), key=lambda item: item[1].vehicle is not None):
-        if table.vehicle and unread:
-            break  # vehicles are built last, because this takes the time
-        on_part(name)
-        kind = table.model_dump_json(include={*SOURCES, "file", "point"})  # components of one kind have one FMU
+    vehicles: dict[str, Vehicle] = {}
+    kinds = {  # components of one kind have one FMU
+        name: table.model_dump_json(include={*SOURCES, "file", "point"}) for name, table in plan.component.items()
+    }
+    for name, table in plan.component.items():
+        kind = kinds[name]
         try:
-            ready[kind] = parts[name] = ready.get(kind) or _part(name, table, path)
+            if kind not in ready and table.vehicle:
+                vehicles[kind] = _vehicle(name, table, path)
+                ready[kind] = _description(vehicles[kind])
+            elif kind not in ready:
+                on_part(name)
+                ready[kind] = _part(table, path)
         except FileError as error:
             where = f"{path}: component.{name}.fmu: " if table.fmu else ""
             unread += [f"{where}{line}" for line in str(error).split("\n")]
             continue
+        parts[name] = ready[kind]
         if (size := size + len(parts[name].content)) > _MOST_BYTES:
             raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
     if unread:
         raise SystemPlanError(*unread)
-    parts = {name: parts[name] for name in plan.component}
     values: dict[str, dict[str, Value]] = {}
     wrong += _set_values(plan, path, parts, values)
     connections = list[Connection]()
@@ -60,28 +69,46 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         wrong.append(f"connect: {' -> '.join(around)} {reason}")
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
-    return Structure(parts, values, connections)
+    for name, kind in kinds.items():
+        if vehicle := vehicles.pop(kind, None):
+            on_part(name)
+            ready[kind] = replace(ready[kind], content=_built(vehicle))
+    return Structure({name: ready[kind] for name, kind in kinds.items()}, values, connections)
 
 
-def _part(name: str, table: ComponentTable, path: Path) -> Part:
-    """Make or read the FMU of a component. Raises FileError, BuildError."""
-    key, folder = f"component.{name}", path.parent
+def _part(table: ComponentTable, path: Path) -> Part:
+    """Make a companion, or read an FMU. Raises FileError."""
+    folder = path.parent
     if table.fmu:
         file = inside(folder, table.fmu)
         return read_part(file, read_bytes(file))
-    if table.companion:
-        content = companion(table.companion, inside(folder, table.file) if table.file else None)
-        return read_part(Path(table.companion), content, is_ours=True)
-    file = named_in(path, f"{key}.vehicle", table.vehicle or "", SystemPlanError)
+    assert table.companion
+    content = companion(table.companion, inside(folder, table.file) if table.file else None)
+    return read_part(Path(table.companion), content, is_ours=True)
+
+
+def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
+    """Return the vehicle of a component with the points of the plan. Raises FileError."""
+    file = named_in(path, f"component.{name}.vehicle", table.vehicle or "", SystemPlanError)
     points = "".join(
         f'\n[[point]]\nname = "{point}"\n'
         f'position = {{ value = {[*position]}, unit = "m", source = "the plan of a system" }}\n'
         for point, position in table.point.items()
     )
-    vehicle = read_vehicle(file, read_bytes(file, VehicleFileError, most=LARGEST) + points.encode())
-    with temporary_folder("system-") as made_in:
-        built = build(vehicle, Path(made_in, f"{vehicle.identifier}.fmu"), platforms="host", interface="cs").path
-        return read_part(file, built.read_bytes(), is_ours=True)
+    return read_vehicle(file, read_bytes(file, VehicleFileError, most=LARGEST) + points.encode())
+
+
+def _description(vehicle: Vehicle) -> Part:
+    """Return what the FMU of a vehicle will have, before the compilation takes its time. It cannot run yet."""
+    content = archive(native_content(vehicle, interface="cs").files)
+    return read_part(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
+
+
+def _built(vehicle: Vehicle) -> bytes:
+    """Return the FMU of a vehicle for this machine. Raises BuildError."""
+    with temporary_folder("system-") as folder:
+        path = Path(folder, f"{vehicle.identifier}.fmu")
+        return build(vehicle, path, platforms="host", interface="cs").path.read_bytes()
 
 
 def _set_values(
