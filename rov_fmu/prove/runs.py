@@ -80,7 +80,6 @@ class Runs:
         self._folder = folder
         self._description = fmpy.read_model_description(folder, validate=False)
         self._variables = {v.name: v for v in self._description.modelVariables}
-        self._version = self._description.fmiVersion[:1]
 
     def run(self, plan: Plan, steps: int) -> Array:
         """Return the outputs before the first step and after each one, a row for each; `steps` are those of a piece.
@@ -156,20 +155,13 @@ class Runs:
     def _instance(self, plan: Plan, *, initialized: bool = True, logging: bool = False) -> Iterator[Any]:
         """Yield an instance with the start values of a plan, initialized or in the initialization. Raises RunError."""
         from fmpy.fmi1 import FMICallException
-        from fmpy.simulation import apply_start_values, instantiate_fmu
+        from fmpy.simulation import apply_start_values
 
-        forget_message()
         fmu = None
         try:
-            fmu = instantiate_fmu(
-                self._folder, self._description, "CoSimulation", debug_logging=logging, logger=keep_message
-            )
-            times = {"startTime": plan.start, "stopTime": plan.stop}
-            if self._version == "2":
-                fmu.setupExperiment(**times)
-                times = {}
+            fmu = new_instance(self._folder, self._description, logging=logging)
             apply_start_values(fmu, self._description, dict(plan.parameters))
-            fmu.enterInitializationMode(**times)
+            enter_initialization(fmu, plan.start, plan.stop)
             self._set(fmu, plan.pieces[0][1])
             if initialized:
                 fmu.exitInitializationMode()
@@ -182,8 +174,7 @@ class Runs:
                 if initialized:
                     with suppress(Exception):
                         fmu.terminate()
-                # The library stays loaded, because loading one again has crashed processes.
-                getattr(fmu, f"fmi{self._version}FreeInstance")(fmu.component)
+                free_instance(fmu)
 
     def _read(self, fmu: Any, names: Sequence[str]) -> list[float]:
         return [float(self._function(fmu, "get", name)()[0]) for name in names]
@@ -196,16 +187,50 @@ class Runs:
     def _function(self, fmu: Any, verb: str, name: str) -> Callable[..., Any]:
         """Return the function that gets or sets a variable, which may be called with its value."""
         variable = self._variables[name]
-        kind = variable.type
-        if kind == "Enumeration":
-            kind = {"2": "Integer", "3": "Int64"}[self._version]
-        return partial(getattr(fmu, f"{verb}{kind}"), [variable.valueReference])
+        return partial(function_of(fmu, verb, variable.type), [variable.valueReference])
 
     @staticmethod
     def _step(fmu: Any, t: float, h: float) -> None:
         returned = fmu.doStep(currentCommunicationPoint=t, communicationStepSize=h)
         if returned and returned[1]:
             raise RunError(f"the FMU ended the run at {returned[3]:.6g} s")
+
+
+def new_instance(folder: str, description: Any, *, logging: bool = False) -> Any:
+    """Return FMPy's instance of an unpacked FMU, whose warnings are kept. It raises what FMPy raises."""
+    from fmpy.simulation import instantiate_fmu
+
+    forget_message()
+    return instantiate_fmu(folder, description, "CoSimulation", debug_logging=logging, logger=keep_message)
+
+
+def enter_initialization(fmu: Any, start: float, stop: float, tolerance: float | None = None) -> None:
+    """Begin the initialization of an instance of FMI 2.0 or 3.0. Times are in s."""
+    times = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
+    if _version(fmu) == "2":
+        fmu.setupExperiment(**times)
+        times = {}
+    fmu.enterInitializationMode(**times)
+
+
+def free_instance(fmu: Any) -> None:
+    """Free an instance. The library stays loaded, because loading one again has crashed processes."""
+    if fmu.component is not None:
+        getattr(fmu, f"fmi{_version(fmu)}FreeInstance")(fmu.component)
+        fmu.component = None
+
+
+def function_of(fmu: Any, verb: str, kind: str) -> Callable[..., Any]:
+    """Return FMPy's function that gets or sets variables of a type, which enumerations share with another type."""
+    if kind == "Enumeration":
+        kind = {"2": "Integer", "3": "Int64"}[_version(fmu)]
+    function: Callable[..., Any] = getattr(fmu, f"{verb}{kind}")
+    return function
+
+
+def _version(fmu: Any) -> str:
+    """Return the version of FMI of an instance. In 3.0, the initialization itself takes the times."""
+    return "2" if hasattr(fmu, "setupExperiment") else "3"
 
 
 def status_word(status: int) -> str:

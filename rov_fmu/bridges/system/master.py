@@ -14,13 +14,18 @@ from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.part import Value
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, reason_of
-from rov_fmu.prove.runs import RunError, forget_message, keep_message, last_message
+from rov_fmu.prove.runs import (
+    RunError,
+    enter_initialization,
+    free_instance,
+    function_of,
+    last_message,
+    new_instance,
+)
 
 Name = tuple[str, str]
 """A component and a variable."""
 _Values = dict[Name, Any]
-_TYPES = {2: {"Enumeration": "Integer"}, 3: {"Enumeration": "Int64"}}
-"""The types whose functions have the name of another type."""
 
 
 class Master:
@@ -85,38 +90,26 @@ class Master:
         return rows
 
     def end(self) -> None:
-        """End the instances. The libraries stay loaded, because loading one again has crashed processes."""
-        for name, fmu in self._fmus.items():
+        """End the instances."""
+        for fmu in self._fmus.values():
             with suppress(Exception):
                 fmu.terminate()
-            getattr(fmu, f"fmi{self._version(name)}FreeInstance")(fmu.component)
+            free_instance(fmu)
         self._fmus = {}
 
-    def _version(self, name: str) -> int:
-        return int(self._descriptions[name].fmiVersion[:1])
-
     def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
-        from fmpy.simulation import instantiate_fmu
-
-        forget_message()
-        fmu = instantiate_fmu(self._folders[name], self._descriptions[name], "CoSimulation", logger=keep_message)
-        self._fmus[name] = fmu
-        times = {"startTime": start, "stopTime": stop}
-        if self._version(name) == 2:
-            fmu.setupExperiment(**times)
-            times = {}
+        fmu = self._fmus[name] = new_instance(self._folders[name], self._descriptions[name])
         for _, names, put in self._calls("set", [(name, variable) for variable in values]):
             put([values[variable] for _, variable in names])
-        fmu.enterInitializationMode(**times)
+        enter_initialization(fmu, start, stop)
         fmu.exitInitializationMode()
 
     def _calls(self, verb: str, names: Iterable[Name]) -> list[tuple[str, list[Name], Callable[..., Any]]]:
         """Return functions that get or set all variables of a type of a component, with what they get or set."""
         found: list[tuple[str, list[Name], Callable[..., Any]]] = []
         for (component, kind), some in grouped(((name[0], self._variables[name].type), name) for name in names).items():
-            function = f"{verb}{_TYPES[self._version(component)].get(kind, kind)}"
             references = [self._variables[name].valueReference for name in some]
-            found.append((component, some, partial(getattr(self._fmus[component], function), references)))
+            found.append((component, some, partial(function_of(self._fmus[component], verb, kind), references)))
         return found
 
     def _passed(self, end: Name) -> Any:

@@ -12,10 +12,18 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 from fmpy.fmi1 import FMICallException
-from fmpy.simulation import instantiate_fmu
 
 from rov_fmu.io.messages import RovError, brief, reason_of
-from rov_fmu.prove.runs import WARNING, Array, RunError, forget_message, keep_message, last_message, status_word
+from rov_fmu.prove.runs import (
+    WARNING,
+    Array,
+    RunError,
+    enter_initialization,
+    free_instance,
+    last_message,
+    new_instance,
+    status_word,
+)
 from rov_fmu.study.plan.model import TYPES, Variable
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.run.run import LoadError
@@ -83,10 +91,8 @@ class Simulator:
         self._fmu = self._instantiate()
 
     def free(self) -> None:
-        """Free the instance. The library stays loaded, because loading one again has crashed processes."""
-        if self._fmu.component is not None:
-            getattr(self._fmu, f"fmi{self._version}FreeInstance")(self._fmu.component)
-            self._fmu.component = None
+        """Free the instance."""
+        free_instance(self._fmu)
 
     def _run(self, values: Sequence[float]) -> None:
         component, start = self._fmu.component, self._times[0]
@@ -114,11 +120,7 @@ class Simulator:
     def _initialize(self) -> None:
         fmu, tolerance, start, end = self._fmu, self._job.plan.tolerance, self._times[0], self._times[-1]
         try:
-            if self._version == 2:
-                fmu.setupExperiment(tolerance, start, end)
-                fmu.enterInitializationMode()
-            else:
-                fmu.enterInitializationMode(tolerance, start, end)
+            enter_initialization(fmu, start, end, tolerance)
             for put, references, count, address in self._changes.get(0, ()):
                 _check(put(fmu.component, references, count, address), "setting the inputs", start)
             fmu.exitInitializationMode()
@@ -151,12 +153,9 @@ class Simulator:
         return groups
 
     def _instantiate(self) -> Any:
-        forget_message()
         try:
             with _loading():
-                return instantiate_fmu(
-                    self._folder, self._description, "CoSimulation", debug_logging=self._logs, logger=keep_message
-                )
+                return new_instance(self._folder, self._description, logging=self._logs)
         except Exception as error:  # FMPy raises that itself
             what = reason_of(error).replace(self._folder + os.sep, "").rstrip(".")
             raise LoadError(brief(f"{what}{last_message()}", 240)) from error
