@@ -7,7 +7,7 @@
  *                                          q may differ astern
  *     force_i, g, drift_i                  a slow force and a short one along each axis, a slow change of all thrust, and a slow velocity
  *                                          over ground: Ornstein-Uhlenbeck processes, each with a size and a time constant
- *     v = h(x, drift)                      what a sensor would measure at once; h knows its place
+ *     v = scale h(x, drift) + offset       what a sensor would measure at once; h knows its place
  *     s' = (v - s) / lag                   what it measures without noise; s = v for a sensor without lag
  *     y = s + n + e                        a sample: n is the sensor's coloured noise, also such a process, and e is white
  *
@@ -103,6 +103,8 @@ typedef struct {
     real lag[MOST_SENSORS];                 /* the time constant of each sensor, s */
     real lever[MOST_SENSORS][N_DRIFTS];     /* the place of each sensor of velocity or position: ahead, to starboard, down, m */
     real turn;                              /* of the sensors of velocity over ground about the vehicle's vertical axis, rad */
+    real scale[MOST_SENSORS], bias[MOST_SENSORS]; /* what a sensor multiplies by, and then adds */
+    real mean_drift[N_DRIFTS];              /* of the velocities over ground, which the positions do not have, m/s */
     real unit[N_X];                         /* of each state: the unit of its gains in runs that repeat them */
     real power[2][N_AXES], typical[N_AXES]; /* of drag a |v| v |v / typical|^power, ahead and astern */
     real offset, width;                     /* the commands act so much later than they are told; the width of a window, relative to
@@ -311,7 +313,7 @@ static real velocity_along(const filter *f, const real x[N_X], real R[3][3], ptr
         found += arm(f, sensor, along, i) * x[i];
     }
     for (int i = 0; i < N_DRIFTS; i++) {
-        found += R[i][along] * (x[DRIFT + i] + current(f, i));
+        found += R[i][along] * (x[DRIFT + i] + current(f, i) + f->set->mean_drift[i]);
     }
     for (int i = 0; i < N_AXES; i++) {
         if (f->where->direction[i] == along) {
@@ -335,8 +337,8 @@ static bool is_turned(const filter *f, ptrdiff_t sensor)
     return f->log->kind[sensor] == OVER_GROUND && f->log->place[sensor] < 2 && ANY(f->set->turn != 0.0);
 }
 
-/* Return what a sensor would measure at once, without noise. */
-static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
+/* Return what a sensor without scale and offset would measure at once, without noise. */
+static real unscaled(const filter *f, const real x[N_X], ptrdiff_t sensor)
 {
     const int place = f->log->place[sensor];
     real R[3][3];
@@ -355,6 +357,12 @@ static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
         return in_frame_of_sensor(f, place, horizontal);
     }
     return velocity_along(f, x, R, sensor, place);
+}
+
+/* Return what a sensor would measure at once, without noise. */
+static real at_once(const filter *f, const real x[N_X], ptrdiff_t sensor)
+{
+    return f->set->scale[sensor] * unscaled(f, x, sensor) + f->set->bias[sensor];
 }
 
 /* Return true for a state that the attitude depends on. */
@@ -388,7 +396,7 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
     if (!ignores_attitude) {
         memcpy(y, x, sizeof y);
         rotation(f, x, R);
-        base = at_once(f, x, sensor);
+        base = unscaled(f, x, sensor);
     }
     for (int c = 0; c < f->count; c++) {
         const int j = f->listed[c];
@@ -397,7 +405,7 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
             H[c] = 1.0;
         } else if (turns(f, j) && !ignores_attitude) {
             y[j] = x[j] + 1e-6;
-            H[c] = wrapped(at_once(f, y, sensor) - base) / 1e-6;
+            H[c] = wrapped(unscaled(f, y, sensor) - base) / 1e-6;
             y[j] = x[j];
         } else if (is_turned(f, sensor)) {
             const real horizontal[2] = {slope_along(f, R, sensor, 0, j), slope_along(f, R, sensor, 1, j)};
@@ -407,6 +415,7 @@ static void gradient(const filter *f, const real x[N_X], ptrdiff_t sensor, real 
         } else if (j < N_AXES && f->where->turn[j] >= 0) {
             H[c] = arm(f, sensor, direction_of(f, sensor), j);
         }
+        H[c] *= f->set->scale[sensor];
     }
 }
 

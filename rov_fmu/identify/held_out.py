@@ -17,7 +17,7 @@ from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.objective import Objective, Part, TableRow, cost, modelled
-from rov_fmu.identify.likelihood.parameters import Table
+from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.records import unchanged
 from rov_fmu.identify.likelihood.search import SETTLING
@@ -32,8 +32,6 @@ INFORMED = 0.5
 """The least share of what all data tell of an axis that a fit must know to hold out the rest."""
 _CENTRAL = (0.5,)
 """The command whose answers tell what data know of an axis."""
-_LEAST_CURRENT = 0.02
-"""The current of an unseen log is never known to better than this, m/s."""
 _STEPS = 0.3, 0.03, 0.003
 """The steps of the derivatives of predictions, relative to standard errors: the first to leave all motions finite."""
 _LOST = 1.8
@@ -129,7 +127,7 @@ def predictions(
     for held in out:
         covariance = held.fit.covariance
         if held.log not in held.part.logs:
-            covariance = _with_currents(objective, best, covariance, held.log)
+            covariance = _of_unseen(objective, best, covariance, held.log)
         yield from _predicted(objective, held, cautious(objective, held.fit.z), covariance, other)
 
 
@@ -141,30 +139,30 @@ def _other(table: Table, against: Vehicle | None) -> Table | None:
     return table.of_vehicle(against) if is_whole else None
 
 
-def _with_currents(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
-    """Return the covariance with the variance of the current of an unseen log: about as large as in the other logs."""
+def _of_unseen(objective: Objective, best: Minimum, covariance: Array, number: int) -> Array:
+    """Return the covariance with the variance of what differs from log to log in an unseen log, such as the current."""
     found = covariance.copy()
     for n, p in enumerate(objective.table.parameters):
-        if p.of_kind.is_of_water and p.log == number:
+        if p.of_kind.differs_by_log and p.log == number:
             found[n], found[:, n] = 0.0, 0.0
-            found[n, n] = unseen_current(objective.table, best.z, covariance, p.of)
+            found[n, n] = unseen_variance(objective.table, best.z, covariance, p)
     return found
 
 
-def unseen_current(table: Table, z: Array, covariance: Array, file: str) -> float:
-    """Return the variance of the current of an unseen log: about as large as in the other logs of a table.
+def unseen_variance(table: Table, z: Array, covariance: Array, unseen: Parameter) -> float:
+    """Return the variance of a current, or of an offset, of an unseen log: as large as in the other logs of a table.
 
     Where no other log has one, it is that of the prior.
     """
-    currents = [(n, p) for n, p in enumerate(table.parameters) if p.of_kind.is_of_water]
-    others = [z[n] ** 2 + covariance[n, n] for n, p in currents if p.of != file]
-    return _LEAST_CURRENT**2 + float(np.mean(others or [p.deviation**2 for _, p in currents]))
+    alike = [(n, p) for n, p in enumerate(table.parameters) if (p.kind, p.unit) == (unseen.kind, unseen.unit)]
+    others = [z[n] ** 2 + covariance[n, n] for n, p in alike if p.of != unseen.of]
+    return unseen.of_kind.least_unseen**2 + float(np.mean(others or [p.deviation**2 for _, p in alike]))
 
 
 def cautious(objective: Objective, z: Array) -> Array:
     """Return the parameters with no size below its least one on unseen data: thrust is never predicted to better."""
-    least = [log(p.of_kind.least_unseen) if p.of_kind.least_unseen else -inf for p in objective.table.parameters]
-    return np.maximum(z, least)
+    sizes = (p.of_kind.least_unseen if p.of_kind.is_size else 0.0 for p in objective.table.parameters)
+    return np.maximum(z, [log(size) if size else -inf for size in sizes])
 
 
 def _predicted(

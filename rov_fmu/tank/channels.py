@@ -8,7 +8,7 @@ are applied:
 - Of several senders of the same message, the one that sends the commands is used.
 - Of several sources of a quantity, the first in the catalogue that has enough samples and changes is used. Of several
   barometers, it is the one that changes most.
-- A velocity that disagrees with the positions in the same messages is corrected, or left out.
+- A velocity that contradicts the positions in the same messages is left out.
 - A velocity in a frame of the earth is rotated into the body frame by the attitude, and left out without one.
 """
 
@@ -21,8 +21,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
-from rov_fmu.io.messages import listed
-from rov_fmu.tank.agreement import disagreement, offset_in_words
 from rov_fmu.tank.arrays import Array, Flags, rms, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
@@ -58,8 +56,6 @@ _CONTRADICTS, _LEAST_ERROR, _EXPLAINED = 0.3, 0.05, 0.5
 motion and more than the distance, m, and if another frame, scale or sign leaves less than the last share of it."""
 _LEAST_TURN = 0.1
 """The turn within _COMPARED of a vehicle that surely turns, rad."""
-_EARTH_AXES, _BODY_AXES = ("to the north", "to the east", "down"), ("forward", "to starboard", "down")
-"""The axes of the two frames."""
 _EARTH_WORDS = {"map", "odom", "world", "earth", "enu", "ned", "local", "global", "inertial"}
 """Words in the names of frames that are fixed to the earth."""
 
@@ -159,7 +155,7 @@ def channels_of(
         judged = measurement
         if measurement.message.gives == VELOCITY and not measurement.unused:
             judged = replace(measurement, unused=_contradiction(measurement, measurements))
-        channels += _channels(*_agreeing(judged, measurements, attitude), attitude, gravity)
+        channels += _channels(judged, attitude, gravity)
     return with_one_source(channels)
 
 
@@ -290,34 +286,6 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     return f"{against} by its scale, signs or axes" if is_explained else ""
 
 
-def _agreeing(
-    velocity: _Measurement, measurements: Iterable[_Measurement], attitude: Slerp | None
-) -> tuple[_Measurement, str]:
-    """Return a measurement, and by what it is corrected, in words: velocities agree with positions in their messages.
-
-    Both are of one estimator. Offset and scale are along the axes of the frame that the velocity is in. Where a scale
-    is far from 1, such as beside a position that stays 0, something else is wrong.
-    """
-    positions = (m for m in measurements if m.topic is velocity.topic and m.message.gives == POSITION)
-    position, is_of_earth = next(positions, None), _is_of_earth(velocity)
-    is_compared = velocity.message.gives == VELOCITY and not velocity.unused and (is_of_earth or attitude)
-    if not (position and is_compared):
-        return velocity, ""
-    earth, body = frames_of(velocity.message, velocity.topic.source)
-    to_own, names = (earth, _EARTH_AXES) if is_of_earth else (body, _BODY_AXES)
-    values, time = velocity.values @ to_own.T, velocity.topic.time
-    axes = None if is_of_earth or not attitude else _at(attitude, time).as_matrix()
-    found = disagreement(time, position.values @ earth.T, values, axes)
-    if not found or not (found.moved | found.scaled).any():
-        return velocity, ""
-    scale, offset = np.where(found.scaled, found.scale, 1.0), np.where(found.moved, found.offset, 0.0)
-    if np.abs(scale - 1.0).max() > _CONTRADICTS:
-        return velocity, ""
-    words = [f"{offset_in_words(offset[n], 'm/s')} {names[n]}" for n in np.flatnonzero(found.moved)]
-    words += [f"a factor of {scale[n]:.3g} {names[n]}" for n in np.flatnonzero(found.scaled)]
-    return replace(velocity, values=(values * scale + offset) @ to_own), listed(words)
-
-
 def _at(attitude: Slerp, time: Array) -> Rotation:
     """Return the attitude at some times; before and after all that are known, the first and the last one."""
     return attitude(np.clip(time, *attitude.times[[0, -1]]))
@@ -326,8 +294,8 @@ def _at(attitude: Slerp, time: Array) -> Rotation:
 # ---- Channels --------------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
-    """Yield the channels of a measurement. `corrected` says by what its velocities are corrected."""
+def _channels(measurement: _Measurement, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
+    """Yield the channels of a measurement."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
     earth, body = frames_of(measurement.message, measurement.topic.source)
     unused = measurement.unused
@@ -348,8 +316,7 @@ def _channels(measurement: _Measurement, corrected: str, attitude: Slerp | None,
             unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
         axes = (SURGE, SWAY, HEAVE) if gives == VELOCITY else (ROLL, PITCH, YAW)
         for axis, column in zip(axes, values.T, strict=True):
-            quantity = QUANTITIES[f"{axis.name} velocity"]
-            yield Channel(quantity, topic.source, topic.time, column, unused=unused, corrected=corrected)
+            yield Channel(QUANTITIES[f"{axis.name} velocity"], topic.source, topic.time, column, unused=unused)
     else:
         yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused, gravity)
 

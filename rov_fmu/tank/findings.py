@@ -65,10 +65,6 @@ _WARNINGS = {
         "{axes}: the logs have its motion, but in all of them its thrusters cancel each other, so the vehicle has no "
         "{axes}. If it was driven that way, check the directions of the thrusters and the signs of their commands"
     ),
-    "scales differ": (
-        "{files}: the {quantity} changes {factor:.3g} times as much as the velocity in {axes} implies. "
-        "One of the two sensors has a wrong scale, and both are used. Leave the wrong one out"
-    ),
     "unreadable file": "{files}: left out as unreadable: {reason}",
     "channel left out": "{files}: {source} is left out for {quantities}: {words}",
     "clock restarts": "{files}: the clock restarts or jumps after {at} s. The log is read as two, before and after",
@@ -112,10 +108,6 @@ _DOUBTS = {
     ),
     "late command": "{files}: {column} has no command before {at} s. Until then, its command is taken as 0",
     "too few samples": ("{files}: the {quantity} has {count:#sample} and needs at least {least:g}, so it is left out"),
-    "velocity corrected": (
-        "{files}: the {velocity} is corrected by {by}, because the position changes so much faster. The errors of a "
-        "position do not grow with time"
-    ),
     "at rest": (
         "{files}: no thrust is {rest} us, because the outputs rest there and never at 1500 us. If that is wrong, write "
         "neutral = 1500 into [logs] of rov.toml"

@@ -71,8 +71,6 @@ class Channel:
     derived_from: str = ""
     """The quantity that the sensor measures, with what is assumed, such as `pressure, for fresh water`, if the values
     are computed from it."""
-    corrected: str = ""
-    """By what a velocity is corrected so that it agrees with the position, in words; empty for values as measured."""
 
     @cached_property
     def there(self) -> Flags:

@@ -1,4 +1,4 @@
-"""What is told about the channels of a log: their sources, sensors that froze, jumps, gaps, scales, and its pieces."""
+"""What is told about the channels of a log: their sources, sensors that froze, jumps, gaps, and its pieces."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -7,11 +7,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.io.messages import MOST, first_of, listed
-from rov_fmu.tank.agreement import Disagreement, disagreement, offset_in_words
-from rov_fmu.tank.arrays import Array, spread
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.clocks import gaps
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Commands, Log
@@ -39,22 +37,14 @@ Other quantities change _FASTER times as fast."""
 def checked(log: Log) -> Log:
     """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
     channels, frozen = _without_frozen(log.file, log.channels)
-    channels, scaled = _agreeing(log, channels)
-    findings = [*log.findings, *frozen, *_corrected(log.file, channels)]
+    findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
-    findings += [*scaled, *sources(log.file, channels)]
+    findings += sources(log.file, channels)
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
     return replace(log, commands=commands, channels=tuple(channels), findings=tuple(findings))
-
-
-def _corrected(file: str, channels: Sequence[Channel]) -> list[Finding]:
-    """Return a finding for each source of velocities that are corrected."""
-    used = (c for c in channels if c.corrected and not c.unused)
-    told = {(f"velocity of {c.source}" if c.source.kind else c.quantity.name, c.corrected) for c in used}
-    return [about(file, "velocity corrected", velocity=name, by=words) for name, words in sorted(told)]
 
 
 # ---- Sources ---------------------------------------------------------------------------------------------------------
@@ -166,49 +156,6 @@ def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[n
     sudden = (np.abs(steps) > least) & (rates > np.maximum(beside, usual))
     around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
     return np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))
-
-
-def _agreeing(log: Log, channels: Sequence[Channel]) -> tuple[list[Channel], list[Finding]]:
-    """Return the channels with each velocity moved by its offset from the position of its axis, if their scales agree,
-    and a finding about each position that changes by another factor than 1 of what the velocity of its axis says.
-
-    In a log of one axis, velocities are through the water and distances over ground, so that a current moves one.
-    """
-    moved: dict[Channel, Channel] = {}
-    findings = []
-    for position in (c for c in channels if not (c.unused or c.quantity.is_velocity)):
-        if not (found := _disagreement(position, channels)):
-            continue
-        (velocity, differs), quantity = found, position.quantity
-        if differs.scaled.any():
-            name, factor = quantity.axis.name if quantity.axis else "", float(differs.scale[0])
-            findings.append(about(log.file, "scales differ", name, quantity=quantity.name, factor=factor))
-        elif differs.moved.any() and log.axis not in (SURGE, SWAY):
-            offset = float(differs.offset[0])
-            words = offset_in_words(offset, velocity.quantity.unit)
-            moved[velocity] = replace(velocity, values=velocity.values + offset, corrected=words)
-    return [moved.get(channel, channel) for channel in channels], findings
-
-
-def _disagreement(position: Channel, channels: Sequence[Channel]) -> tuple[Channel, Disagreement] | None:
-    """Return the velocity that is used along the axis of a position, and how it differs from the position.
-
-    Logs with roll or pitch are left out, because there the velocity has another direction.
-    """
-    axis = position.quantity.axis
-    used = (c for c in channels if c.quantity.axis == axis and c.quantity.is_velocity and not c.unused)
-    velocity = next(used, None)
-    tilted = any(c.quantity.name in ("roll angle", "pitch angle") and c.count for c in channels)
-    if not axis or tilted or not velocity or min(position.count, velocity.count) < LEAST_SAMPLES:
-        return None
-    time, values = position.unwrapped
-    at, speeds = velocity.samples
-    both = (at >= time[0]) & (at <= time[-1])
-    if not spread(speeds[both]):
-        return None
-    positions = np.interp(at[both], time, values)
-    found = disagreement(at[both], positions[:, None], speeds[both, None])
-    return (velocity, found) if found else None
 
 
 # ---- Frozen sensors --------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 import tomlkit
 
 from rov_fmu.equation.catalogue import HEAVE
-from rov_fmu.identify import assess, held_out
+from rov_fmu.identify import assess
 from rov_fmu.identify.findings import acting
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records, search
@@ -89,7 +89,7 @@ def test_the_states_of_the_filter_are_those_of_the_code() -> None:
 
 
 def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
-    page, least = text(METHOD), held_out._LEAST_CURRENT
+    page, least = text(METHOD), KINDS["current"].least_unseen
     assert f"faster than {records.FASTEST:g} per second are averaged" in page
     assert f"up to |u| = c = {objective.OUTLYING:g}, and" in page
     assert f"The filter reads the first {search.SETTLING:g} s" in page

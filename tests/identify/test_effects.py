@@ -1,6 +1,6 @@
 """What is told of a fit: its effects, loggers and sensors, the errors of its predictions, and effects found in logs."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from math import log
@@ -31,6 +31,8 @@ from tests.folders import ARM, HEAD, MASS, TURNS, folder_of
 from tests.report.results import without_findings
 from tests.vehicles import VIDEORAY
 
+Columns = dict[str, np.ndarray]
+"""The columns of a log, by their titles."""
 ERROR = 0.004
 HALF = t.ppf(0.975, 10) * ERROR
 FOUND = {"lag": 0.2, "dead time": 0.1, "dead band": 0.05, "advance": 0.1, "drag astern": log(1.3), "load": 0.03}
@@ -299,20 +301,53 @@ def test_a_power_of_drag_is_unusual_beyond_a_half_unless_predictions_are_as_exac
         assert [effect.is_unusual for effect in some] == [is_far and R > 1.0] * 2
 
 
+def moved(drag: Callable[[float], float]) -> tuple[Columns, np.ndarray, np.ndarray]:
+    """Return the times and commands of 31 v' = 78 c |c| - drag(v), and position and velocity by DOP853."""
+    state, some = [0.0, 0.0], list[np.ndarray]()
+    for c in HELD[:9]:
+        rate = partial(lambda _, x, c: [x[1], (78.0 * c * abs(c) - drag(x[1])) / 31.0], c=c)
+        held = solve_ivp(rate, (0.0, 4.0), state, "DOP853", t_eval=np.linspace(0.0, 4.0, 21), rtol=1e-9, atol=1e-9).y
+        some.append(held[:, :-1])
+        state = held[:, -1].tolist()
+    position, velocity = np.hstack(some)
+    return {"time [s]": 0.2 * np.arange(180), "command [1]": np.repeat(HELD[:9], 20)}, position, velocity
+
+
+@pytest.mark.parametrize(
+    ("scale", "offset"),
+    [
+        (1.05, 0.02),
+        pytest.param(1.0, 0.0, marks=pytest.mark.long),
+        pytest.param(1.25, 0.2, marks=pytest.mark.long),
+        pytest.param(0.8, -0.2, marks=pytest.mark.long),
+    ],
+)
+def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float, offset: float, tmp_path: Path) -> None:
+    """They move no answer: V_ss are those of 78 c |c| = 38 |V| V + 9 V. Without them, nothing is told."""
+    columns, position, velocity = moved(lambda v: 38.0 * abs(v) * v + 9.0 * v)
+    noise = 0.01 * np.random.default_rng(1).standard_normal((2, 180))
+    columns |= {"depth [m]": position + noise[0], "velocity [m/s]": scale * velocity + offset + noise[1]}
+    mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
+    result = identified(tmp_path, f"{HEAD}[known]\n{mass}{THRUST.replace('rear', 'top')}", columns, "log_heave.csv")
+    (heave,) = result.axes
+    for answer in heave.answers:
+        V = 2.0 * 78.0 * answer.command**2 / (9.0 + np.hypot(9.0, np.sqrt(4.0 * 38.0 * 78.0) * answer.command))
+        assert contains(answer.steady[1], np.copysign(V, answer.command)), answer
+    truth = {"sensor scale": scale, "sensor offset": offset} if offset else {}
+    kept = {effect.kind: effect for effect in result.effects if effect.kept}
+    assert {*kept} == {*truth}
+    assert all(contains(kept[kind].interval, value) for kind, value in truth.items())
+    assert any(effect.is_unusual for effect in kept.values()) == (abs(log(scale)) > 0.2)
+
+
 def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
-    """31 u' = 78 c |c| - 38 |u| u |2 u|^(-1/2) - 4 u by DOP853. The file has the nearest linear and quadratic drag."""
-    u, speeds = 0.0, list[float]()
+    """The drag is 38 |u| u |2 u|^(-1/2) + 4 u. The file has the nearest linear and quadratic drag."""
 
     def drag(v: float) -> float:
         return 38.0 * abs(v) * v / float(np.sqrt(max(abs(2.0 * v), 1e-9))) + 4.0 * v
 
-    for c in HELD[:9]:
-        rate = partial(lambda _, x, c: [(78.0 * c * abs(c) - drag(x[0])) / 31.0], c=c)
-        held = solve_ivp(rate, (0.0, 4.0), [u], "DOP853", t_eval=np.linspace(0.0, 4.0, 21), rtol=1e-9, atol=1e-9).y[0]
-        speeds += held[:-1].tolist()
-        u = float(held[-1])
-    measured = np.array(speeds) + 0.01 * np.random.default_rng(1).standard_normal(len(speeds))
-    columns = {"time [s]": 0.2 * np.arange(180), "command [1]": np.repeat(HELD[:9], 20), "velocity [m/s]": measured}
+    columns, _, speeds = moved(drag)
+    columns["velocity [m/s]"] = speeds + 0.01 * np.random.default_rng(1).standard_normal(len(speeds))
     mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
     result = identified(tmp_path, f"{HEAD}[known]\n{mass}{THRUST}", columns, "log_surge.csv")
     (surge,) = result.axes

@@ -1,4 +1,4 @@
-"""Times and values of commands, headings that wrap, gaps, and scales of sensors."""
+"""Times and values of commands, headings that wrap, and gaps."""
 
 from dataclasses import replace
 from math import nan, pi
@@ -9,7 +9,7 @@ import pytest
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.clocks import gaps, in_rows
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, uninterrupted
+from rov_fmu.tank.quality import uninterrupted
 from tests.tank.logs import channel, commands
 
 STEPS: Array = np.linspace(0.0, 19.9, 200)
@@ -105,19 +105,3 @@ def test_a_log_in_which_nothing_is_told_for_a_time_is_several_logs_with_all_its_
         assert piece.commands.since.min() == piece.commands.rows[0]
     goes_on = replace(log, channels=(depth, channel("heave velocity", np.arange(0.0, 40.0, 0.5), np.zeros(80))))
     assert uninterrupted(goes_on) == [goes_on]
-
-
-@pytest.mark.parametrize(("scale", "is_told"), [(1.0, False), (1.008, False), (1.02, True), (0.97, True)])
-def test_sensors_of_other_scales_are_told(scale: float, is_told: bool) -> None:
-    """A noisy depth, and the velocity of the same motion at other times, with a current of 0.05 m/s between them."""
-    random = np.random.default_rng(0)
-    time, at = np.arange(0.0, 120.0, 0.1), np.arange(0.03, 120.0, 0.05)
-    depth = scale * (2.0 * np.sin(0.3 * time) + 0.05 * time) + 0.005 * random.standard_normal(len(time))
-    speed = 0.6 * np.cos(0.3 * at) + 0.01 * random.standard_normal(len(at))
-    channels = channel("depth", time, depth), channel("heave velocity", at, speed)
-    tilted = (*channels, channel("pitch angle", time, 0.1 * time))
-    for measured, count in ((channels, is_told), (tilted, False)):
-        told = [f for f in checked(Log("a.csv", None, measured)).findings if f.kind == "scales differ"]
-        assert len(told) == count
-        for finding in told:
-            assert finding.words["factor"] == pytest.approx(scale, abs=0.003)

@@ -122,6 +122,12 @@ class Parameters:
     """The place of each sensor of velocity or position: forward of the origin, to starboard, and down, m."""
     turn: Number = 0.0
     """How far the sensors of velocity over ground are turned to starboard about the vertical axis of the body, rad."""
+    scales: tuple[Number, ...] = ()
+    """What each sensor multiplies its quantity by. Empty: 1."""
+    offsets: tuple[Number, ...] = ()
+    """What each sensor then adds, SI units. Empty: 0."""
+    mean_drifts: tuple[Number, ...] = (0.0, 0.0)
+    """What sensors add to the velocity over ground to the north and to the east, m/s. Positions do not have it."""
     lags: tuple[Number | None, ...] = ()
     """The time constant of each sensor, s; None for one that measures at once. Empty: all do."""
     powers: tuple[tuple[Number, Number, float], ...] = ()
@@ -335,6 +341,9 @@ class Filter:
             *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
             *(part for lever in levers for part in lever),
             parameters.turn,
+            *(*parameters.scales, *[1.0] * (MOST_SENSORS - len(parameters.scales))),
+            *(*parameters.offsets, *[0.0] * (MOST_SENSORS - len(parameters.offsets))),
+            *(*parameters.mean_drifts, 0.0),
             *units,
             *(number for column in zip(*powers, strict=True) for number in column),
             *(parameters.offset, parameters.width),

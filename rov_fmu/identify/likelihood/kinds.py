@@ -26,6 +26,7 @@ INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "loggin
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 TURN = "turned velocity sensor"
+SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
@@ -142,7 +143,7 @@ class Kind(Coordinate):
     """Its least size where unseen data are predicted."""
     is_of_structure: bool = False
     """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
-    is_of_water: bool = False
+    differs_by_log: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
 
@@ -235,6 +236,9 @@ _PLACE = Deviation(
 _COLOURED = Deviation(
     "coloured_noise", 1.0, "ln of a sensor's coloured noise, and of its correlation time", "filters in sensors"
 )
+_MOST_SCALE = 0.5
+"""The largest size of ln of a sensor's scale. What is beyond has another unit, such as knots or feet."""
+_WITHOUT_SENSORS = ". The vehicle file does not have it, because it describes the vehicle without its sensors"
 _WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
 
 KINDS = {
@@ -386,17 +390,37 @@ KINDS = {
         ". It belongs to the water, so the vehicle file does not have it",
         null=0.0,
         unit="m/s",
-        is_of_water=True,
+        differs_by_log=True,
+        least_unseen=0.02,
         adapts=True,
     ),
     "sensor lag": Kind(
         Deviation("sensor_lag", 0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
         "time constant",
-        ". The vehicle file does not have it, because it describes the vehicle without its sensors",
+        _WITHOUT_SENSORS,
         is_lag=True,
         low=0.0,
         null=0.0,
         unit="s",
+    ),
+    SENSOR_SCALE: Kind(
+        Deviation("sensor_scale", 0.05, "ln of a velocity's scale beside a position", "sound differs by 3 % in water"),
+        "measured velocity relative to that by the position",
+        _WITHOUT_SENSORS,
+        is_ratio=True,
+        finest=0.005,
+        low=-_MOST_SCALE,
+        high=_MOST_SCALE,
+        null=0.0,
+    ),
+    SENSOR_OFFSET: Kind(
+        Deviation("sensor_offset", 0.05, "a velocity's offset beside a position, m/s or rad/s", "zeros drift by cm/s"),
+        "offset of the measured",
+        _WITHOUT_SENSORS,
+        finest=0.005,
+        null=0.0,
+        differs_by_log=True,
+        adapts=True,
     ),
     **{kind: Kind(_PLACE, f"place of the {kind}", _WITHOUT_PLACES, null=0.0, unit="m") for kind in PLACED.values()},
     "voltage": Kind(
@@ -526,7 +550,7 @@ KINDS = {
     TURN: Kind(
         None,
         "angle of the velocity sensor about the vertical axis",
-        ". The vehicle file does not have it, because it describes the vehicle without its sensors",
+        _WITHOUT_SENSORS,
         deviation=1.5,
         low=-pi,
         high=pi,

@@ -25,6 +25,8 @@ from rov_fmu.identify.likelihood.kinds import (
     POWER,
     POWER_ASTERN,
     PRIORS,
+    SENSOR_OFFSET,
+    SENSOR_SCALE,
     TURN,
     WANDER,
     WHITE,
@@ -33,7 +35,7 @@ from rov_fmu.identify.likelihood.kinds import (
     Kind,
 )
 from rov_fmu.identify.likelihood.prior import Prior
-from rov_fmu.identify.likelihood.records import SampledLog
+from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -104,6 +106,11 @@ class Parameter(Coordinate):
 def has_place(sensor: Sensor) -> bool:
     """Return True for a sensor of a velocity or a horizontal position. Its place changes what it measures of a turn."""
     return not sensor.axis.is_rotation and (sensor.is_velocity or sensor.axis is not HEAVE)
+
+
+def _of_estimator(part: str) -> str:
+    """Return which offset of an estimator is meant: it integrates accelerations in the frame of the earth."""
+    return f"velocity {part}"
 
 
 def with_same_lag(sensor: Sensor) -> str:
@@ -325,6 +332,9 @@ class Table:
             lags=tuple(self._lag(z, m.sensor) for m in sampled.measured),
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in sampled.measured),
             turn=self.get(z, TURN),
+            scales=tuple(self._scale(z, m.sensor) for m in sampled.measured),
+            offsets=tuple(self.get(z, SENSOR_OFFSET, file, m.channel.quantity.name) for m in sampled.measured),
+            mean_drifts=tuple(self.get(z, SENSOR_OFFSET, file, _of_estimator(part)) for part in CURRENT),
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
             width=self.get(z, WIDTH, file),
             powers=tuple(powers),
@@ -376,6 +386,10 @@ class Table:
         if (numbers == numbers[0]).all():
             return _followed(sampled, *numbers[0].tolist())
         return np.array([_followed(sampled, *each) for each in numbers.tolist()])
+
+    def _scale(self, z: Array, sensor: Sensor) -> Any:
+        """Return what a sensor multiplies its quantity by."""
+        return np.exp(self.get(z, SENSOR_SCALE, sensor.axis.name)) if sensor.is_velocity else 1.0
 
     def _lag(self, z: Array, sensor: Sensor) -> Any:
         """Return the lag of a sensor; None if it has none."""
@@ -560,9 +574,27 @@ def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parame
     share, width = (0.5, {"mean": 1.0, "low": 1.0}) if sampled.is_momentary else (1.0, {})
     yield make(OFFSET, file, mean=-half, deviation=max(share * half, 0.005), log=number)
     yield make(WIDTH, file, log=number, **width)
+    directions = CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]
     if sampled.has_positions or sampled.has_velocities:
-        for part in CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]:
+        for part in directions:
             yield make("current", file, part, log=number)
+    offsets = {m.channel.quantity.name: m.channel.quantity.unit for m in _with_offset(sampled)}
+    if sampled.record.wanders:
+        offsets |= dict.fromkeys(map(_of_estimator, directions), "m/s")
+    for part, unit in offsets.items():
+        yield make(SENSOR_OFFSET, file, part, unit=unit, log=number)
+
+
+def _with_offset(sampled: SampledLog) -> Iterator[SampledChannel]:
+    """Yield the velocities whose own offset a position tells.
+
+    That of an estimator is in the frame of the earth. A horizontal velocity through the water differs from the change
+    of a position by a current, too.
+    """
+    for m in sampled.seen_twice:
+        is_level = m.sensor.axis.place < 2 and not m.sensor.axis.is_rotation
+        if not is_level or (m.sensor.over_ground and not sampled.record.wanders):
+            yield m
 
 
 def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
@@ -577,6 +609,8 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
         }
         for part in _PLACES if turns - {YAW} else _PLACES[:2] if turns else ():
             yield make(kind, "", part)
+    for axis in {m.sensor.axis: None for one in logs for m in one.seen_twice}:
+        yield make(SENSOR_SCALE, axis.name)
     for part in sorted({with_same_lag(sensor) for one in logs for sensor in one.record.sensors}):
         yield make("sensor lag", "", part)
 

@@ -158,6 +158,15 @@ class SampledLog:
         return self._with_rows(**made)
 
     @property
+    def seen_twice(self) -> list[SampledChannel]:
+        """The velocities whose motion a position of the log shows, too."""
+        positions = [s for s in self.record.sensors if not s.is_velocity]
+        is_horizontal = any(s.is_horizontal for s in positions)
+        axes = {s.axis for s in positions}
+        velocities = (m for m in self.measured if m.sensor.is_velocity)
+        return [m for m in velocities if m.sensor.axis in axes or (is_horizontal and m.sensor.is_horizontal)]
+
+    @property
     def has_positions(self) -> bool:
         """True if a horizontal position is measured."""
         return any(not s.is_velocity and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors)

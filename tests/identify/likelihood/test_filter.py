@@ -239,11 +239,12 @@ def test_a_turning_vehicle_measures_its_velocity_over_ground() -> None:
     assert np.abs((found.innovations - off) / np.sqrt(variances)).max() < 5e-4
 
 
-@pytest.mark.parametrize("turned", [0.0, 2.1])
-def test_a_sensor_beside_the_origin_measures_the_turn(turned: float) -> None:
+@pytest.mark.parametrize(("turned", "scale", "offset"), [(0.0, 1.0, 0.0), (2.1, 1.0, 0.0), (2.1, 1.05, 0.02)])
+def test_a_sensor_beside_the_origin_measures_the_turn(turned: float, scale: float, offset: float) -> None:
     """A velocity at a place is that of the origin plus the turn times the place, and a position is beside it.
 
-    A sensor of velocity over ground that is turned to starboard measures along its own directions.
+    A sensor of velocity over ground that is turned to starboard measures along its own directions. What an estimator
+    adds is in the frame of the earth. Each sensor then multiplies by its scale, and adds its offset.
 
     The variances are those of errors of one state at a time.
     """
@@ -256,7 +257,9 @@ def test_a_sensor_beside_the_origin_measures_the_turn(turned: float) -> None:
     sensors = [Sensor(axis, moves, ground) for moves, ground in kinds for axis in (SURGE, SWAY, HEAVE)]
     white, told, filter = 0.01, (np.zeros(1), np.zeros(1)), Filter(k)
     levers = (tuple(place.tolist()),) * len(sensors)
-    known = parameters(k, len(sensors), levers=levers, turn=turned)
+    scales, offsets = (scale,) * len(sensors), tuple(offset * n for n in range(len(sensors)))
+    drifts = -2.0 * offset, 3.0 * offset
+    known = parameters(k, len(sensors), levers=levers, turn=turned, scales=scales, offsets=offsets, mean_drifts=drifts)
 
     def predicted(changed: dict[str, float], errors: dict[str, float]) -> tuple[Array, Array]:
         """Return what the sensors measure of a state, and the variances of the first sample of each sensor alone."""
@@ -269,7 +272,9 @@ def test_a_sensor_beside_the_origin_measures_the_turn(turned: float) -> None:
 
     found, _ = predicted({}, {})
     moved = np.array([*velocity.values()]) + np.cross([*turn.values()], place)
-    assert found == pytest.approx(np.concatenate([moved, about_z(-turned) @ moved, about_z(psi) @ place]))
+    over_ground = about_z(-turned) @ (moved + about_z(-psi) @ [*drifts, 0.0])
+    at_once = np.concatenate([moved, over_ground, about_z(psi) @ place])
+    assert found == pytest.approx(scale * at_once + offsets)
     for name in ("u", "v", "p", "q", "r", QUATERNION[2], QUATERNION[3]):
         slope = (predicted({name: state.get(name, 0.0) + 1e-5}, {})[0] - found) / 1e-5
         _, variances = predicted({}, {name: 0.1})

@@ -1,6 +1,7 @@
 """The parameters: their priors, and how they enter the model."""
 
 import ast
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import exp
@@ -119,6 +120,50 @@ def test_priors_are_those_that_are_stated(known: Known) -> None:
     lines = [told(p) for p in known[0].parameters]
     assert {*lines} == {*PRIORS.strip().splitlines()}
     assert sum(line.startswith("thrust shape rear") for line in lines) == 8, "four ahead and four astern"
+
+
+OVER_GROUND = ("velocity to the north", "velocity to the east")
+
+
+@pytest.mark.parametrize(
+    ("name", "quantities", "wanders", "scales", "offsets"),
+    [
+        ("dive", ("surge velocity", "depth", "heading"), False, (), ()),
+        ("dive", ("surge velocity", "surge distance"), False, ("surge",), ("surge velocity",)),
+        ("dive", ("surge velocity", "surge distance", "heading"), True, ("surge",), OVER_GROUND),
+        ("dive", ("heave velocity", "depth", "surge velocity"), False, ("heave",), ("heave velocity",)),
+        ("dive", ("yaw velocity", "heading"), False, ("yaw",), ("yaw velocity",)),
+        ("log_heave", ("depth", "velocity"), False, ("heave",), ("heave velocity",)),
+        ("log_surge", ("distance", "velocity"), False, ("surge",), ()),
+        ("log_surge", ("velocity",), False, (), ()),
+    ],
+)
+def test_a_velocity_has_a_scale_and_an_offset_where_a_position_shows_the_same_motion(
+    name: str, quantities: Sequence[str], wanders: bool, scales: Sequence[str], offsets: Sequence[str], tmp_path: Path
+) -> None:
+    """In a tank, a current moves the distance, and not the velocity. The offset of an estimator is in the earth frame.
+
+    They are what the filter reads, beside sensors that have neither.
+    """
+    random, file = np.random.default_rng(0), f"{name}.csv"
+    inputs = ["u_l [1]", "u_r [1]", "u_t [1]"] if name == "dive" else ["command [1]"]
+    units = {"yaw velocity": "rad/s", "heading": "rad"}
+    titles = ["time [s]", *inputs]
+    titles += [f"{one} [{units.get(one, 'm/s' if 'velocity' in one else 'm')}]" for one in quantities]
+    numbers = np.column_stack([0.1 * np.arange(90), random.uniform(-0.5, 0.5, (90, len(titles) - 1))])
+    text = "\n".join([",".join(titles), *(",".join(f"{x:.4f}" for x in row) for row in numbers.tolist())])
+    beginning, (log,), _ = begin(load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', {file: text})))
+    log = replace(log, record=replace(log.record, wanders=wanders))
+    table = table_of(beginning, [log], [])
+    assert [p.of for p in table.parameters if p.kind == "sensor scale"] == [*scales]
+    assert [(p.of, p.part) for p in table.parameters if p.kind == "sensor offset"] == [(file, one) for one in offsets]
+    z = random.uniform(0.05, 0.3, len(table.parameters))
+    filtered, names = table.of_log(z, log), [m.channel.quantity.name for m in log.measured]
+    of = partial(table.get, z)
+    assert filtered.offsets == tuple(of("sensor offset", file, one) for one in names)
+    assert filtered.mean_drifts == tuple(of("sensor offset", file, one) for one in OVER_GROUND)
+    axes = [m.sensor.axis.name if m.sensor.is_velocity else "" for m in log.measured]
+    assert filtered.scales == pytest.approx([exp(of("sensor scale", axis)) for axis in axes])
 
 
 def test_parameters_enter_the_model_as_their_names_say(known: Known) -> None:

@@ -11,7 +11,7 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, unseen_current
+from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, unseen_variance
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit
@@ -30,12 +30,12 @@ def test_the_current_of_an_unseen_log_is_about_that_of_the_others() -> None:
     table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, currents)
     covariance = np.diag([9.0, 0.01**2, 0.02**2])
     usual = 0.02**2 + (0.03**2 + 0.01**2 + 0.04**2 + 0.02**2) / 2.0
-    assert unseen_current(table, np.array([5.0, 0.03, -0.04]), covariance, "a") == pytest.approx(usual)
-    assert unseen_current(table, np.array([5.0, 0.3, -0.4]), covariance, "a") == pytest.approx(
+    assert unseen_variance(table, np.array([5.0, 0.03, -0.04]), covariance, currents[0]) == pytest.approx(usual)
+    assert unseen_variance(table, np.array([5.0, 0.3, -0.4]), covariance, currents[0]) == pytest.approx(
         0.02**2 + (0.3**2 + 0.01**2 + 0.4**2 + 0.02**2) / 2.0
     )
     alone = replace(table, parameters=currents[:1])
-    assert unseen_current(alone, np.array([5.0]), covariance[:1, :1], "a") == pytest.approx(0.02**2 + 0.1**2)
+    assert unseen_variance(alone, np.array([5.0]), covariance[:1, :1], currents[0]) == pytest.approx(0.02**2 + 0.1**2)
 
 
 def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit) -> None:

@@ -39,8 +39,8 @@ class Identified:
         here, there = np.array([(n, index) for n, index in indices if index is not None]).T
         z[here], covariance[np.ix_(here, here)] = own.z[there], own.covariance[np.ix_(there, there)]
         for n, p in enumerate(table.parameters):
-            if p.kind == "current":
-                covariance[n, n] = held_out.unseen_current(own.table, own.z, own.covariance, p.of)
+            if p.of_kind.differs_by_log:
+                covariance[n, n] = held_out.unseen_variance(own.table, own.z, own.covariance, p)
         objective = Objective(table, [recording.log], [])
         off, deviations = held_out.ahead(objective, 0, held_out.cautious(objective, z), covariance, begin, span)
         return recording.log.record.value - off, deviations**2
