@@ -49,14 +49,16 @@ LEAST_COMMAND = 0.05
 _CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
 """Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
 them has another command, and if more than the third share of a command is lost between them."""
-_SAME_ROWS = 0.9
-"""A log is a table if this share of its measurements has the times of its commands."""
+_FAR_ROWS, _SAME_ROWS = 0.3, 0.9
+"""Means are told from values of a moment if rows are farther apart than the first number, s: a mean over h differs from
+the value in its middle by h²/24 of the acceleration. A log is a table if more than the second share of its measurements
+has the times of its commands."""
 _GAP_OF_ROWS = 1.5
 """A mean is over the time since the row before, or over the usual interval if that is longer by this factor."""
 _UNKNOWN_ANGLE = 1.0
 """The standard deviation of an angle, or of a part of its quaternion, at the start if its means are left out there."""
 _SMOOTH, _AT_SEAM = pi / 3.0, 0.1
-"""The change of a heading changes by less than the first number from row to row, rad, unless one of them is averaged
+"""The change of an angle changes by less than the first number from row to row, rad, unless one of them is averaged
 across a jump. Noise lets an angle exceed a jump by less than the second number."""
 _LEAST_BESIDE = 1e-3
 """The least second difference of the thrust that counts, relative to full thrust."""
@@ -174,7 +176,7 @@ class SampledLog:
         values of a moment."""
         commands = self.log.commands
         assert commands
-        return commands.interval > 1.0 / THINNED and all(
+        return self.interval > _FAR_ROWS and all(
             np.mean(np.isin(m.channel.time, commands.rows)) > _SAME_ROWS for m in self.measured
         )
 
@@ -187,7 +189,7 @@ class SampledLog:
         """
         commands, names = self.log.commands, [*self.layout.inputs]
         assert commands
-        span, rows = commands.interval, np.union1d(commands.rows, self.record.told)
+        span, rows = self.interval, np.union1d(commands.rows, self.record.told)
         inputs = held(self.record.told, self.record.inputs, rows)
         columns = [
             _steps(rows, column, span) if name in self.layout.commands else (rows, column)
@@ -280,14 +282,14 @@ def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
 def _clear_of(seam: float, values: Array) -> Flags:
     """Return which means of an angle surely contain no jump by a full turn.
 
-    They are farther from it than the angle changes from or to the next one, and change smoothly: within three of them,
-    the change changes by less than _SMOOTH.
+    They are farther from it than the angle changes from or to the next one, and one of three that change smoothly: by
+    less than twice _SMOOTH each, and with less than _SMOOTH between these changes.
     """
     steps = np.remainder(np.diff(values) + pi, 2.0 * pi) - pi
-    is_smooth = np.abs(np.remainder(np.diff(steps) + pi, 2.0 * pi) - pi) < _SMOOTH
-    each = np.pad(is_smooth, (1, 1))
+    size = np.abs(steps)
+    each = np.pad((np.abs(np.diff(steps)) < _SMOOTH) & (np.maximum(size[1:], size[:-1]) < 2.0 * _SMOOTH), 1)
     smooth = each | np.roll(each, 1) | np.roll(each, -1)
-    largest = np.maximum(np.pad(np.abs(steps), (0, 1)), np.pad(np.abs(steps), (1, 0)))
+    largest = np.maximum(np.pad(size, (0, 1)), np.pad(size, (1, 0)))
     distance = np.abs(np.remainder(values - seam + pi, 2.0 * pi) - pi)
     return np.asarray(smooth & (distance > largest))
 
