@@ -9,6 +9,7 @@
  *                                          over ground: Ornstein-Uhlenbeck processes, each with a size and a time constant
  *     v = scale h(x, drift) + offset       what a sensor would measure at once; h knows its place
  *     s' = (v - s) / lag                   what it measures without noise; s = v for a sensor without lag
+ *     s' = (v - s) / (t - t_0)             the same for a log of means: s is the mean of v since t_0
  *     y = s + n + e                        a sample: n is the sensor's coloured noise, also such a process, and e is white
  *
  * A change of the commands happens at an unknown time within a window. The mean uses the expected command, and the state `lateness`
@@ -56,6 +57,7 @@ enum {
 };
 
 static const double TURN = 6.283185307179586;
+static const double INSTANT = 1e-9;   /* s: rounding of times */
 static const double MARGIN = 0.005;   /* s: how near to a step a change of a command matters */
 static const double TINY = 1e-60;
 static const double OUTLYING = 3.0; /* standard deviations: a larger innovation corrects the states as if it were no larger (Huber) */
@@ -91,6 +93,7 @@ typedef struct {
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
+    const double *averaged;      /* of each sample: the time from which it is the mean; NULL if samples are of a moment */
     double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
     double share;                /* the longest step relative to the fastest time constant */
 } record;
@@ -157,6 +160,7 @@ typedef struct {
     int listed[N_X], count;
     belief now, ahead; /* after all samples so far, and the prediction */
     ptrdiff_t row, tilt;
+    ptrdiff_t next[MOST_SENSORS]; /* the next sample of each sensor, or the last one */
     real reset;                /* the last row at which the lateness began anew */
     mask beside[MOST_SENSORS]; /* if the last sample of a sensor was far beside its prediction */
     real cf, sf, ct, st;       /* cosines and sines of the measured roll and pitch at the time of the step or sample */
@@ -572,13 +576,19 @@ static void mean_thrust(const filter *f, ptrdiff_t row, double from, double to, 
 }
 
 /* How what a sensor with a lag measures follows from what it would measure at once, which is linear in time over a span of h: it is
- * `remains` of what it was, and shares of the values at the beginning and at the end. A lag of 0 gives the value at the end. */
+ * `remains` of what it was, and shares of the values at the beginning and at the end. A lag of 0 gives the value at the end, and so
+ * does a time before the interval of a mean. */
 typedef struct {
     real remains, begin, end;
 } lagging;
 
-static lagging lagging_over(const filter *f, ptrdiff_t sensor, double h)
+static lagging lagging_over(const filter *f, ptrdiff_t sensor, double begin, double h)
 {
+    if (f->log->averaged) { /* the lag is the time since the interval of the next mean began */
+        const double since = begin - f->log->averaged[f->next[sensor]];
+        const real share = h / ((since > 0.0 ? since : 0.0) + h), none = 0.0, whole = 1.0;
+        return since < -INSTANT ? (lagging){none, none, whole} : (lagging){1.0 - share, 0.5 * share, 0.5 * share};
+    }
     const real lag = fmax(f->set->lag[sensor], TINY), remains = exp(-h / lag), share = (1.0 - remains) * lag / h;
     return (lagging){remains, share - remains, 1.0 - share};
 }
@@ -591,21 +601,22 @@ static real next_to(const filter *f, real value, const real x[N_X], ptrdiff_t se
 }
 
 /* Move what the sensors with a lag measure over a step, of which the states at its beginning, middle and end are known. */
-static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], double h, real x[N_X])
+static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], double from, double h, real x[N_X])
 {
     for (int sensor = 0; sensor < f->log->sensors; sensor++) {
         if (lags(f, sensor)) {
-            const lagging part = lagging_over(f, sensor, 0.5 * h);
+            lagging part = lagging_over(f, sensor, from, 0.5 * h);
             real *const value = &x[LAGGED + sensor];
             const real begin = next_to(f, *value, before, sensor), half = next_to(f, begin, middle, sensor);
             *value = part.remains * *value + part.begin * begin + part.end * half;
+            part = lagging_over(f, sensor, from + 0.5 * h, 0.5 * h);
             *value = flushed(part.remains * *value + part.begin * half + part.end * next_to(f, half, x, sensor));
         }
     }
 }
 
 /* Take one Runge-Kutta step, and compute the states in its middle. */
-static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double h, const real remains[N_SLOW],
+static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double from, double h, const real remains[N_SLOW],
                       real middle[N_X])
 {
     real k[4][N_STATES], y[N_X], before[N_X];
@@ -629,7 +640,7 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
     for (int i = 0; i < N_SLOW; i++) {
         x[FORCE + i] = flushed(x[FORCE + i] * remains[i]);
     }
-    step_lagged(f, before, middle, h, x);
+    step_lagged(f, before, middle, from, h, x);
     x[LATENESS] = 0.0;
 }
 
@@ -719,14 +730,14 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
 
 /* Compute the rows of the sensors with a lag, which follow from the rows of the vehicle, and how much of the value at the end of the
  * step each of them takes. */
-static void transition_lagged(const filter *f, const real middle[N_X], double h, const real remains[N_SLOW], sparse *phi,
-                              lagging part[MOST_SENSORS], real slope[MOST_SENSORS][N_X])
+static void transition_lagged(const filter *f, const real middle[N_X], double from, double h, const real remains[N_SLOW],
+                              sparse *phi, lagging part[MOST_SENSORS], real slope[MOST_SENSORS][N_X])
 {
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     for (int a = vehicle; a < moving; a++) {
         const int sensor = f->listed[a] - LAGGED;
         real *const H = slope[sensor], row[N_X];
-        part[sensor] = lagging_over(f, sensor, h);
+        part[sensor] = lagging_over(f, sensor, from, h);
         gradient(f, middle, sensor, H);
         memset(row, 0, sizeof row);
         row[a] = part[sensor].remains;
@@ -910,6 +921,7 @@ static void add_growth(const filter *f, const real middle[N_X], ptrdiff_t row, r
 static void advance(filter *f, belief *b, double from, double to, int pieces, bool has_covariance)
 {
     const double h = (to - from) / pieces;
+    const int together = f->log->averaged ? 1 : TOGETHER; /* what remains of a mean differs from step to step */
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     ptrdiff_t row = f->row;
     real reset = f->reset, once[N_SLOW];
@@ -929,14 +941,14 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         }
         set_tilt(f, 0.5 * (begin + end));
         mean_thrust(f, row, begin, end, held);
-        step_mean(f, b->x, held, h, once, middle);
+        step_mean(f, b->x, held, begin, h, once, middle);
         if (!has_covariance) {
             continue;
         }
-        if (piece % TOGETHER == 0) {
+        if (piece % together == 0) {
             slopes(f, middle, held, &m->A);
             transition(f, &m->A, h, &m->once);
-            transition_lagged(f, middle, h, once, &m->once, part, slope);
+            transition_lagged(f, middle, begin, h, once, &m->once, part, slope);
             memset(&d, 0, sizeof d);
             d.count = 1;
         }
@@ -946,8 +958,8 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             const mask begins_anew = begins(f, j) < end && reset < (double)j;
             if (f->log->anew[j] != 0 && ANY(begins_anew)) {
                 reset = begins_anew ? (double)j : reset;
-                d.newest = begins_anew ? (double)(1 + piece % TOGETHER) : d.newest;
-                d.count = 2 + piece % TOGETHER;
+                d.newest = begins_anew ? (double)(1 + piece % together) : d.newest;
+                d.count = 2 + piece % together;
             }
             if (ANY(growth > 0.0)) {
                 add_growth(f, middle, j, growth, late);
@@ -960,9 +972,9 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             }
         }
         step_delays(f, &m->once, late, &d);
-        if (piece % TOGETHER == TOGETHER - 1 || piece == pieces - 1) {
+        if (piece % together == together - 1 || piece == pieces - 1) {
             memcpy(remains, once, sizeof remains);
-            step_covariance(f, b->P, 1 + piece % TOGETHER, &d, remains, row);
+            step_covariance(f, b->P, 1 + piece % together, &d, remains, row);
         }
     }
 }
@@ -1060,7 +1072,7 @@ static void take(filter *f, belief *b, ptrdiff_t k, int repeats, real *off, real
 
 #if LANES == 1
 /* Return how many steps the time before a sample needs: none is longer than `longest`, or than a share of the fastest time constant.
- * Steps in which a command changes are shorter, because they take the mean of the thrust. */
+ * Steps in which a command changes are shorter, because they take the mean of the thrust. The mean of a sample hardly shows it. */
 static int pieces_over(const filter *f, double from, double to)
 {
     double fastest = 1.0 / f->log->longest;
@@ -1071,7 +1083,7 @@ static int pieces_over(const filter *f, double from, double to)
             fastest = fmax(fastest, f->listed[A->column[i][k]] == i ? fabs(A->entry[i][k]) / f->log->share : 0.0);
         }
     }
-    for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN; j++) {
+    for (ptrdiff_t j = f->row + 1; j < f->log->rows && begins(f, j) < to + MARGIN && !f->log->averaged; j++) {
         if (ends(f, j) > from - MARGIN && f->log->anew[j] != 0) {
             fastest = fmax(fastest, 1.0 / f->log->changing);
         }
@@ -1079,6 +1091,17 @@ static int pieces_over(const filter *f, double from, double to)
     return (int)fmin(fmax(ceil((to - from) * fastest - 1e-6), 1.0), 1e5);
 }
 #endif
+
+/* Find the next sample of a sensor from one on. */
+static void find_next(filter *f, ptrdiff_t k, ptrdiff_t sensor)
+{
+    for (; k < f->log->samples; k++) {
+        if (f->log->sensor[k] == sensor) {
+            f->next[sensor] = k;
+            return;
+        }
+    }
+}
 
 /* Let each sensor with a lag begin with what it would measure at once. The error of this is the lag times a rate of change, whose
  * standard deviation is the `error` of its state. */
@@ -1138,6 +1161,9 @@ static void begin_run(filter *f, const parameter_set sets[LANES])
             f->listed[f->count++] = i;
         }
     }
+    for (ptrdiff_t sensor = 0; sensor < log->sensors; sensor++) {
+        find_next(f, 0, sensor);
+    }
     pass_rows(f, log->time[0]);
     set_tilt(f, log->time[0]);
     begin_lagged(f);
@@ -1189,6 +1215,7 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
             }
         }
         take(f, &f->now, k, how->repeats, &off, &variance, gain);
+        find_next(f, k + 1, log->sensor[k]);
         if (predicts) {
             real PH[N_X];
             off = innovation(f, &f->ahead, k);

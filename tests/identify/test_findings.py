@@ -183,6 +183,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
+        "means of rows",
+        quiet(structures=(Structure("means of rows", "a.csv", 0.98),)),
+        "a.csv: each row has the means of its interval (probability 98%)",
+        quiet(),
+    ),
+    (
         "rotor lag",
         quiet(structures=(Structure("rotor lag", "", 0.98),)),
         "the speed of the rotors lags behind",

@@ -77,7 +77,7 @@ class Hypothesis:
     has_times: bool = False
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
     is_first: bool = False
-    """True if it leaves out samples, which would mislead all others. So it is tried before these."""
+    """True if it changes what samples are, which would mislead all others. So it is tried before these."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
 
@@ -92,6 +92,10 @@ def _momentary(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]
 
 def _settled(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
     return known, [one.settled_at(at) if one.log.file in of and (at := one.jump) is not None else one for one in logs]
+
+
+def _averaged(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
+    return known, [one.with_means() if one.log.file in of else one for one in logs]
 
 
 def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
@@ -167,6 +171,13 @@ def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
 def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each file in which a horizontal velocity jumps."""
     yield from ((one.log.file,) for one in logs if one.jump is not None)
+
+
+def _slow_tables(_: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield the files that are tables with rows far apart."""
+    files = [one.log.file for one in logs if one.is_slow_table]
+    if files:
+        yield tuple(files)
 
 
 def _with_both_velocities(_: Prior, logs: Logs) -> Iterator[Of]:
@@ -286,6 +297,19 @@ HYPOTHESES = {
         in_words=_of_settled,
         changes_thrust=False,
         is_first=True,
+    ),
+    "means of rows": Hypothesis(
+        0.03,
+        _slow_tables,
+        _averaged,
+        sentence=(
+            "{of}: each row has the means of its interval{odds}. They are compared with means, and angles whose mean "
+            "may contain a jump by a full turn are left out. Log values of a moment, at 10 Hz or more"
+        ),
+        alarm=0.0,  # rows far apart seem to have so much noise that no error is large
+        changes_thrust=False,
+        is_first=True,
+        why_no_null="a row has a mean or the value of a moment, and nothing lies between",
     ),
     "idle commands": Hypothesis(
         0.05,

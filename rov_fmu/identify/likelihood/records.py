@@ -6,7 +6,7 @@ which keeps what they tell and bounds the time of a fit.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, inf, sin
+from math import cos, inf, pi, sin
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,8 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axi
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
-from rov_fmu.tank.arrays import Array, rms
-from rov_fmu.tank.clocks import first_in_each, gaps
+from rov_fmu.tank.arrays import Array, Flags, rms
+from rov_fmu.tank.clocks import first_in_each, gaps, held
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
@@ -49,6 +49,17 @@ LEAST_COMMAND = 0.05
 _CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
 """Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
 them has another command, and if more than the third share of a command is lost between them."""
+_FAR_ROWS, _SAME_ROWS = 0.3, 0.9
+"""Means are told from values of a moment if rows are farther apart than the first number, s: a mean over h differs from
+the value in its middle by h²/24 of the acceleration. A log is a table if more than the second share of its measurements
+has the times of its commands."""
+_GAP_OF_ROWS = 1.5
+"""A mean is over the time since the row before, or over the usual interval if that is longer by this factor."""
+_UNKNOWN_ANGLE = 1.0
+"""The standard deviation of an angle, or of a part of its quaternion, at the start if its means are left out there."""
+_SMOOTH, _AT_SEAM = pi / 3.0, 0.1
+"""The change of an angle changes by less than the first number from row to row, rad, unless one of them is averaged
+across a jump. Noise lets an angle exceed a jump by less than the second number."""
 _LEAST_BESIDE = 1e-3
 """The least second difference of the thrust that counts, relative to full thrust."""
 _LEAST_PUSH = 0.02
@@ -82,6 +93,8 @@ class SampledLog:
     """The share of the command along each axis that is lost between its rows, by the axis."""
     is_momentary: bool = False
     """True if its rows have the commands of a moment, between which they follow a straight line, on the average."""
+    has_means: bool = False
+    """True if its rows have the means of commands and measurements over the interval before them."""
     settled: float = -inf
     """The time from which its horizontal velocities count, s: before, their sensor did not know them."""
 
@@ -167,6 +180,64 @@ class SampledLog:
         return [m for m in velocities if m.sensor.axis in axes or (is_horizontal and m.sensor.is_horizontal)]
 
     @property
+    def is_slow_table(self) -> bool:
+        """True if its measurements have the times of its commands, and these are so far apart that means differ from
+        values of a moment."""
+        commands = self.log.commands
+        assert commands
+        return self.interval > _FAR_ROWS and all(
+            np.mean(np.isin(m.channel.time, commands.rows)) > _SAME_ROWS for m in self.measured
+        )
+
+    def with_means(self) -> "SampledLog":
+        """Return the log if its rows are means over the interval before them.
+
+        A command between those of the rows before and after changed once, at a time that its mean tells, if it held
+        otherwise. If neither neighbour is also between others, this is taken to be so. An angle whose mean may contain
+        a jump by a full turn is left out.
+        """
+        commands, names = self.log.commands, [*self.layout.inputs]
+        assert commands
+        span, rows = self.interval, np.union1d(commands.rows, self.record.told)
+        inputs = held(self.record.told, self.record.inputs, rows)
+        columns = [
+            _steps(rows, column, span) if name in self.layout.commands else (rows, column)
+            for name, column in zip(names, inputs.T, strict=True)
+        ]
+        told = np.unique(np.concatenate([time for time, _ in columns]))
+        made = {"told": told, "since": told, "inputs": np.column_stack([held(*column, told) for column in columns])}
+
+        measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
+        if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
+            angles = {"psi", *_quaternion(0.0, 0.0, 0.0)} & {*start}
+            start = {**start, **{name: _start(measured, self.layout, ())[0][name] for name in angles}}
+            errors = {**errors, **dict.fromkeys(angles, _UNKNOWN_ANGLE)}
+
+        def of_means(record: Record) -> Record:
+            kept, begin = np.ones(len(record.time), bool), record.time.copy()
+            for number, m in enumerate(measured):
+                own = np.flatnonzero(record.sensor == number)
+                before, time = record.time[own[:-1]], record.time[own[1:]]
+                begin[own[1:]] = np.where(time - before > _GAP_OF_ROWS * span, time - span, before)
+                kept[own] = np.isin(record.time[own], m.channel.time)
+            columns = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
+            tilt = record.tilt - np.array([[0.5 * span], [0.0], [0.0]])
+            some = {"start": start, "errors": errors, "averaged": begin[kept], "tilt": tilt}
+            return replace(record, **columns, **made, **some)
+
+        records = {"record": of_means(self.record), "thinned": of_means(self.thinned)}
+        return replace(self, measured=tuple(measured), **records, lost={}, has_means=True)
+
+    def _clear(self, m: SampledChannel) -> SampledChannel:
+        """Return a channel without the means of an angle that may contain a jump by a full turn."""
+        raw = self.log.used(m.channel.quantity.name)
+        if raw is None or raw.unwrapped[1] is raw.samples[1]:
+            return m
+        seam = 0.0 if raw.samples[1].min() > -_AT_SEAM else pi
+        kept = _clear_of(seam, m.channel.values)
+        return replace(m, channel=replace(m.channel, time=m.channel.time[kept], values=m.channel.values[kept]))
+
+    @property
     def has_positions(self) -> bool:
         """True if a horizontal position is measured."""
         return any(not s.is_velocity and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors)
@@ -200,6 +271,36 @@ class SampledLog:
         after = np.pad(ends[1:], ((0, 1), (0, 0)))
         beside = np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2)
         return replace(self._with_rows(beside=beside), is_momentary=True)
+
+
+def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
+    """Return when a command changes in the intervals before rows, and its values then, from its means over these.
+
+    The times are those of the rows at whose intervals' beginnings it changes, later within these where it is known.
+    """
+    before, now, after = values[:-2], values[1:-1], values[2:]
+    is_between = np.pad((np.minimum(before, after) < now) & (now < np.maximum(before, after)), 1)
+    alone = is_between & ~np.roll(is_between, 1) & ~np.roll(is_between, -1)
+    at = np.flatnonzero(alone)
+    time, found = rows.astype(float), values.copy()
+    time[at] += span * (values[at] - values[at + 1]) / (values[at - 1] - values[at + 1])
+    found[at] = values[at + 1]
+    return time, found
+
+
+def _clear_of(seam: float, values: Array) -> Flags:
+    """Return which means of an angle surely contain no jump by a full turn.
+
+    They are farther from it than the angle changes from or to the next one, and one of three that change smoothly: by
+    less than twice _SMOOTH each, and with less than _SMOOTH between these changes.
+    """
+    steps = np.remainder(np.diff(values) + pi, 2.0 * pi) - pi
+    size = np.abs(steps)
+    each = np.pad((np.abs(np.diff(steps)) < _SMOOTH) & (np.maximum(size[1:], size[:-1]) < 2.0 * _SMOOTH), 1)
+    smooth = each | np.roll(each, 1) | np.roll(each, -1)
+    largest = np.maximum(np.pad(size, (0, 1)), np.pad(size, (1, 0)))
+    distance = np.abs(np.remainder(values - seam + pi, 2.0 * pi) - pi)
+    return np.asarray(smooth & (distance > largest))
 
 
 def recorded(log: Log, layout: Layout) -> SampledLog | None:

@@ -374,14 +374,13 @@ def refitted(plain: Objective, starts: Starts, prior: float, near: StructureFit)
 
 
 def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
-    """Return the fit without the samples that would mislead the search, and the odds of the hypotheses that leave these
-    out.
+    """Return the fit with samples that do not mislead the search, and the odds of the hypotheses that change these.
 
-    Only J of the other samples is compared.
+    Only J of the samples that none leaves out is compared.
     """
     odds = dict[Suspect, float]()
-    if plain.predicted > ALARM:
-        for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
+    for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
+        if plain.predicted > HYPOTHESES[kind].alarm:
             every = [*HYPOTHESES[kind].suspects(plain.objective.table.known, plain.objective.logs)]
             for of in every:
                 prior = 2.0 * log(HYPOTHESES[kind].probability / len(every))
