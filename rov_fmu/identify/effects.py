@@ -2,16 +2,16 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, nan, pi
+from math import inf, nan
 
 import numpy as np
 
 from rov_fmu.equation.catalogue import REVERSE
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, Start, Suspect, in_order, probability, row_of
-from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, WIDTH
+from rov_fmu.identify.likelihood.kinds import LAG, OFFSET, SHORTEST_LAG, WIDTH
 from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_lag
-from rov_fmu.identify.likelihood.posterior import around, hull
+from rov_fmu.identify.likelihood.posterior import hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
 from rov_fmu.identify.result import Effect, Estimate, Logging, SensorNoise, Structure
@@ -19,6 +19,8 @@ from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
+_SHARED = 0.1
+"""Times are not told apart where one has this share of its variance in common with the other."""
 
 
 def effects_of(fit: Fit) -> Iterator[Effect]:
@@ -103,21 +105,40 @@ def _shortest(fit: Fit, p: Parameter) -> float:
         for n, m in enumerate(sampled.measured)
         if p.of_kind.is_lag and p.part in ("", with_same_lag(m.sensor))
     ]
-    return min(intervals, default=-inf) / (2.0 * pi)
+    return min(intervals, default=-inf) * SHORTEST_LAG
 
 
 def loggers_of(fit: Fit) -> Iterator[Logging]:
     """Yield how long after their rows the commands of each log act, s, without the dead time and lag of the vehicle."""
     posterior, table = fit.file.posterior, fit.file.posterior.table
+    lag = table.index(LAG)
+    # a delay that the vehicle does not keep belongs to the logger
+    delay = float(posterior.z[lag]) if lag in posterior.absent else 0.0
     for sampled in fit.objective.logs:
         index = table.index(OFFSET, sampled.log.file)
         if index is None:
             continue
-        offset, lag = float(posterior.z[index]), table.index(LAG)
-        if lag in posterior.absent:  # a delay that the vehicle does not keep belongs to the logger
-            offset += float(posterior.z[lag])
+        offset, (low, high) = _number(fit, index)
         width = table.get(posterior.z, WIDTH, sampled.log.file) * sampled.interval
-        yield Logging(sampled.log.file, sampled.interval, offset, around(offset, posterior.errors[index]), width)
+        yield Logging(sampled.log.file, sampled.interval, offset + delay, (low + delay, high + delay), width)
+
+
+def times_of(fit: Fit) -> tuple[str, ...]:
+    """Return the times from a command to what a sensor shows that the logs do not tell apart, in words; none, if they
+    tell the first one.
+
+    Its interval, whatever the others are, then contains both its absence and its usual size. The others are those whose
+    knowledge would take away a tenth of its variance.
+    """
+    posterior, parameters = fit.posterior, fit.posterior.table.parameters
+    times = grouped((p.of_kind.time, n) for n, p in enumerate(parameters) if p.of_kind.time and not p.is_fixed)
+    for n in posterior.lasting - fit.file.posterior.absent:
+        own, null = parameters[n].of_kind.time, parameters[n].null
+        assert null is not None
+        if posterior.ends(n)[1] <= null:
+            others = (name for name, some in times.items() if name != own and posterior.shared(n, some) > _SHARED)
+            return own, *others
+    return ()
 
 
 def sensors_of(fit: Fit) -> Iterator[SensorNoise]:

@@ -183,6 +183,10 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "thrusters {of}: the logs do not tell whether one of them has lost force, because their commands are "
             "always about the same. A log in which these differ tells it"
         ),
+        "times": (
+            "the logs do not tell {first} from {others}, so its interval contains what they share. Logs at 50 Hz with "
+            "steps of single thrusters would"
+        ),
         "logging": (
             "{files}: the commands act {time} s {beside} their rows. This belongs to the logger, not to the vehicle"
         ),
@@ -269,6 +273,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             size = size_in_words(sensor.wander, sensor.unit)
             findings.append(about("", "estimator", sensor.axis.name, size=size))
     findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
+    first, *others = (f"the {time}" for time in identification.times or ("",))
+    findings += [about("", "times", first=first, others=listed(others))] if others else []
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:

@@ -282,7 +282,9 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     """Return the layout without the effects that are absent."""
     file = fit.file.posterior
     table = file.table
-    present = {(p.kind, p.of) for n, p in enumerate(table.parameters) if n not in file.absent}
+    effects_of_file = [p for n, p in enumerate(table.parameters) if n not in file.absent]
+    present = {(p.kind, p.of) for p in effects_of_file}
+    lasting = {key for p in effects_of_file if p.of_kind.is_in_all for key in p.of_kind.keys}
     base, given = tests.base, tests.description.known
     coefficients: dict[str, float] = table.coefficients(file.z)
 
@@ -292,7 +294,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
             return key in part.keys
         if key in ("V_0", "n_V"):
             return with_voltage
-        if coefficients[name] == ABSENT.get(key.removesuffix(REVERSE)):
+        if key not in lasting and coefficients[name] == ABSENT.get(key.removesuffix(REVERSE)):
             return False
         effects = {effect: kind.keys for effect, kind in EFFECTS.items() if key in kind.keys}
         if not key.endswith(REVERSE) or not effects:

@@ -12,7 +12,7 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of
+from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
 from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
 from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
@@ -132,6 +132,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         slips=wrong,
         structures=tuple(structures_of(fit)),
         alike=fit.alike,
+        times=times_of(fit),
     )
     return told(result)
 

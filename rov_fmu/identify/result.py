@@ -572,6 +572,8 @@ class Identification:
     """The hypotheses about the structure that won."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the logs do not tell apart."""
+    times: tuple[str, ...] = ()
+    """Times from a command to what a sensor shows that the logs do not tell apart, in words."""
     axes_of_base: tuple[AxisOfBase, ...] = ()
     """The other axes of the base and of rov.toml."""
     findings: tuple[Finding, ...] = ()

@@ -1,6 +1,6 @@
 """What is told of a fit: its effects, loggers and sensors, the errors of its predictions, and effects found in logs."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from math import log
@@ -360,22 +360,47 @@ def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
         assert low < 78.0 * answer.command**2 < high
 
 
-@pytest.mark.parametrize("lag", [0.6, pytest.param(0.0, marks=pytest.mark.long)])
-def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
-    """A depth of 31 w' = 78 c |c| - 38 |w| w - 9 w is measured through a filter of the first order."""
-    h, w, z, shown, depths = 0.005, 0.0, 5.0, 5.0, []
-    commands = np.repeat(HELD, round(4.0 / h))
+def of_depth(
+    folder: Path, held: Sequence[float], noise: float, *, sensor: float = 0.0, thruster: float = 0.0
+) -> Identification:
+    """Identify 31 w' = F - 38 |w| w - 9 w from a log at 10 Hz of a depth that is measured through a filter.
+
+    The force F follows 78 c |c| with the lag of the thruster. Both lags are of the first order.
+    """
+    h, w, z, F, shown, depths = 0.005, 0.0, 5.0, 0.0, 5.0, []
+    commands = np.repeat(held, round(4.0 / h))
+    seen, followed = ((1.0 - np.exp(-h / lag)) if lag else 1.0 for lag in (sensor, thruster))
     for c in commands.tolist():
         depths.append(shown)
-        shown += (1.0 - np.exp(-h / lag)) * (z - shown) if lag else z - shown
+        shown += seen * (z - shown)
         z += h * w
-        w += h * (78.0 * c * abs(c) - 38.0 * abs(w) * w - 9.0 * w) / 31.0
-    measured = np.array(depths) + 0.005 * np.random.default_rng(3).standard_normal(len(depths))
+        w += h * (F - 38.0 * abs(w) * w - 9.0 * w) / 31.0
+        F += followed * (78.0 * c * abs(c) - F)
+    measured = np.array(depths) + noise * np.random.default_rng(3).standard_normal(len(depths))
     columns = {"time [s]": h * np.arange(len(commands)), "command [1]": commands, "depth [m]": measured}
     mass = 'm_rov = { value = 20.0, unit = "kg", source = "scale" }\n'
     every = {title: values[::20] for title, values in columns.items()}
     thrust = THRUST.replace("rear", "top")
-    result = identified(tmp_path, f"{HEAD}[known]\n{mass}{thrust}", every, "log_heave.csv")
+    return identified(folder, f"{HEAD}[known]\n{mass}{thrust}", every, "log_heave.csv")
+
+
+@pytest.mark.parametrize(("lag", "noise", "is_short"), [(0.11, 0.02, False), (0.0, 0.0003, True)])
+def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
+    lag: float, noise: float, is_short: bool, tmp_path: Path
+) -> None:
+    """Otherwise, the file has it, and a sentence names what stands in its place."""
+    result = of_depth(tmp_path, HELD[:8], noise, thruster=lag)
+    names = [f"the {time}" for time in result.times]
+    assert names[:1] == ([] if is_short else ["the lag of the thrusters"])
+    assert ("the lag of the sensors" in names) == (not is_short)
+    assert len(sentences(findings_of(result), "times")) == (not is_short)
+    assert ("T_top" in result.vehicle.layout.coefficients) == (not is_short)
+    assert is_short or contains(result.vehicle.intervals["T_top"], lag)
+
+
+@pytest.mark.parametrize("lag", [0.6, pytest.param(0.0, marks=pytest.mark.long)])
+def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
+    result = of_depth(tmp_path, HELD, 0.005, sensor=lag)
     (heave,) = result.axes
     truth = {"a_d_w": 38.0, "b_d_w": 9.0, "beta_w": 20.0 / 31.0}
     of = {one.name: truth[one.name.removesuffix("_reverse")] for one in heave.known}

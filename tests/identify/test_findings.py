@@ -156,6 +156,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     (
+        "times",
+        quiet(times=("lag of the thrusters", "dead time of the commands", "lag of the sensors")),
+        "the logs do not tell the lag of the thrusters from the dead time of the commands and the lag of the sensors, ",
+        quiet(times=("lag of the thrusters",)),
+    ),
+    (
         "unlogged motion",
         turning("heading"),
         "yaw: no log shows how the vehicle moves ahead and sideways",

@@ -5,7 +5,7 @@ minimised with quadratic curves, and then without the weakest effects while it r
 the file has the numbers of a minimum of J, and not those of another vehicle that is extrapolated from it.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 
 from rov_fmu.identify.likelihood.objective import Objective
@@ -29,7 +29,7 @@ class FileFit:
     posterior: Posterior
 
 
-def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
+def without_weak_effects(objective: Objective, best: Minimum, lasting: Collection[int] = ()) -> FileFit:
     """Leave out the weakest effects, each time with a refit, while J rises by at most MOST_RISE.
 
     The effect that is left out next is the one without which J is expected to rise least, given that those before it
@@ -37,7 +37,7 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     that hold tell anew what to expect of the next ones.
 
     An effect that needs evidence, such as the voltage, which would be an input of the FMU, is left out before, whatever
-    the rise, if the evidence for it is not positive.
+    the rise, if the evidence for it is not positive. Those that are `lasting`, by their indices, stay.
 
     The refits keep the derivatives of the fit that they begin at: J where they end is J, and exact derivatives follow
     at the end, with which more effects may go.
@@ -48,7 +48,7 @@ def without_weak_effects(objective: Objective, best: Minimum) -> FileFit:
     least, is_exact = best, not absent
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)
-        order = [*_weakest(posterior, least.value - best.value)]
+        order = [*_weakest(posterior, least.value - best.value, lasting)]
         tried = [absent.union(order[: n + 1]) for n in range(len(order))]
         found = refits(objective, least, [objective.whole] * len(tried), tried)
         within = [n for n, one in enumerate(found) if one.value - best.value <= MOST_RISE]
@@ -76,10 +76,10 @@ def _without_evidence(posterior: Posterior) -> frozenset[int]:
     return posterior.absent
 
 
-def _weakest(posterior: Posterior, rise: float) -> Iterator[int]:
+def _weakest(posterior: Posterior, rise: float, lasting: Collection[int]) -> Iterator[int]:
     """Yield the indices of effects in the order in which they are left out, for a normal posterior after J rose."""
     may_go = {n for n, p in enumerate(posterior.table.parameters) if p.is_effect and not p.of_kind.is_of_structure}
-    while rest := may_go - posterior.absent:
+    while rest := may_go - posterior.absent.union(lasting):
         rises = {n: _rise(posterior, n) for n in rest}
         least = min(rises, key=lambda n: rises[n])
         rise += rises[least]

@@ -18,6 +18,8 @@ from rov_fmu.identify.likelihood.prior import Prior
 
 LEAST_LAG = 0.02
 """The least time constant of a lag, s. A shorter one cannot be told from the time of the commands."""
+SHORTEST_LAG = 1.0 / (2.0 * pi)
+"""The shortest lag that samples show, relative to the time between two of them: its corner frequency is theirs."""
 USUAL_EXPONENT = 1.5
 """The usual exponent of thrust over voltage, of thrusters whose speed nothing regulates."""
 PLACED = {True: "velocity sensor", False: "position sensor"}
@@ -115,6 +117,10 @@ class Kind(Coordinate):
     needs_evidence: bool = False
     """True if the file has it only with positive evidence: the FMU would have one more input for it, or the file can
     only approximate it."""
+    is_in_all: bool = False
+    """True if every vehicle has it: the file has it unless the data tell that it is smaller than usual."""
+    time: str = ""
+    """What it is among the times from a command to what a sensor shows of it, which a log may not tell apart."""
     is_lag: bool = False
     """True for a time constant, which the samples of sensors must be close enough to show."""
     unusual: float = 2.5
@@ -296,6 +302,8 @@ KINDS = {
         Deviation("lag", 0.15, "the time constant of the thrusters, s", "small thrusters need 0.05 to 0.3 s"),
         "time constant of the thrusters",
         keys=("T",),
+        is_in_all=True,
+        time="lag of the thrusters",
         is_lag=True,
         mean=0.05,
         low=LEAST_LAG,
@@ -307,6 +315,7 @@ KINDS = {
         Deviation("dead_time", 0.05, "the time from a command to its effect, s", "links of one or two control periods"),
         "dead time of the commands",
         ". The vehicle file does not have it; T_d in [commands] would add it",
+        time="dead time of the commands",
         low=0.0,
         null=0.0,
         unit="s",
@@ -398,6 +407,7 @@ KINDS = {
         Deviation("sensor_lag", 0.3, "the time constant of a sensor, s", "navigation filters smooth over 0 to 0.5 s"),
         "time constant",
         _WITHOUT_SENSORS,
+        time="lag of the sensors",
         is_lag=True,
         low=0.0,
         null=0.0,
@@ -567,7 +577,7 @@ KINDS = {
     "coloured noise": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(0.3), hides_structure=True),
     "correlation time": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(2.0), unit="s"),
     "row noise": Kind(is_log=True, of_motion=False, mean=log(0.03), low=log(1e-3)),
-    "logging offset": Kind(unit="s", adapts=True),
+    "logging offset": Kind(unit="s", time="time of the rows", adapts=True),
     "logging width": Kind(of_motion=False, mean=0.5, deviation=0.5, low=0.0, high=1.0),
 }
 """All kinds. The sizes of slow processes are relative to full thrust, fractions, and in m/s. Coloured noise is relative

@@ -224,7 +224,7 @@ class Table:
                 values[curve.coefficient(f"d{end}")] = lost * own * relative * full
         if "T" in curve.keys:
             lag = curve.coefficient("T")
-            values[lag] = np.maximum(self.get(z, LAG, default=values[lag]), LEAST_LAG)
+            values[lag] = self.get(z, LAG, default=max(values[lag], LEAST_LAG))
 
     def force_unit(self, z: Array, axis: Axis) -> Any:
         """Return what the size of a slow force is relative to, N or N m: full thrust, in proportion to the inertia.

@@ -4,7 +4,7 @@ The posterior is normal in the coordinates of the parameters, with the inverse o
 covariance. Intervals take Student's distribution with 10 degrees of freedom, because the noise is estimated as well.
 """
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log
@@ -70,7 +70,8 @@ class Posterior:
         `unseen` is the covariance of the parameters by errors that the data do not show.
         """
         wider = self._with_less_information(ratios)
-        return replace(wider, covariance=wider.covariance + unseen) if unseen.any() else wider
+        is_free = np.diag(self.covariance) > 0.0
+        return replace(wider, covariance=wider.covariance + unseen * np.outer(is_free, is_free))
 
     def _with_less_information(self, ratios: Mapping[Axis, float]) -> "Posterior":
         layout, worst = self.table.layout, max(ratios.values(), default=0.0)
@@ -103,6 +104,21 @@ class Posterior:
         """Return a coordinate and the two ends of its 95 % interval."""
         z = float(self.z[index])
         return np.array([z, *around(z, self.error(index))])
+
+    @property
+    def lasting(self) -> frozenset[int]:
+        """The indices of the effects that every vehicle has, unless the data tell that they are smaller than usual.
+
+        Weak evidence is no reason to leave them out: the other effects may stand in their place.
+        """
+        some = [(n, p) for n, p in enumerate(self.table.parameters) if p.is_effect and p.of_kind.is_in_all]
+        return frozenset(n for n, p in some if self.ends(n)[2] >= p.of_kind.mean)
+
+    def shared(self, index: int, others: Sequence[int]) -> float:
+        """Return the share of the variance of a coordinate that the knowledge of others would take away."""
+        with_others = self.covariance[index, [*others]]
+        of_others = np.linalg.pinv(self.covariance[np.ix_(others, others)], hermitian=True)
+        return float(with_others @ of_others @ with_others / max(self.covariance[index, index], 1e-300))
 
     def evidence(self, index: int) -> float:
         """Return 2 ln of the Bayes factor for an effect (Savage and Dickey): prior to posterior where it is absent.

@@ -30,7 +30,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     row_of,
     thrusters_alike,
 )
-from rov_fmu.identify.likelihood.kinds import INERTIA, WHITE, WIDTH
+from rov_fmu.identify.likelihood.kinds import INERTIA, SHORTEST_LAG, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import Posterior
@@ -162,7 +162,9 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
     }
 
 
-def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
+def unseen_errors(
+    objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit], covariance: Array
+) -> Array:
     """Return the covariance of the parameters by errors that do not become smaller with the number of samples.
 
     What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
@@ -171,7 +173,9 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
 
     Where commands change between the rows of a log, they act a small part of their window earlier or later along each
     axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
-    had another inertia, and a fast axis the more.
+    had another inertia, and a fast axis the more. What a command does between two rows also acts like a lag: where all
+    logs have such commands, the lag of the thrusters has a standard error of the shortest lag that rows show. The other
+    times change with it as the data tell by their `covariance`.
 
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
@@ -187,6 +191,12 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
         if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (CONSTANTS["late"].value * max(widths) / time) ** 2)
+    shortest = min((one.interval if one.lost else 0.0 for one in objective.logs), default=0.0) * SHORTEST_LAG
+    are_times = np.array([bool(p.of_kind.time) for p in parameters])
+    for n, p in enumerate(parameters):
+        if p.of_kind.is_in_all and covariance[n, n] > 0.0:
+            along = are_times * covariance[n] / covariance[n, n]
+            found += shortest**2 * np.outer(along, along)
     return found
 
 

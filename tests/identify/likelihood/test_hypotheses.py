@@ -235,7 +235,7 @@ def with_jump(sampled: SampledLog) -> SampledLog:
 
 
 def one_of_each(model: Objective) -> Starts:
-    """One hypothesis of each kind about a model whose log has momentary commands, far rows and a velocity that jumps."""
+    """One hypothesis of each kind, for a model whose log has momentary commands, far rows and a velocity that jumps."""
     told, found = model.logs[0].record.told, dict[Suspect, Start]()
     for kind, hypothesis in HYPOTHESES.items():
         of = next(hypothesis.suspects(model.table.known, model.logs))
@@ -478,7 +478,7 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
     objective = model
     axes = [form.axis for form in model.table.known.layout.axes]
     z = np.array([p.mean for p in objective.table.parameters])
-    found = unseen_errors(objective, z, {}, dict.fromkeys(axes, Misfit(1.0, lack)))
+    found = unseen_errors(objective, z, {}, dict.fromkeys(axes, Misfit(1.0, lack)), np.eye(len(z)))
     exact = Posterior(objective.table, z, np.diag(np.full(len(z), 1e-8)))
     for axis in axes:
         if not model.table.known.coefficients[axis.coefficient("F_0")]:  # a load is no part of the thrust
@@ -489,6 +489,24 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
 
             _, covariance, _ = replace(exact, covariance=found).numbers(logarithms)
             assert np.sqrt(np.diag(covariance)) == pytest.approx([error, error], rel=0.01)
+
+
+def test_a_lag_is_as_uncertain_as_what_commands_do_between_rows(model: Objective) -> None:
+    """The sum of the lags of thrusters and sensors stays. A log without such commands tells the lag."""
+    nothing, (log,) = dict.fromkeys((form.axis for form in model.table.known.layout.axes), Misfit()), model.logs
+    lost, other = replace(log, lost={"yaw": 0.1}), replace(log, log=replace(log.log, file="other.csv"))
+    for logs, error in (([lost], log.interval / (2.0 * np.pi)), ([lost, other], 0.0)):
+        objective = with_logs(model, logs)
+        z = np.array([p.mean for p in objective.table.parameters])
+        of = {p.kind: n for n, p in enumerate(objective.table.parameters)}
+        lags, inertia = [of["lag"], of["sensor lag"]], of["inertia"]
+        covariance = np.eye(len(z))
+        covariance[lags, lags[::-1]] = -1.0
+        covariance[lags[0], inertia] = covariance[inertia, lags[0]] = 0.5
+        found = unseen_errors(objective, z, {}, nothing, covariance)
+        assert found[lags, lags] ** 0.5 == pytest.approx([error, error])
+        assert found[np.ix_(lags, lags)].sum() == pytest.approx(0.0, abs=1e-12)
+        assert found[lags[0], inertia] == 0.0
 
 
 def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_scale_of_sensors(
@@ -505,7 +523,7 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     for width, window in ((0.05, 0.2), (0.4, 0.4), (0.6, 1.0)):  # beyond a half, commands change at any time
         z[index] = width
         assert windows(objective, z) == {file: pytest.approx(window)}
-        found = unseen_errors(objective, z, {}, nothing)
+        found = unseen_errors(objective, z, {}, nothing, np.eye(len(z)))
         assert np.array_equal(found, found.T)
         for axis in vehicle.layout.bare_axes:
             own = {p.kind: n for n, p in enumerate(table.parameters) if p.of == axis.name}
