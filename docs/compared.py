@@ -187,7 +187,7 @@ AHEAD = (0.1, 0.2, 0.3, 0.5, 1.0)
 
 
 def _tilting(eight: Vehicle) -> Table:
-    """How far vehicles without control tilt under thrust ahead."""
+    """How far vehicles without control tilt under thrust ahead, deep under water."""
     found: Table = [("thrust ahead for 30 s", *(f"{command:.0%}" for command in AHEAD))]
     cases = {
         "Heavy": eight,
@@ -197,7 +197,7 @@ def _tilting(eight: Vehicle) -> Table:
         cells = []
         for command in AHEAD:
             inputs = {name: sign * command for name, sign in rov.layout.signs(SURGE).items()}
-            moved = run(rov, 0.1 * np.arange(301), inputs)
+            moved = run(rov, 0.1 * np.arange(301), {"z": 100.0, **inputs})
             tilt = degrees(float(np.max(np.arccos(np.cos(moved["phi"]) * np.cos(moved["theta"])))))
             cells.append(f"{tilt:.0f}°" if tilt < 90.0 else "turns over")
         found.append((title, *cells))

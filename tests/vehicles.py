@@ -183,6 +183,11 @@ def carried(vehicle: Vehicle) -> tuple[object, ...]:
     return {name: [table and table.path for table in own] for name, own in measured.items()}, layout.voltage_source
 
 
+def without_surface(rov: _Vehicle) -> _Vehicle:
+    """Return a vehicle that buoyancy and thrust move above the surface, too."""
+    return rov.with_(replace(rov.layout, surface=False))
+
+
 def four_axes(vehicle: Vehicle) -> Vehicle:
     """Return a vehicle without roll and pitch, if it has them: its net weight is then a constant load in heave."""
     rov = vehicle
@@ -205,8 +210,8 @@ def four_axes(vehicle: Vehicle) -> Vehicle:
 
 
 VIDEORAY = load_vehicle(SHIPPED["videoray"])
-HEAVY = four_axes(load_vehicle(SHIPPED["bluerov2_heavy"]))
-"""The BlueROV2 Heavy without roll and pitch: four axes with lag and coupling."""
+HEAVY = four_axes(without_surface(load_vehicle(SHIPPED["bluerov2_heavy"])))
+"""The BlueROV2 Heavy without roll, pitch and the surface: four axes with lag and coupling."""
 VEHICLES = {
     "VideoRay": VIDEORAY,
     "Heavy": HEAVY,
@@ -279,12 +284,6 @@ def passed(rov: _Vehicle) -> _Vehicle:
 def surfaced(rov: _Vehicle, height: float = 0.25) -> _Vehicle:
     """Return a vehicle whose buoyancy and thrust fade out above the surface."""
     return replace(rov, layout=replace(rov.layout, surface=True), coefficients={**rov.coefficients, "height": height})
-
-
-def without_surface(rov: _Vehicle) -> _Vehicle:
-    """Return a vehicle that buoyancy and thrust move above the surface, too."""
-    kept = {name: value for name, value in rov.coefficients.items() if name != "height"}
-    return replace(rov, layout=replace(rov.layout, surface=False), coefficients=kept)
 
 
 def extended(rov: Vehicle, **values: float) -> Vehicle:

@@ -3,6 +3,7 @@
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 20000;
 const RESTING = 0.55; // of the vehicle's size: the height of its middle above the seabed on which it rests
+const NO_SURFACE = 1e6; // m; over such a height, buoyancy and thrust do not fade out
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
 /** Returns the last place at which ascending numbers are at most x, or 0. @param {number[]} numbers @param {number} x */
@@ -186,12 +187,22 @@ class Flight {
 
   /** Begins the history with the states as they are set. */
   begin() {
+    this.surface();
     this.time = 0;
     this.times.splice(0, Number.POSITIVE_INFINITY, 0); // the charts keep this list
     this.commands = [this.given()];
     this.pilot.begin();
     this.ghost.begin();
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
+  }
+
+  /** Lets the surface of the models act, but not in recordings and step tests, in which the vehicles are as deep under water. */
+  surface() {
+    const acts = this.isBounded && !this.test && !this.replay;
+    for (const { model } of [this.pilot, this.ghost]) {
+      const height = acts ? model.start("height") : NO_SURFACE;
+      if (model.has("height") && model.get("height") !== height) model.tune({ height });
+    }
   }
 
   /** Returns the commands that act. */
@@ -271,6 +282,7 @@ class Flight {
       this.seek(this.time + h);
       return true;
     }
+    this.surface();
     for (let left = h; left > 0; ) {
       const step = Math.min(left, LONGEST_STEP);
       const sticks = this.steering();
@@ -302,12 +314,11 @@ class Flight {
   play(recording) {
     const { time } = this.replay ? this : { time: 0 };
     this.reset();
-    const replay = new Replay(recording, this);
-    if (!replay.fly(this)) {
+    this.replay = new Replay(recording, this);
+    if (!this.replay.fly(this)) {
       this.reset();
       return false;
     }
-    this.replay = replay;
     this.ghostShown = true;
     this.begun = true;
     this.seek(time);

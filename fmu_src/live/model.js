@@ -97,6 +97,11 @@ class Model {
     return this.places.has(name);
   }
 
+  /** Returns the start value of a variable, or 0 if the vehicle does not have it. @param {string} name */
+  start(name) {
+    return this.vehicle.variables[this.places.get(name) ?? -1]?.[1] ?? 0;
+  }
+
   /** Returns the value of a variable, or 0 if the vehicle does not have it. @param {string} name */
   get(name) {
     const place = this.places.get(name);

@@ -1,9 +1,11 @@
 """Gymnasium environments of a vehicle: one, or many with coefficients drawn from their uncertainty.
 
 The task is to hold station: the vehicle starts at rest in a random place near the origin and should return there and
-stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states.
+stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states. Depth is
+from the place to hold, deep under water, so that a vehicle with a surface has none here.
 """
 
+from dataclasses import replace
 from typing import Any, Literal
 
 import gymnasium
@@ -50,6 +52,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         for name, value in {"count": count, "step": step, "steps": steps}.items():
             if not value > 0:
                 raise InputError(f"{name} = {shown(value)}: must be above 0")
+        vehicle = vehicle.with_(replace(vehicle.layout, surface=False))
         layout = vehicle.layout
         self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
         self.draws: Draws = draws if len(vehicle.uncertainty.names) else False

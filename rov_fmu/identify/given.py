@@ -139,9 +139,11 @@ def _kept_from_base(folder: Folder, description: Description, logged: Collection
 
 
 def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
-    """Drop the coefficients that a vehicle need not have, unless they are known."""
+    """Drop the coefficients that a vehicle need not have, unless they are known, and the surface: many logs have no
+    depth, or count it from elsewhere, and would be taken to be in the air."""
     kinds = AXIS | CURVE
-    return layout.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
+    deep = replace(layout, surface=False)
+    return deep.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
 
 
 def _is_tested_or_known(axis: Axis, tested: Collection[str], known: Collection[str]) -> bool:

@@ -26,6 +26,7 @@ from rov_fmu.identify.result import Coefficient, Identification, Interval
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.vehicle.checks import check_surface
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated
 from rov_fmu.vehicle.uncertainty import NORMAL
@@ -237,7 +238,7 @@ def _changed(posterior: Posterior, vehicle: Vehicle) -> list[str]:
     parameters = posterior.table.parameters
     moves = [(n, 0.1 * parameters[n].deviation + 0.01) for n in posterior.of_vehicle]
     values = posterior.table.coefficients(changed(posterior.z, [(0, 0.0), *moves]))
-    return [name for name in vehicle.coefficients if np.ptp(values[name]) > 0.0]
+    return [name for name in vehicle.coefficients if name in values and np.ptp(values[name]) > 0.0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -279,7 +280,7 @@ def _numbers(posterior: Posterior, fit: Fit, names: Sequence[str]) -> _Numbers:
 
 
 def _layout(tests: Tests, fit: Fit) -> Layout:
-    """Return the layout without the effects that are absent."""
+    """Return the layout without the effects that are absent, and with the surface of the base where it can be."""
     file = fit.file.posterior
     table = file.table
     effects_of_file = [p for n, p in enumerate(table.parameters) if n not in file.absent]
@@ -307,7 +308,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
     with_voltage = tests.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
     kept, own = layout.with_keys(has), tests.vehicle.layout
-    return replace(
+    written = replace(
         kept,
         axes=tuple(form for form in kept.axes if own.has(form.axis)),
         coupled=own.coupled,
@@ -316,6 +317,8 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         voltage=layout.voltage if with_voltage else None,
         mix=own.mix,
     )
+    surfaced = replace(written, surface=tests.description.layout.surface)
+    return written if any(check_surface(surfaced)) else surfaced
 
 
 def _data(fit: Fit) -> str:

@@ -67,7 +67,7 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
         yield from check_inputs(layout)
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
-    yield from _check_surface(layout)
+    yield from check_surface(layout)
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
         yield from check_distinct_names(layout)
         yield from _check_named_coefficients(parts, layout, lost)
@@ -91,7 +91,7 @@ def check_distinct_names(layout: Layout) -> Iterator[str]:
             return
 
 
-def _check_surface(layout: Layout) -> Iterator[str]:
+def check_surface(layout: Layout) -> Iterator[str]:
     """Check that a vehicle with a surface moves up and down, and that its thrust is quadratic there."""
     if layout.surface and not layout.has(HEAVE):
         yield key_line("surface", "the vehicle does not move up and down: give axes.heave, or leave this table out")

@@ -38,7 +38,7 @@ def test_the_environment_checker_passes() -> None:
 def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environment(
     name: str, drawn_values: int
 ) -> None:
-    """The file of the Heavy contains no uncertainty, so its coefficients are not drawn."""
+    """The file of the Heavy contains no uncertainty, so its coefficients are not drawn. It moves as 50 m deep."""
     vehicle = rov_fmu.load(name)
     many = RovVectorEnv(vehicle, 3, steps=5)
     start, _ = many.reset(seed=1)
@@ -59,8 +59,10 @@ def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environm
         assert rewards == pytest.approx(-np.sum(states[:, task] ** 2, axis=1) - 0.1 * np.sum(actions[n] ** 2, axis=1))
     commands = dict(zip(many.commands, actions[:, 1].T, strict=True))
     begin = dict(zip(many.states, start[1], strict=True))
-    run = drawn.simulate(0.1 * np.arange(6), commands, start=begin, record=many.states)
-    np.testing.assert_allclose(states[1], [run[name][-1] for name in many.states], rtol=1e-11, atol=1e-11)
+    run = drawn.simulate(0.1 * np.arange(6), commands, start=begin | {"z": begin["z"] + 50.0}, record=many.states)
+    expected = {name: run[name][-1] for name in many.states}
+    expected["z"] -= 50.0
+    np.testing.assert_allclose(states[1], [*expected.values()], rtol=1e-11, atol=1e-11)
     states, rewards, _, truncated, _ = many.step(actions[5])
     assert not rewards.any()
     assert not truncated.any()

@@ -32,7 +32,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, frictionless, passed, tied
+from tests.vehicles import VEHICLES, frictionless, passed, tied, without_surface
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 
@@ -69,7 +69,7 @@ def package_of(vehicle: Vehicle) -> ModuleType:
 
 @cache
 def loaded(name: str) -> tuple[VehicleModel, ModuleType]:
-    vehicle = rov_fmu.load(FILES[name])
+    vehicle = without_surface(rov_fmu.load(FILES[name]))
     return vehicle, package_of(vehicle)
 
 

@@ -371,7 +371,8 @@ def test_how_far_a_vehicle_rises_before_ardusub_knows_its_position(
     fall = solve_ivp(
         lambda _, y: (y[1], (force - linear * y[1] - quadratic * abs(y[1]) * y[1]) / mass), (0.0, 45.0), (0.0, 0.0)
     )
-    assert main(["sitl", name, "--set", f"Z_ext={setting}", "--duration", "0.01", "--port", "0"]) == 0
+    given = [f"--set=Z_ext={setting}", "--set=z=50"]
+    assert main(["sitl", name, *given, "--duration", "0.01", "--port", "0"]) == 0
     said = re.findall(r"rises with (.*) N: (.*) m in the 45 s before", capsys.readouterr().err)
     expected = [newtons, pytest.approx(-fall.y[0, -1], rel=0.05)]
     assert [[*map(float, found)] for found in said] == ([expected] if newtons else [])

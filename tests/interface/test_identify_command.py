@@ -75,6 +75,7 @@ def test_a_log_alone_is_identified_with_a_vehicle_that_is_assumed(
     assert "The mass and the thrusters are assumed." in heave
     vehicle = load_vehicle(written)
     assert vehicle.sources["m_rov"] == "Assumed, as in bluerov2: Wu (2018)"
+    assert vehicle["height"] == 0.254, "the base has a surface, which no fit knows"
     assert vehicle.provenance
     assert {*vehicle.provenance.inputs} == {"bluerov2", "dive.csv"}
     assert not (tmp_path / "rov.toml").exists()

@@ -341,12 +341,13 @@ WRONG: dict[str, tuple[Call, str]] = {
 
 def test_a_vehicle_that_turns_over_brings_a_warning() -> None:
     heavy, ahead = rov_fmu.load("bluerov2_heavy"), {"u_1": -0.3, "u_2": -0.3, "u_3": 0.3, "u_4": 0.3}
-    times = np.linspace(0.0, 3.0, 301)
+    times, deep = np.linspace(0.0, 3.0, 301), {"z": 10.0}
     with pytest.warns(UserWarning, match=r"^BlueROV2 Heavy turns over at 1\.87 s: nothing holds it level") as caught:
-        found = heavy.simulate(times, ahead, record="u")
+        found = heavy.simulate(times, ahead, start=deep, record="u")
     assert (found.names, len(caught), caught[0].filename) == (("u",), 1, __file__)
+    many = {name: np.array([[x], [0.0]]) for name, x in ahead.items()}
     with pytest.warns(UserWarning, match="turns over at 1"):
-        heavy.simulate_many(times, {name: np.array([[x], [0.0]]) for name, x in ahead.items()}, record="u")
+        heavy.simulate_many(times, many, start=deep, record="u")
     heavy.simulate(times, {name: 0.5 * x for name, x in ahead.items()})  # tilts
     heavy.simulate(times, start={"phi_0": 3.0})  # begins on its back
 

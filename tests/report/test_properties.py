@@ -91,10 +91,11 @@ def evaluated(rov: Vehicle, shown: Equations, inputs: Values, state: Values) -> 
 
 
 def check(rov: Vehicle, rng: random.Random, times: int) -> set[str]:
-    """Check the equations at random inputs and states, and return the names that they give."""
+    """Check the equations at random inputs and states under water, and return the names that they give."""
     shown = equations.equations_of(rov.layout)
     for _ in range(times):
         inputs, state = random_inputs(rng, rov), random_state(rng, rov)
+        state |= {"z": abs(state["z"])} if "z" in state else {}
         exact = exactly(rov, inputs, state)
         found = evaluated(rov, shown, inputs, state)
         largest = max(map(abs, exact.values()))

@@ -192,6 +192,8 @@ class Motion:
                     found = _root(velocity, length, self.y[i] * sign, reached), i
                     continue
                 if self.is_rounding(i, self.rate[i]):
+                    if self.is_rounding(i, reached / h):
+                        continue
                     self.direction[name] = -sign
                     self.find_numbers()
                     self.rate = self.rates(0.0, self.y)

@@ -26,6 +26,8 @@ _APART = 0.065
 """The least distance of the labels of lines, as a share of the height of a plot."""
 _LABELS = 40.0
 """The width of the labels of lines, points."""
+_DEEP = 1e4
+"""The depth from which no step reaches the surface, m."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ def draw_curve(ax: Axes, vehicle: Vehicle, curve: Curve) -> None:
 
 
 def after_step(vehicle: Vehicle, axis: Axis, command: float, times: Sequence[float]) -> list[float]:
-    """Return the velocity along an axis at each time, the first 0, under a held command from rest.
+    """Return the velocity along an axis at each time, the first 0, under a held command from rest deep under water.
 
     The other axes are left without a force, so that they stay at rest and do not act on this one.
     """
@@ -101,7 +103,8 @@ def after_step(vehicle: Vehicle, axis: Axis, command: float, times: Sequence[flo
         for name in (form.axis.coefficient("alpha"), form.coefficient("F_0"))
         if name in vehicle.coefficients
     }
-    values = {**vehicle.held_inputs(axis, command), **others}
+    deep = {"z": _DEEP} if vehicle.layout.surface else {}
+    values = {**vehicle.held_inputs(axis, command), **others, **deep}
     velocity: list[float] = simulate(vehicle, np.array(times), values, [axis.velocity]).values[0, 0].tolist()
     return velocity
 

@@ -17,10 +17,14 @@ from rov_fmu.bridges.system.part import read_part
 from rov_fmu.bridges.system.run import run_system
 from rov_fmu.bridges.system.ssp import Structure
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import FileError
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.bridges.system.fmus import foreign
 from tests.commands import without_progress
+from tests.vehicles import tied
 
 HERE = Path(__file__).parent
 
@@ -117,6 +121,32 @@ def test_steps_that_differ_in_their_last_bits_make_no_difference() -> None:
     """Those of an importer that counts in nanoseconds do."""
     first, second = tether(0.5), tether(0.5, step=0.05 + 1e-15)
     assert all(getattr(first, name) == getattr(second, name) for name in slave_of("tether").variables)
+
+
+def test_the_peak_of_a_snap_load_grows_with_the_step_as_the_page_says() -> None:
+    """A BlueROV2 sets off ahead with 60 %, and a tether of 60 m with 1 m of slack stops it.
+
+    Steps of 1 ms give 85.4 N.
+    """
+    pytest.importorskip("moordyn")
+    rov = tied(load_vehicle(SHIPPED["bluerov2"]), tether=(-0.2, 0.0, -0.1))
+    inputs = rov.layout.usual_inputs | rov.layout.commands_along(SURGE, 0.6)
+    ports = {f"{x}_bottom": f"{x}_tether" for x in ("x", "y", "z", "vg_N", "vg_E", "vg_D")}
+    excess = []
+    for h in (0.05, 0.1):
+        line: Any = slave_of("tether")(instance_name="tether")
+        line.x_top, line.z_top = -59.2, 9.9
+        state, most = rov.layout.at_rest | {"z": 10.0}, 0.0
+        for n in range(round(0.9 / h)):
+            now = state | rov.calculated(inputs, state)
+            vars(line).update({place: now[name] for place, name in ports.items()})
+            force = {f"F_{d}_tether": getattr(line, f"F_{d}_bottom") for d in "NED"}
+            assert line.do_step(n * h, h)
+            state = rov.step(inputs | force, state, h)
+            most = max(most, line.tension_bottom)
+        line.terminate()
+        excess.append(most / 85.4 - 1.0)
+    assert excess == pytest.approx([0.09, 0.25], abs=0.005)
 
 
 def test_a_step_that_moordyn_cannot_do_is_refused() -> None:

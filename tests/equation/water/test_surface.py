@@ -110,6 +110,18 @@ def test_a_jump_passes_the_height_above_which_nothing_lifts() -> None:
     assert np.isfinite(rate).all()
 
 
+def test_in_the_air_thrust_that_is_lost_moves_nothing() -> None:
+    """The thrust and what it loses cancel each other but for rounding errors, whose signs are no directions."""
+    rng, rov = random.Random(1), LEVEL.with_(height=0.254)  # 1/H is no binary fraction
+    for z in np.linspace(-15.0, -1.0, 20):
+        state = at_rest(rov) | {"z": float(z), "w": 0.8, "r": rng.uniform(-2.0, 2.0)}
+        state |= {name: rng.uniform(-20.0, 20.0) for name in rov.layout.lagging}
+        inputs = still(rov) | {name: rng.uniform(-1.0, 1.0) for name in rov.layout.commands}
+        for step in (in_python, in_engine):
+            moved = step(rov, inputs, state, 1e-5)
+            assert (moved["u"], moved["v"]) == pytest.approx((0.0, 0.0), abs=1e-17)
+
+
 @pytest.mark.parametrize("name", ROVS)
 def test_below_the_surface_it_moves_as_without_one(name: str) -> None:
     rov = ROVS[name]

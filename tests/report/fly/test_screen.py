@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+import rov_fmu
 from tests.report.conftest import flown_vehicle, get, write_page
 from tests.report.fly.boxes import SCREENS, WIDTHS, drawn_problems, problems, record_drawn_texts
 from tests.report.pages import UNFOLD
@@ -44,7 +45,7 @@ def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) ->
 
 
 def test_a_step_test_that_leaves_the_water_says_that_the_surface_is_off(fly: Callable[..., Any]) -> None:
-    """The BlueROV2 is lighter than water, so it rises in a step test along another axis, too."""
+    """The BlueROV2 is lighter than water, so it rises in a step test along another axis, too. Else it floats."""
     page = fly("bluerov2")
     page.evaluate("""() => {
         live.run();
@@ -52,8 +53,12 @@ def test_a_step_test_that_leaves_the_water_says_that_the_surface_is_off(fly: Cal
         live.flight.advance(5);
         live.draw();
     }""")
-    assert get(page, "z")[0] < 0.0
+    deep = rov_fmu.load("bluerov2").simulate([0.0, 5.0], start={"z": 9.0})
+    assert get(page, "z")[0] == pytest.approx(deep["z"][-1] - 9.0, rel=1e-3)
     assert "(surface off)" in page.inner_text("#live-readings")
+    page.evaluate("() => { live.flight.reset(); live.flight.advance(60); live.draw(); }")
+    assert get(page, "z")[0] == pytest.approx(-0.254 * 2.0 / (2.0 + 9.80665 * 11.5), rel=1e-3)
+    assert "(at the surface)" in page.inner_text("#live-readings")
 
 
 @pytest.mark.parametrize(("width", "scheme"), SCREENS)
