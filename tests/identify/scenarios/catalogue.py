@@ -100,6 +100,9 @@ COMPLETE: dict[str, Tank] = {
     "pilot": _usual(_PILOT, expected=Expected(seconds=20.0)),
     "pilot in a current": _usual(_PILOT, "current", conditions=_FLOW),
     "two depth sensors": _usual(_PILOT, sensors=(*USUAL, Sensor(HEAVE, "velocity", 0.01))),
+    "two depth sensors of other scales": _usual(
+        _PILOT, "sensor scale of heave", sensors=(*USUAL, Sensor(HEAVE, "velocity", 0.01, scale=1.05))
+    ),
     "slow depth by a late clock": _usual(_PILOT, "dead time", sensors=_with(USUAL, replace(DEPTH, every=4, late=0.15))),
     "sag with voltage": replace(
         _TWO,
@@ -132,11 +135,6 @@ INCOMPLETE: dict[str, Tank] = {
     "tether": replace(_TWO, conditions=_TETHER, expected=_lacking("distance", unusable=("surge",))),
     "tilt": replace(_TWO, conditions=_TILT, more={"F_0_w": 0.3}, expected=_lacking(effects=("load of heave",))),
     "saturation": replace(_TWO, conditions=_SATURATION, expected=_lacking("command")),
-    "scale": replace(
-        _TWO,
-        sensors=(*_with(_TWO.sensors, replace(DEPTH, scale=1.02)), Sensor(HEAVE, "velocity", 0.01)),
-        expected=_lacking("scale"),
-    ),
 }
 """The scenarios whose model lacks something."""
 
