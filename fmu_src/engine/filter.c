@@ -143,11 +143,18 @@ typedef struct {
     real entry[FORCE][N_X];
 } sparse;
 
+/* The last results of functions that are often called with the same numbers in turn. */
+typedef struct {
+    real heading, cosine, sine;
+    real speed[N_AXES], beside[N_AXES]; /* velocities, and the forces by which their drag differs from a quadratic one */
+} recent;
+
 /* Matrices, which are too large for the stack of some threads. */
 typedef struct {
     sparse A, once, over;   /* the derivatives of the rates, and the transitions over one step and over a few */
     real whole[2][N_X][ROW]; /* a transition, and then a product of two */
     real moved[FORCE + BLOCK][ROW];
+    recent last;
 } matrices;
 
 typedef struct {
@@ -202,8 +209,15 @@ static void rotation(const filter *f, const real x[N_X], real R[3][3])
         const real cf = f->cf, sf = f->sf, ct = f->ct, st = f->st;
         real cp = 1.0, sp = 0.0;
         if (f->where->heading >= 0) {
-            cp = cos(x[f->where->heading - FIRST_STATE]);
-            sp = sin(x[f->where->heading - FIRST_STATE]);
+            recent *const last = &f->m->last;
+            const real heading = x[f->where->heading - FIRST_STATE];
+            if (ANY(heading != last->heading)) {
+                last->heading = heading;
+                last->cosine = cos(heading);
+                last->sine = sin(heading);
+            }
+            cp = last->cosine;
+            sp = last->sine;
         }
         R[0][0] = cp * ct;
         R[0][1] = cp * st * sf - sp * cf;
@@ -493,7 +507,11 @@ static void rates(const filter *f, const real x[N_X], model_held *q, real rate[N
     for (int i = 0; i < N_AXES; i++) {
         at[f->where->external[i]] = f->set->at[f->where->external[i]] + x[FORCE + i] + x[SHORT + i];
         if (ANY(f->set->power[0][i] != 0.0) || ANY(f->set->power[1][i] != 0.0)) {
-            at[f->where->external[i]] += beside_quadratic(f, i, x[i]);
+            if (ANY(x[i] != f->m->last.speed[i])) {
+                f->m->last.speed[i] = x[i];
+                f->m->last.beside[i] = beside_quadratic(f, i, x[i]);
+            }
+            at[f->where->external[i]] += f->m->last.beside[i];
         }
     }
     if (tilts) { /* the load along heave is a net weight, which stays vertical */
@@ -601,23 +619,23 @@ static real next_to(const filter *f, real value, const real x[N_X], ptrdiff_t se
 }
 
 /* Move what the sensors with a lag measure over a step, of which the states at its beginning, middle and end are known. */
-static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], double from, double h, real x[N_X])
+static void step_lagged(const filter *f, const real before[N_X], const real middle[N_X], lagging halves[2][MOST_SENSORS],
+                        real x[N_X])
 {
     for (int sensor = 0; sensor < f->log->sensors; sensor++) {
         if (lags(f, sensor)) {
-            lagging part = lagging_over(f, sensor, from, 0.5 * h);
+            const lagging first = halves[0][sensor], second = halves[1][sensor];
             real *const value = &x[LAGGED + sensor];
             const real begin = next_to(f, *value, before, sensor), half = next_to(f, begin, middle, sensor);
-            *value = part.remains * *value + part.begin * begin + part.end * half;
-            part = lagging_over(f, sensor, from + 0.5 * h, 0.5 * h);
-            *value = flushed(part.remains * *value + part.begin * half + part.end * next_to(f, half, x, sensor));
+            *value = first.remains * *value + first.begin * begin + first.end * half;
+            *value = flushed(second.remains * *value + second.begin * half + second.end * next_to(f, half, x, sensor));
         }
     }
 }
 
 /* Take one Runge-Kutta step, and compute the states in its middle. */
-static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double from, double h, const real remains[N_SLOW],
-                      real middle[N_X])
+static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], double h, const real remains[N_SLOW],
+                      lagging halves[2][MOST_SENSORS], real middle[N_X])
 {
     real k[4][N_STATES], y[N_X], before[N_X];
     model_held q;
@@ -640,7 +658,7 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
     for (int i = 0; i < N_SLOW; i++) {
         x[FORCE + i] = flushed(x[FORCE + i] * remains[i]);
     }
-    step_lagged(f, before, middle, from, h, x);
+    step_lagged(f, before, middle, halves, x);
     x[LATENESS] = 0.0;
 }
 
@@ -711,7 +729,7 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
     for (int a = 0; a < vehicle; a++) {
         const int i = f->listed[a];
         real row[N_X];
-        memset(row, 0, sizeof row);
+        memset(row, 0, (size_t)f->count * sizeof row[0]);
         for (int k = 0; k < A->count[i]; k++) {
             const int b = A->column[i][k];
             const real entry = h * A->entry[i][k];
@@ -728,18 +746,16 @@ static void transition(const filter *f, const sparse *A, double h, sparse *phi)
     }
 }
 
-/* Compute the rows of the sensors with a lag, which follow from the rows of the vehicle, and how much of the value at the end of the
- * step each of them takes. */
-static void transition_lagged(const filter *f, const real middle[N_X], double from, double h, const real remains[N_SLOW],
-                              sparse *phi, lagging part[MOST_SENSORS], real slope[MOST_SENSORS][N_X])
+/* Compute the rows of the sensors with a lag, which follow from the rows of the vehicle. */
+static void transition_lagged(const filter *f, const real middle[N_X], const lagging part[MOST_SENSORS],
+                              const real remains[N_SLOW], sparse *phi, real slope[MOST_SENSORS][N_X])
 {
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     for (int a = vehicle; a < moving; a++) {
         const int sensor = f->listed[a] - LAGGED;
         real *const H = slope[sensor], row[N_X];
-        part[sensor] = lagging_over(f, sensor, from, h);
         gradient(f, middle, sensor, H);
-        memset(row, 0, sizeof row);
+        memset(row, 0, (size_t)f->count * sizeof row[0]);
         row[a] = part[sensor].remains;
         for (int c = 0; c < f->count; c++) {
             if (ALL(H[c] == 0.0)) {
@@ -782,9 +798,9 @@ static const sparse *transition_over(const filter *f, int steps, real remains[N_
     matrices *const m = f->m;
     real(*from)[ROW] = m->whole[0], (*to)[ROW] = m->whole[1], once[N_SLOW];
     memcpy(once, remains, sizeof once);
-    for (int a = 0; a < columns && steps > 1; a++) {
-        memset(from[a], 0, sizeof from[a]);
-        for (int k = 0; a < moving && k < m->once.count[a]; k++) {
+    for (int a = 0; a < moving && steps > 1; a++) { /* the rows below have a diagonal alone */
+        memset(from[a], 0, (size_t)f->count * sizeof from[a][0]);
+        for (int k = 0; k < m->once.count[a]; k++) {
             from[a][m->once.column[a][k]] = m->once.entry[a][k];
         }
     }
@@ -820,7 +836,7 @@ static void step_delays(const filter *f, const sparse *phi, const real late[FORC
     const int moving = count_before(f, FORCE);
     for (int k = 0; k < d->count; k++) {
         real before[FORCE];
-        memcpy(before, d->late[k], sizeof before);
+        memcpy(before, d->late[k], (size_t)moving * sizeof before[0]);
         for (int a = 0; a < moving; a++) {
             real sum = d->newest == (double)k ? late[f->listed[a]] : 0.0;
             for (int c = 0; c < phi->count[a] && phi->column[a][c] < moving; c++) {
@@ -925,7 +941,7 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
     const int vehicle = count_before(f, LAGGED), moving = count_before(f, FORCE);
     ptrdiff_t row = f->row;
     real reset = f->reset, once[N_SLOW];
-    lagging part[MOST_SENSORS];
+    lagging part[MOST_SENSORS], halves[2][MOST_SENSORS];
     real slope[MOST_SENSORS][N_X];
     matrices *const m = f->m;
     delays d;
@@ -939,17 +955,24 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
         while (row + 1 < f->log->rows && ALL(ends(f, row + 1) <= begin)) {
             row++;
         }
+        for (int a = vehicle; a < moving && (piece == 0 || f->log->averaged); a++) {
+            const int sensor = f->listed[a] - LAGGED;
+            part[sensor] = lagging_over(f, sensor, begin, h);
+            halves[0][sensor] = lagging_over(f, sensor, begin, 0.5 * h);
+            halves[1][sensor] = lagging_over(f, sensor, begin + 0.5 * h, 0.5 * h);
+        }
         set_tilt(f, 0.5 * (begin + end));
         mean_thrust(f, row, begin, end, held);
-        step_mean(f, b->x, held, begin, h, once, middle);
+        step_mean(f, b->x, held, h, once, halves, middle);
         if (!has_covariance) {
             continue;
         }
         if (piece % together == 0) {
             slopes(f, middle, held, &m->A);
             transition(f, &m->A, h, &m->once);
-            transition_lagged(f, middle, begin, h, once, &m->once, part, slope);
-            memset(&d, 0, sizeof d);
+            transition_lagged(f, middle, part, once, &m->once, slope);
+            memset(d.late[0], 0, sizeof d.late[0]);
+            d.newest = 0.0;
             d.count = 1;
         }
         memset(late, 0, sizeof late);
@@ -959,7 +982,9 @@ static void advance(filter *f, belief *b, double from, double to, int pieces, bo
             if (f->log->anew[j] != 0 && ANY(begins_anew)) {
                 reset = begins_anew ? (double)j : reset;
                 d.newest = begins_anew ? (double)(1 + piece % together) : d.newest;
-                d.count = 2 + piece % together;
+                while (d.count < 2 + piece % together) {
+                    memset(d.late[d.count++], 0, sizeof d.late[0]);
+                }
             }
             if (ANY(growth > 0.0)) {
                 add_growth(f, middle, j, growth, late);
@@ -1005,8 +1030,9 @@ static real project(const filter *f, const belief *b, ptrdiff_t sensor, real PH[
 {
     const real white = f->set->white[sensor];
     real H[N_X], variance = white * white;
-    memset(H, 0, sizeof H);
-    if (!lags(f, sensor)) {
+    if (lags(f, sensor)) {
+        memset(H, 0, (size_t)f->count * sizeof H[0]);
+    } else {
         gradient(f, b->x, sensor, H);
     }
     for (int c = 0; c < f->count; c++) {
@@ -1014,7 +1040,7 @@ static real project(const filter *f, const belief *b, ptrdiff_t sensor, real PH[
             H[c] = 1.0;
         }
     }
-    memset(PH, 0, N_X * sizeof PH[0]);
+    memset(PH, 0, (size_t)f->count * sizeof PH[0]);
     for (int c = 0; c < f->count; c++) {
         if (ANY(H[c] != 0.0)) {
             for (int a = 0; a < f->count; a++) {
@@ -1031,7 +1057,8 @@ static real project(const filter *f, const belief *b, ptrdiff_t sensor, real PH[
 /* Correct the states by an innovation. The quaternion keeps the length 1. */
 static void correct(const filter *f, belief *b, const real gain[N_X], real off)
 {
-    for (int i = 0; i < N_X; i++) {
+    for (int a = 0; a < f->count; a++) {
+        const int i = f->listed[a];
         b->x[i] += f->set->unit[i] * gain[i] * off;
     }
     if (f->where->quaternion >= 0) {
@@ -1059,7 +1086,6 @@ static void take(filter *f, belief *b, ptrdiff_t k, int repeats, real *off, real
     const mask is_beside = size > OUTLYING;
     const real weight = is_beside & ~f->beside[sensor] ? OUTLYING / size : 1.0;
     f->beside[sensor] = is_beside;
-    memset(gain, 0, N_X * sizeof gain[0]);
     for (int a = 0; a < f->count; a++) {
         const real share = weight * PH[a] / *variance;
         gain[f->listed[a]] = share / f->set->unit[f->listed[a]];
@@ -1185,6 +1211,8 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
     f->at = at;
     f->m = (matrices *)(memory + 1);
     f->thrust = (model_held *)(f->m + 1);
+    memset(&f->m->last, 0, sizeof f->m->last);
+    f->m->last.cosine = 1.0;
     begin_run(f, sets);
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
     double restart = log->time[0] + how->begin, last = log->time[0];
@@ -1210,8 +1238,8 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
             restart += how->span * (floor((log->time[k] - restart) / how->span) + 1.0);
         }
         for (int i = 0; i < LANES && how->repeats == 2; i++) {
-            for (int n = 0; n < N_X; n++) {
-                LANE(gain[n], i) = results[i].gain[k * N_X + n];
+            for (int a = 0; a < f->count; a++) {
+                LANE(gain[f->listed[a]], i) = results[i].gain[k * N_X + f->listed[a]];
             }
         }
         take(f, &f->now, k, how->repeats, &off, &variance, gain);
@@ -1234,8 +1262,8 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
             if (has_covariance) {
                 to->variance[k] = LANE(variance, i);
             }
-            for (int n = 0; n < N_X && has_covariance && to->gain; n++) {
-                to->gain[k * N_X + n] = LANE(gain[n], i);
+            for (int a = 0; a < f->count && has_covariance && to->gain; a++) {
+                to->gain[k * N_X + f->listed[a]] = LANE(gain[f->listed[a]], i);
             }
             for (int a = 0; a < f->count && to->states; a++) {
                 to->states[k * N_X + f->listed[a]] = LANE(f->now.x[f->listed[a]], i);
