@@ -1,8 +1,8 @@
 """Write the experiments, the expected results and the evidence in an FMU, in the form of the standard FMI-LS-REF.
 
 The experiments are a step of each axis from rest to its largest command, with and without the vehicle's tuning, and a
-manoeuvre of all axes, which begins tilted if the vehicle rolls or pitches. The expected results are computed in plain
-Python, and not with the C code that they prove.
+manoeuvre of all axes, which begins tilted if the vehicle rolls or pitches. A vehicle with a surface begins deep under
+water. The expected results are computed in plain Python, and not with the C code that they prove.
 
 If coefficients have confidence intervals, further experiments repeat the manoeuvre at the ends of these intervals. They
 have no expected results, because they are there to show how uncertain the motion is.
@@ -45,6 +45,8 @@ _PHASES: tuple[tuple[Mapping[Axis, float], float], ...] = (
 """The phases of the manoeuvre: shares of the largest command by axis, and of loads and current."""
 _ATTITUDE = {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
 """The Euler angles at the start of the manoeuvre."""
+_DEEP = {"z": 100.0}
+"""The depth at the start, m, from which no experiment reaches a surface."""
 
 Values = Mapping[str, float]
 _Row = tuple[float, Values]
@@ -85,9 +87,10 @@ class _Experiment:
     def references(self) -> list[_Row]:
         """Return the states and the Euler angles from the start to the end."""
         vehicle, memory = self.vehicle, self.vehicle.memory()
-        state = vehicle.layout.at_rest
+        _, given = self.parameters or ("", {})
+        state = {name: given.get(name, at_rest) for name, at_rest in vehicle.layout.at_rest.items()}
         if vehicle.layout.has_attitude:
-            angles = {**dict.fromkeys(vehicle.layout.initial, 0.0), **(self.parameters[1] if self.parameters else {})}
+            angles = {**dict.fromkeys(vehicle.layout.initial, 0.0), **given}
             attitude = compiled(start_formulas())(angles)
             state = state | {name: attitude[name] for name in QUATERNION} | {"psi": angles["psi_0"]}
         before = 0.0
@@ -102,7 +105,7 @@ class _Experiment:
 
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     """Return the files of the standard's folder by their path in the FMU. Raises FileError."""
-    proofs = [*_steps(vehicle), _manoeuvre(vehicle)]
+    proofs = [*map(_deep, (*_steps(vehicle), _manoeuvre(vehicle)))]
     variants = _at_ends_of_intervals(vehicle, proofs[-1])
     sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
     text = {
@@ -150,8 +153,17 @@ _SETS = {
     "tuned": "alpha and beta as identified",
     "untuned": "alpha = beta = 1: without tuning",
     "attitude": "Euler angles at the start",
+    "deep": "Depth at the start",
 }
 """The parameter sets of the experiments with expected results, in words."""
+
+
+def _deep(experiment: _Experiment) -> _Experiment:
+    """Let an experiment of a vehicle with a surface begin deep under water."""
+    if not experiment.vehicle.layout.surface:
+        return experiment
+    name, given = experiment.parameters or ("deep", {})
+    return replace(experiment, parameters=(name, {**given, **_DEEP}))
 
 
 def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: _Experiment) -> list[_Experiment]:

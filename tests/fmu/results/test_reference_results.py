@@ -164,7 +164,7 @@ def test_the_manoeuvre_drives_all_axes_ahead_and_back_with_loads_and_a_current(n
     times = [row["time"] for row in _rows(files, "manoeuvre_expected.csv")]
     assert times == pytest.approx([0.5 * n * length for n in range(9)])
     if name == "tilted":
-        assert _parameters(files, "attitude.ssv") == {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0}
+        assert _parameters(files, "attitude.ssv") == {"phi_0": 0.6, "theta_0": -0.4, "psi_0": 1.0, "z": 100.0}
         start, *_ = _rows(files, "manoeuvre_expected.csv")
         assert (start["phi"], start["theta"], start["psi"]) == pytest.approx((0.6, -0.4, 1.0))
         of_roll = _experiments(files)["roll_100"]
@@ -176,7 +176,9 @@ def _check(rov: Vehicle, files: Mapping[str, bytes], name: str) -> None:
     """Compare every expected value with a computation in 50 digits."""
     experiment = _experiments(files)[name]
     stimuli, expected = (_rows(files, experiment.find(part).get("source")) for part in ("Stimuli", "References"))
-    state: Mapping[str, Any] = at_rest(rov)
+    source = getattr(experiment.find("Parameters"), "attrib", {}).get("source")
+    given = _parameters(files, source) if source else {}
+    state: Mapping[str, Any] = {key: given.get(key, x) for key, x in at_rest(rov).items()}
     largest = {key: max(0.01, *(abs(row[key]) for row in expected)) for key in expected[0]}
     t = 0.0
     for row in expected[1:]:

@@ -55,7 +55,7 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.folders import HEAD, folder_of
-from tests.vehicles import VIDEORAY
+from tests.vehicles import VIDEORAY, without_surface
 from verification.references.autopilot.flights import flown
 
 SECONDS, INTERVAL = 45.0, 0.1
@@ -135,7 +135,7 @@ def with_rotors(vehicle: Vehicle, T: float) -> VehicleModel:
 
 def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     """A log of steps of all thrusters, each at its own levels, with the noise of sensors."""
-    whole = rov_fmu.load(vehicle)
+    whole = without_surface(rov_fmu.load(vehicle))
     names = [t.name for t in whole.layout.thrusters]
     n = round(SECONDS / INTERVAL) + 1
     time = INTERVAL * np.arange(n)

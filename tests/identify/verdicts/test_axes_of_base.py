@@ -159,7 +159,7 @@ def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> Non
 def test_it_is_told_why_a_log_identifies_no_axis(tmp_path: Path) -> None:
     """Nobody steers, and the heading is logged; nothing shows surge and sway."""
     rov, time = load("bluerov2"), np.arange(0.0, 20.0, 0.2)
-    motion = rov.simulate(time, {"heave": np.repeat([0.3, -0.2, 0.4, -0.4, 0.0], 20)})
+    motion = rov.simulate(time, {"heave": np.repeat([0.3, -0.2, 0.4, -0.4, 0.0], 20)}, start={"z": 5.0})
     noise = 0.003 * np.random.default_rng(0).standard_normal((2, len(time)))
     columns = {f"{name} [1]": values for name, values in motion.commands.items()}
     columns |= {SENSORS[HEAVE]: motion["z"] + noise[0], SENSORS[YAW]: noise[1]}
