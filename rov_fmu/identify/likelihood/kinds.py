@@ -245,6 +245,7 @@ _COLOURED = Deviation(
 _MOST_SCALE = 0.5
 """The largest size of ln of a sensor's scale. What is beyond has another unit, such as knots or feet."""
 _WITHOUT_SENSORS = ". The vehicle file does not have it, because it describes the vehicle without its sensors"
+_POSITION_COUNTS = ". The fit takes the position for the right one of the two, and the vehicle file does not have it"
 _WITHOUT_PLACES = ". The vehicle file does not have it, because it tells the motion of the origin"
 
 KINDS = {
@@ -415,8 +416,8 @@ KINDS = {
     ),
     SENSOR_SCALE: Kind(
         Deviation("sensor_scale", 0.05, "ln of a velocity's scale beside a position", "sound differs by 3 % in water"),
-        "measured velocity relative to that by the position",
-        _WITHOUT_SENSORS,
+        "scale of the measured velocity beside the position",
+        _POSITION_COUNTS,
         is_ratio=True,
         finest=0.005,
         low=-_MOST_SCALE,
@@ -426,7 +427,7 @@ KINDS = {
     SENSOR_OFFSET: Kind(
         Deviation("sensor_offset", 0.05, "a velocity's offset beside a position, m/s or rad/s", "zeros drift by cm/s"),
         "offset of the measured",
-        _WITHOUT_SENSORS,
+        _POSITION_COUNTS,
         finest=0.005,
         null=0.0,
         differs_by_log=True,
