@@ -182,7 +182,7 @@ def fit_all(
     file = _less_bent(full, frozenset(), least, most, work) if of_measured else (told, least)
     misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
-    unseen = unseen_errors(told, least.z, before, misfits, posterior.covariance)
+    unseen = unseen_errors(told, least.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)
     # Time constants of tables contain the lag, so that tables alone need none.
     of_file = without_weak_effects(*file, posterior.lasting if logs else ())

@@ -71,7 +71,8 @@ class Posterior:
         """
         wider = self._with_less_information(ratios)
         is_free = np.diag(self.covariance) > 0.0
-        return replace(wider, covariance=wider.covariance + unseen * np.outer(is_free, is_free))
+        unseen = unseen * np.outer(is_free, is_free)
+        return replace(wider, covariance=wider.covariance + unseen) if unseen.any() else wider
 
     def _with_less_information(self, ratios: Mapping[Axis, float]) -> "Posterior":
         layout, worst = self.table.layout, max(ratios.values(), default=0.0)

@@ -33,7 +33,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
 from rov_fmu.identify.likelihood.kinds import INERTIA, SHORTEST_LAG, WHITE, WIDTH
 from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, with_samples
 from rov_fmu.identify.likelihood.parameters import Table
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, least_from, minimise, scaled, start_of, total
 from rov_fmu.identify.result import ALARM, CONSTANTS, USUAL, least_error, moves
@@ -162,9 +162,7 @@ def windows(objective: Objective, z: Array) -> dict[str, float]:
     }
 
 
-def unseen_errors(
-    objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit], covariance: Array
-) -> Array:
+def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], misfits: Mapping[Axis, Misfit]) -> Array:
     """Return the covariance of the parameters by errors that do not become smaller with the number of samples.
 
     What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
@@ -173,9 +171,11 @@ def unseen_errors(
 
     Where commands change between the rows of a log, they act a small part of their window earlier or later along each
     axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
-    had another inertia, and a fast axis the more. What a command does between two rows also acts like a lag: where all
-    logs have such commands, the lag of the thrusters has a standard error of the shortest lag that rows show. The other
-    times change with it as the data tell by their `covariance`.
+    had another inertia, and a fast axis the more.
+
+    A lag of the thrusters and one that all sensors share change the motion alike, and only what acts between them tells
+    one from the other. Where all logs have such commands, this is a force that makes up for what their rows lack. So
+    the lag has a standard error of the shortest one that rows show, and its interval contains what all sensors share.
 
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
@@ -192,11 +192,10 @@ def unseen_errors(
         if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (CONSTANTS["late"].value * max(widths) / time) ** 2)
     shortest = min((one.interval if one.lost else 0.0 for one in objective.logs), default=0.0) * SHORTEST_LAG
-    are_times = np.array([bool(p.of_kind.time) for p in parameters])
-    for n, p in enumerate(parameters):
-        if p.of_kind.is_in_all and covariance[n, n] > 0.0:
-            along = are_times * covariance[n] / covariance[n, n]
-            found += shortest**2 * np.outer(along, along)
+    lags = np.array([p.of_kind.is_lag * (-1.0 if p.part else 1.0) for p in parameters])
+    if shortest and lags.max() > 0.0:
+        shared = min(z[lags < 0.0], default=0.0)
+        found += (shortest**2 + (shared / QUANTILE) ** 2) * np.outer(lags, lags)
     return found
 
 

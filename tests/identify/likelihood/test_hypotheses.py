@@ -31,7 +31,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
 )
 from rov_fmu.identify.likelihood.kinds import KINDS, TURN
 from rov_fmu.identify.likelihood.objective import Data, Objective
-from rov_fmu.identify.likelihood.posterior import Posterior
+from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
     Misfit,
@@ -478,7 +478,7 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
     objective = model
     axes = [form.axis for form in model.table.known.layout.axes]
     z = np.array([p.mean for p in objective.table.parameters])
-    found = unseen_errors(objective, z, {}, dict.fromkeys(axes, Misfit(1.0, lack)), np.eye(len(z)))
+    found = unseen_errors(objective, z, {}, dict.fromkeys(axes, Misfit(1.0, lack)))
     exact = Posterior(objective.table, z, np.diag(np.full(len(z), 1e-8)))
     for axis in axes:
         if not model.table.known.coefficients[axis.coefficient("F_0")]:  # a load is no part of the thrust
@@ -491,22 +491,24 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
             assert np.sqrt(np.diag(covariance)) == pytest.approx([error, error], rel=0.01)
 
 
-def test_a_lag_is_as_uncertain_as_what_commands_do_between_rows(model: Objective) -> None:
-    """The sum of the lags of thrusters and sensors stays. A log without such commands tells the lag."""
+@pytest.mark.parametrize("shared", [0.0, 0.06])
+def test_a_lag_is_as_uncertain_as_what_commands_do_between_rows(shared: float, model: Objective) -> None:
+    """Its interval contains what all sensors share. A log without such commands tells it."""
     nothing, (log,) = dict.fromkeys((form.axis for form in model.table.known.layout.axes), Misfit()), model.logs
     lost, other = replace(log, lost={"yaw": 0.1}), replace(log, log=replace(log.log, file="other.csv"))
-    for logs, error in (([lost], log.interval / (2.0 * np.pi)), ([lost, other], 0.0)):
+    error = np.hypot(log.interval / (2.0 * np.pi), shared / QUANTILE)
+    for logs, expected in (([lost], error), ([lost, other], 0.0)):
         objective = with_logs(model, logs)
-        z = np.array([p.mean for p in objective.table.parameters])
-        of = {p.kind: n for n, p in enumerate(objective.table.parameters)}
-        lags, inertia = [of["lag"], of["sensor lag"]], of["inertia"]
-        covariance = np.eye(len(z))
-        covariance[lags, lags[::-1]] = -1.0
-        covariance[lags[0], inertia] = covariance[inertia, lags[0]] = 0.5
-        found = unseen_errors(objective, z, {}, nothing, covariance)
-        assert found[lags, lags] ** 0.5 == pytest.approx([error, error])
-        assert found[np.ix_(lags, lags)].sum() == pytest.approx(0.0, abs=1e-12)
-        assert found[lags[0], inertia] == 0.0
+        parameters = objective.table.parameters
+        sensors = [n for n, p in enumerate(parameters) if p.kind == "sensor lag"]
+        lag = objective.table.index("lag")
+        z = np.array([p.mean for p in parameters])
+        z[sensors] = shared + 0.1 * np.arange(len(sensors))
+        found = unseen_errors(objective, z, {}, nothing)
+        for n in sensors:
+            both = found[np.ix_([lag, n], [lag, n])]
+            assert np.diag(both) ** 0.5 == pytest.approx([expected, expected])
+            assert both.sum() == pytest.approx(0.0, abs=1e-12), "the sum is told"
 
 
 def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_scale_of_sensors(
@@ -523,7 +525,7 @@ def test_errors_that_no_log_shows_are_those_of_the_time_of_commands_and_of_the_s
     for width, window in ((0.05, 0.2), (0.4, 0.4), (0.6, 1.0)):  # beyond a half, commands change at any time
         z[index] = width
         assert windows(objective, z) == {file: pytest.approx(window)}
-        found = unseen_errors(objective, z, {}, nothing, np.eye(len(z)))
+        found = unseen_errors(objective, z, {}, nothing)
         assert np.array_equal(found, found.T)
         for axis in vehicle.layout.bare_axes:
             own = {p.kind: n for n, p in enumerate(table.parameters) if p.of == axis.name}
