@@ -154,8 +154,8 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
 
 
 def windows(objective: Objective, z: Array) -> dict[str, float]:
-    """Return the part of the time between two rows in which a command may change, of each log that loses commands."""
-    found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.lost}
+    """Return the part of the time between two rows in which a command may change, of each log that tells no exact times."""
+    found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.has_windows}
     return {
         file: 1.0 if width > MOST_OF_ROW else max(float(width), CONSTANTS["narrowest"].value)
         for file, width in found.items()
@@ -169,9 +169,9 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     and the inertia m/s. It acts on times as a scale of the inertia alone. It is as large in unseen data, so it has the
     size of the errors over 10 s.
 
-    Where commands change between the rows of a log, they act a small part of their window earlier or later along each
-    axis, because a stick and a controller change them at other times. The axis then answers earlier or later, as if it
-    had another inertia, and a fast axis the more.
+    Where commands change between the rows of a log, or rows are means, they act a small part of their window earlier or
+    later along each axis, because a stick and a controller change them at other times. The axis then answers earlier or
+    later, as if it had another inertia, and a fast axis the more.
 
     A lag of the thrusters and one that all sensors share change the motion alike, and only what acts between them tells
     one from the other. Where all logs have such commands, this is a force that makes up for what their rows lack. So
@@ -180,7 +180,9 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     `before` has the windows of the fit without hypotheses, because straight lines between rows do not show them.
     """
     now, parameters = windows(objective, z), objective.table.parameters
-    widths = [one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.lost]
+    widths = [
+        one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.has_windows
+    ]
     found = np.zeros((len(z), len(z)))
     vehicle, shapes = objective.table.model(z)
     for axis, misfit in misfits.items():

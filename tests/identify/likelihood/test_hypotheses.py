@@ -235,7 +235,7 @@ def with_jump(sampled: SampledLog) -> SampledLog:
 
 
 def one_of_each(model: Objective) -> Starts:
-    """One hypothesis of each kind, for a model whose log has momentary commands, far rows and a velocity that jumps."""
+    """One hypothesis of each kind about a model whose log has momentary commands in far rows and a velocity jump."""
     told, found = model.logs[0].record.told, dict[Suspect, Start]()
     for kind, hypothesis in HYPOTHESES.items():
         of = next(hypothesis.suspects(model.table.known, model.logs))
