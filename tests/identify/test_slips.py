@@ -19,6 +19,8 @@ from rov_fmu.identify.result import ALARM
 from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.tank.catalogue import QUANTITIES
+from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN
@@ -243,6 +245,15 @@ def mirrored(folder: Path, *columns: str) -> Path:
             row[index] = str(-float(row[index])) if row[index] else ""
     file.write_text("\n".join(",".join(row) for row in [header, *rows]), encoding="utf-8")
     return file
+
+
+@pytest.mark.parametrize(("yaw", "is_tried"), [({-1.0: 1.0}, True), ({}, True), ({1.0: 1.0}, False)])
+def test_a_frame_is_tried_only_where_no_channel_agrees_as_it_stands(yaw: dict[float, float], is_tried: bool) -> None:
+    """The depth has the other sign, as where both vertical thrusters are reversed. The fit of a frame takes long."""
+    ratios = {"depth": {-1.0: 1.0}, "heading": {}, "yaw velocity": yaw}
+    channels = {name: Channel(QUANTITIES[name], Source("log"), np.zeros(0), np.zeros(0)) for name in ratios}
+    some = [module._Match("dive.csv", channels[name], 10, own) for name, own in ratios.items()]
+    assert [*module._frames(some)] == [frozenset((one, -1.0) for one in some)] * (2 * is_tried)
 
 
 @pytest.mark.long

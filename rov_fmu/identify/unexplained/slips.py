@@ -38,7 +38,7 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.search import structure, worst
-from rov_fmu.identify.likelihood.solve import Minimum, minimise, start_of
+from rov_fmu.identify.likelihood.solve import ENOUGH, MOST_STEPS, QUICK, Minimum, minimise, start_of
 from rov_fmu.identify.result import Slip
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
@@ -47,8 +47,9 @@ from rov_fmu.tank.log import Channel
 _CERTAIN, _WEIGHED = 2.0, 0.05
 """An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
 and the water inside change from dive to dive."""
-_CLEAR, _NEXT = 9.0, 6.0
-"""The evidence from which a slip is told, and how much better it must be for other explanations not to be told."""
+_CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
+"""The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
+which difference of J quick fits go on to their end."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -121,22 +122,29 @@ def slips(
         return (), inf
     fits = dict[Scaling, tuple[Objective, Minimum]]()
 
-    def least(scaling: Scaling, start: Array | None = None) -> float:
+    def least(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
-        quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
         try:
-            end = minimise(quick, start_of(quick) if start is None else start, last=False)
+            if is_exact := scaling in fits:
+                quick, start = fits[scaling][0], fits[scaling][1].z
+            else:
+                quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
+                start = start_of(quick) if start is None else start
+            end = minimise(quick, start, most=most, enough=ENOUGH if is_exact else QUICK, last=False)
         except DivergedError:
             return inf
         fits[scaling] = quick, end
         return end.value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling) + unlikely
 
-    as_it_is, J = least(frozenset(), best), dict[Scaling, float]()
+    as_it_is, J = least(frozenset(), best, 1), dict[Scaling, float]()
     while untried:  # The best explanation may need fewer channels than it has.
         J |= {one: least(one) for one in untried}
+        J |= {one: least(one) for one in untried if J[one] < min(J.values()) + _CLOSE}
         first = min(J, key=lambda one: J[one])
         fewer = set[Scaling]() if first in frames else {first - {member} for member in first}
         untried = fewer - J.keys() - {frozenset()}
+    if as_it_is < min(J.values()) + _CLOSE:
+        as_it_is = least(frozenset())
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
     for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
         for match, scale in scaling:
@@ -221,13 +229,13 @@ def _scalings(likely: Mapping[_Match, Sequence[float]]) -> Iterator[Scaling]:
 def _frames(compared: Sequence[_Match]) -> Iterator[Scaling]:
     """Yield the channels of each source, and of each file, whose signs its frame decides.
 
-    At least one of them is suspected of the other sign.
+    At least one of them is suspected of the other sign, and none moves like the vehicle of the priors as it stands.
     """
     turned = [m for m in compared if m.channel.quantity.axis in _MIRRORED]
     sources = grouped(((m.file, source), m) for m in turned for source in (m.channel.source, ""))
     for some in sources.values():
         has_two = len({m.channel.quantity.axis for m in some}) > 1
-        if has_two and any(-1.0 in m.scales for m in some):
+        if has_two and any(-1.0 in m.scales for m in some) and not any(1.0 in m.ratios for m in some):
             yield frozenset((m, -1.0) for m in some)
 
 
