@@ -198,6 +198,12 @@ def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
         assert all((one.evidence > KEPT, one.kept) == (True, is_told) for one in some)
 
 
+def test_a_lag_at_its_least_has_its_whole_error(fit: Fit) -> None:
+    shortest = found(fit, lag=kinds.LEAST_LAG).posterior
+    _, covariance, _ = shortest.numbers(lambda z: np.array([shortest.table.coefficients(z)["T_top"]]))
+    assert covariance == pytest.approx(np.array([[ERROR**2]]))
+
+
 @pytest.mark.parametrize(("lag", "offset"), [(0.2, -0.05), (0.02, -0.03)])
 def test_a_delay_that_the_vehicle_does_not_keep_is_the_loggers(lag: float, offset: float, fit: Fit) -> None:
     heave, yaw = loggers_of(found(fit, logging_offset=-0.05, logging_width=0.6, lag=lag))

@@ -234,8 +234,10 @@ class Table:
         return self.full.get(axis.name, 1.0) * self.get(z, INERTIA, axis.name, default=1.0)
 
     def model(self, z: Array) -> tuple[Vehicle, Shapes]:
-        """Return the vehicle, and the deviations of the shapes of its curves."""
+        """Return the vehicle, and the deviations of the shapes of its curves. No lag is shorter than the least one."""
         coefficients = self.coefficients(z)
+        lags = (curve.coefficient("T") for curve in self.layout.curves if "T" in curve.keys)
+        coefficients |= {name: np.maximum(coefficients[name], LEAST_LAG) for name in lags}
         return Vehicle(self.layout, coefficients), self._shapes(z, coefficients)
 
     def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
