@@ -501,7 +501,7 @@ def test_a_lag_is_as_uncertain_as_what_commands_do_between_rows(shared: float, m
         objective = with_logs(model, logs)
         parameters = objective.table.parameters
         sensors = [n for n, p in enumerate(parameters) if p.kind == "sensor lag"]
-        lag = objective.table.index("lag")
+        (lag,) = (n for n, p in enumerate(parameters) if p.kind == "lag")
         z = np.array([p.mean for p in parameters])
         z[sensors] = shared + 0.1 * np.arange(len(sensors))
         found = unseen_errors(objective, z, {}, nothing)
