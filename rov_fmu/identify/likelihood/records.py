@@ -190,9 +190,9 @@ class SampledLog:
     def with_means(self) -> "SampledLog":
         """Return the log if its rows are means over the interval before them.
 
-        A command between those of the rows before and after changed once, at a time that its mean tells, if it held
-        otherwise. If neither neighbour is also between others, this is taken to be so. An angle whose mean may contain
-        a jump by a full turn is left out.
+        A command between those of the rows before and after changed once, at a time that its mean tells, unless one of
+        these is also between others: then it changed gradually. An angle whose mean may contain a jump by a full turn
+        is left out.
         """
         commands, names = self.log.commands, [*self.layout.inputs]
         assert commands
@@ -203,7 +203,8 @@ class SampledLog:
             for name, column in zip(names, inputs.T, strict=True)
         ]
         told = np.unique(np.concatenate([time for time, _ in columns]))
-        made: dict[str, Any] = {"told": told, "since": told, "inputs": np.column_stack([held(time, of, told) for time, of in columns])}
+        then = [held(time, values, told) for time, values in columns]
+        made: dict[str, Any] = {"told": told, "since": told, "inputs": np.column_stack(then)}
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
