@@ -199,9 +199,9 @@ class SampledLog:
     def with_means(self) -> "SampledLog":
         """Return the log if its rows are means over the interval before them.
 
-        A command between those of the rows before and after changed once, at a time that its mean tells, if it held
-        otherwise. If neither neighbour is also between others, this is taken to be so. An angle whose mean may contain
-        a jump by a full turn is left out.
+        A command between those of the rows before and after changed once, at a time that its mean tells, unless one of
+        these is also between others: then it changed gradually. An angle whose mean may contain a jump by a full turn
+        is left out.
         """
         commands, names = self.log.commands, [*self.layout.inputs]
         assert commands
@@ -212,7 +212,8 @@ class SampledLog:
             for name, column in zip(names, inputs.T, strict=True)
         ]
         told = np.unique(np.concatenate([time for time, _ in columns]))
-        made = {"told": told, "since": told, "inputs": np.column_stack([held(*column, told) for column in columns])}
+        then = [held(time, values, told) for time, values in columns]
+        made: dict[str, Any] = {"told": told, "since": told, "inputs": np.column_stack(then)}
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
@@ -227,13 +228,13 @@ class SampledLog:
                 before, time = record.time[own[:-1]], record.time[own[1:]]
                 begin[own[1:]] = np.where(time - before > _GAP_OF_ROWS * span, time - span, before)
                 kept[own] = np.isin(record.time[own], m.channel.time)
-            columns = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
+            columns: dict[str, Any] = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
             tilt = record.tilt - np.array([[0.5 * span], [0.0], [0.0]])
-            some = {"start": start, "errors": errors, "averaged": begin[kept], "tilt": tilt}
+            some: dict[str, Any] = {"start": start, "errors": errors, "averaged": begin[kept], "tilt": tilt}
             return replace(record, **columns, **made, **some)
 
-        records = {"record": of_means(self.record), "thinned": of_means(self.thinned)}
-        return replace(self, measured=tuple(measured), **records, lost={}, has_means=True)
+        full, thin = map(of_means, (self.record, self.thinned))
+        return replace(self, measured=tuple(measured), record=full, thinned=thin, lost={}, has_means=True)
 
     def _clear(self, m: SampledChannel) -> SampledChannel:
         """Return a channel without the means of an angle that may contain a jump by a full turn."""
@@ -292,18 +293,15 @@ def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
     time, found = rows.astype(float), values.copy()
     time[at] += span * (values[at] - values[at + 1]) / (values[at - 1] - values[at + 1])
     found[at] = values[at + 1]
-    others = np.flatnonzero(is_between & ~alone)
-    parts = np.arange(_PARTS) / _PARTS
-    later, means = rows[others, None] + span * parts, _means_of_parts(values, others)
-    time, found = (
-        np.concatenate(both)
-        for both in ((np.delete(time, others), later.ravel()), (np.delete(found, others), means.ravel()))
-    )
+    others = is_between & ~alone
+    later = rows[others, None] + span * np.arange(_PARTS) / _PARTS
+    time = np.concatenate([time[~others], later.ravel()])
+    found = np.concatenate([found[~others], _means_of_parts(values, others).ravel()])
     order = np.argsort(time)
     return time[order], found[order]
 
 
-def _means_of_parts(values: Array, at: Array) -> Array:
+def _means_of_parts(values: Array, at: Flags) -> Array:
     """Return the means of equal parts of some intervals in which a command changes, by the means of all intervals.
 
     The value is a parabola in each interval that is monotone (the piecewise parabolic method, Colella and Woodward
@@ -312,7 +310,7 @@ def _means_of_parts(values: Array, at: Array) -> Array:
     far = np.pad(values, 2, mode="edge")
     edges = (7.0 * (far[1:-2] + far[2:-1]) - (far[:-3] + far[3:])) / 12.0
     edges = np.clip(edges, np.minimum(far[1:-2], far[2:-1]), np.maximum(far[1:-2], far[2:-1]))
-    first, last, mean = edges[at], edges[at + 1], values[at]
+    first, last, mean = edges[:-1][at], edges[1:][at], values[at]
     first = np.clip(first, *np.sort([3.0 * mean - 2.0 * last, last], axis=0))
     last = np.clip(last, *np.sort([3.0 * mean - 2.0 * first, first], axis=0))
     bend = 6.0 * mean - 3.0 * (first + last)

@@ -154,7 +154,7 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
 
 
 def windows(objective: Objective, z: Array) -> dict[str, float]:
-    """Return the part of the time between two rows in which a command may change, of each log that tells no exact times."""
+    """Return the part of the time between rows in which a command may change, of each log that does not tell when."""
     found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.has_windows}
     return {
         file: 1.0 if width > MOST_OF_ROW else max(float(width), CONSTANTS["narrowest"].value)

@@ -203,7 +203,8 @@ def test_a_mean_is_that_of_the_motion_with_the_variance_of_its_errors(has_gap: b
     span, step, errors = 0.5, 0.005, {"w": 0.1, "z": 0.02}
     times = np.array([0.0, 1.5 if has_gap else 0.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5])
     rows = record((DEPTH, VELOCITY), [(t, n) for t in times.tolist() for n in (0, 1)], errors=errors)
-    means = replace(rows, averaged=np.where(rows.time > 0.0, rows.time - span, 0.0))
+    since = np.where(rows.time > 0.0, rows.time - span, 0.0)
+    means = replace(rows, averaged=since)
     known = parameters(LAGGING, 2, white=WHITE)
 
     def shown(log: Record, **start: float) -> Array:
@@ -216,17 +217,8 @@ def test_a_mean_is_that_of_the_motion_with_the_variance_of_its_errors(has_gap: b
     assert shown(means)[0] == pytest.approx(fine[0]), "the first sample has no interval"
 
     slope = [(shown(means, **{name: START[name] + 1e-4}) - shown(means)) / 1e-4 for name in errors]
-    first = (
-        Filter(LAGGING)
-        .run(
-            replace(
-                means, time=means.time[:4], value=means.value[:4], sensor=means.sensor[:4], averaged=means.averaged[:4]
-            ),
-            known,
-            begin=0.0,
-        )
-        .variances
-    )
+    two = replace(means, time=means.time[:4], value=means.value[:4], sensor=means.sensor[:4], averaged=since[:4])
+    first = Filter(LAGGING).run(two, known, begin=0.0).variances
     of_errors = sum((one[1] * error) ** 2 for one, error in zip(slope, errors.values(), strict=True))
     assert first[2:] == pytest.approx(of_errors + np.square(WHITE), rel=0.02)
 

@@ -89,9 +89,9 @@ def of_rows(kind: str, rate: float, values: Array) -> Array:
     """The rows of a table: values of a moment, the last values that sensors sent, every 0.35 s, or means."""
     count = round(RAW / rate)
     if kind == "means":
-        return values.reshape(-1, count, *values.shape[1:]).mean(axis=1)
+        return np.asarray(values.reshape(-1, count, *values.shape[1:]).mean(axis=1))
     at = np.arange(0, len(values), count)
-    return values[at if kind == "moments" else at // 7 * 7]
+    return np.asarray(values[at if kind == "moments" else at // 7 * 7])
 
 
 def table(folder: Path, kind: str, rate: float, seed: int = 0) -> SampledLog:
