@@ -166,12 +166,13 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     assert asked(tmp_path, slipped(log, slip), rov=KNOWN) == {(log.file, quantity): QUESTIONS[kind]}
 
 
-def test_no_structure_is_sought_where_a_slip_explains_the_errors(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (log, *_), slip = recordings(HEAVE), SLIPS["heave up"]
+def test_a_fit_is_not_refined_where_a_slip_explains_the_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (log, *_), slip, shown = recordings(HEAVE), SLIPS["heave up"], list[str]()
     monkeypatch.setattr(StructureSearch, "_round", lambda _: pytest.fail("a structure is sought"))
-    found = identify(load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN, FORCES)))
+    tests = load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN, FORCES))
+    found = identify(tests, lambda text, _: shown.append(text))
+    assert shown
+    assert not any("exact derivatives" in text for text in shown)
     assert [one.words for one in found.slips] == [QUESTIONS["heave up"]]
     assert [one.verdict.word for one in found.axes] == ["do not use"]
 

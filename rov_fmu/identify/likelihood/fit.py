@@ -163,9 +163,11 @@ def fit_all(
         found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
         if bends(found.value, found.information):
             full, near = other, minimise(other, found.z, last=False)
-    # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
-    work.steps("exact derivatives")(0)
-    best = minimise(full, scaled(full, near.z), most=0)
+    best = near
+    if not is_wrong:
+        # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
+        work.steps("exact derivatives")(0)
+        best = minimise(full, scaled(full, near.z), most=0)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = [
