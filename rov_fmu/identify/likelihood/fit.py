@@ -185,7 +185,7 @@ def fit_all(
     misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
     unseen = unseen_errors(told, least.z, before, misfits)
-    of_file = without_weak_effects(*file)
+    of_file = without_weak_effects(*file, refines=not is_wrong)
     return Fit(
         told,
         least,
