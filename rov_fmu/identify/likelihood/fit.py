@@ -211,7 +211,7 @@ def _less_bent(
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
     other, show = _bending(objective, bent), work.steps("quadratic thrust")
-    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK)
+    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK, last=most > _UNREFINED)
 
 
 def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:
