@@ -13,6 +13,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.findings import sentences
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood import file_fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.search import StructureSearch
 from rov_fmu.identify.result import ALARM
@@ -169,6 +170,7 @@ def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
 def test_a_fit_is_not_refined_where_a_slip_explains_the_errors(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (log, *_), slip, shown = recordings(HEAVE), SLIPS["heave up"], list[str]()
     monkeypatch.setattr(StructureSearch, "_round", lambda _: pytest.fail("a structure is sought"))
+    monkeypatch.setattr(file_fit, "_weakest", lambda *_: pytest.fail("weak effects are left out"))
     tests = load_tests(folder_of(write_folder(tmp_path, [slipped(log, slip)]), KNOWN, FORCES))
     found = identify(tests, lambda text, _: shown.append(text))
     assert shown

@@ -29,7 +29,9 @@ class FileFit:
     posterior: Posterior
 
 
-def without_weak_effects(objective: Objective, best: Minimum, lasting: Collection[int] = ()) -> FileFit:
+def without_weak_effects(
+    objective: Objective, best: Minimum, lasting: Collection[int] = (), *, refines: bool = True
+) -> FileFit:
     """Leave out the weakest effects, each time with a refit, while J rises by at most MOST_RISE.
 
     The effect that is left out next is the one without which J is expected to rise least, given that those before it
@@ -40,11 +42,14 @@ def without_weak_effects(objective: Objective, best: Minimum, lasting: Collectio
     the rise, if the evidence for it is not positive. Those that are `lasting`, by their indices, stay.
 
     The refits keep the derivatives of the fit that they begin at: J where they end is J, and exact derivatives follow
-    at the end, with which more effects may go.
+    at the end, with which more effects may go. If `refines` is False, only effects that need evidence are left out.
     """
     absent = _without_evidence(Posterior.of(objective.table, best.z, best.information))
     if absent:
         (best,) = refits(objective, best, [objective.whole], [absent])
+    if not refines:
+        posterior = Posterior.of(objective.table, best.z, best.information, absent)
+        return FileFit(objective.without(absent), best, posterior)
     least, is_exact = best, not absent
     while True:
         posterior = Posterior.of(objective.table, least.z, least.information, absent)

@@ -187,7 +187,7 @@ def fit_all(
     unseen = unseen_errors(told, least.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)
     # Time constants of tables contain the lag, so that tables alone need none.
-    of_file = without_weak_effects(*file, posterior.lasting if logs else ())
+    of_file = without_weak_effects(*file, posterior.lasting if logs else (), refines=not is_wrong)
     return Fit(
         told,
         least,
@@ -213,7 +213,7 @@ def _less_bent(
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
     other, show = _bending(objective, bent), work.steps("quadratic thrust")
-    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK)
+    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK, last=most > _UNREFINED)
 
 
 def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:

@@ -66,7 +66,7 @@ def minimise(
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
     less than `enough`, the second time exact ones, and early where J within reach, with the information, promises
     nothing. Data and information of a `last` fit have exact derivatives: those of the step before if J hardly fell, and
-    otherwise others, after one more step with them. Those of a fit that is not the last are of the step before.
+    otherwise others, after one more step with them, if all motions beside the minimum are finite. Those of a fit that is not the last are of the step before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
@@ -91,7 +91,11 @@ def minimise(
         if stalled == _STALLED:
             break
     if last and not (stalled == _STALLED and before.value - now.value < ENOUGH):
-        now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
+        try:
+            now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
+        except DivergedError:  # beside the minimum; the derivatives of the step before are near
+            if not now.data:
+                raise
     if last:
         now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
     return now
