@@ -66,7 +66,8 @@ def minimise(
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
     less than `enough`, the second time exact ones, and early where J within reach, with the information, promises
     nothing. Data and information of a `last` fit have exact derivatives: those of the step before if J hardly fell, and
-    otherwise others, after one more step with them, if all motions beside the minimum are finite. Those of a fit that is not the last are of the step before.
+    otherwise others, after one more step with them, unless motions beside the minimum diverge. Those of a fit that is
+    not the last are of the step before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
