@@ -9,7 +9,7 @@ from math import inf, isfinite, log, nan, sqrt
 from typing import Literal
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
-from rov_fmu.identify.likelihood.kinds import SLOW, Process
+from rov_fmu.identify.likelihood.kinds import KINDS, SENSOR_SCALE, SLOW, Process
 from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
@@ -59,6 +59,11 @@ CONSTANTS = {
     "late": Constant(0.05, "how much earlier or later commands act along an axis, relative to their window", _FLIGHTS),
     "narrowest": Constant(0.2, "the narrowest such window, relative to the time between two rows", _FLIGHTS),
     "most of row": Constant(0.5, "the window from which commands are told as momentary", _FLIGHTS),
+    "finest": Constant(
+        KINDS[SENSOR_SCALE].finest,
+        "least scale (ln) and offset (m/s) of a velocity sensor that are told",
+        "a position that lags by 0.5 s gave 0.010 and 3 mm/s that are not there",
+    ),
     "least noise": Constant(0.01, "least noise of a sensor, relative to its motion", _FLIGHTS),
 }
 """Chosen after results were seen. [priors] and the rules of the verdict have their own tables, with their reasons."""
