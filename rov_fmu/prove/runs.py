@@ -160,8 +160,9 @@ class Runs:
         fmu = None
         try:
             fmu = new_instance(self._folder, self._description, logging=logging)
+            begin_initialization = set_up(fmu, plan.start, plan.stop)
             apply_start_values(fmu, self._description, dict(plan.parameters))
-            enter_initialization(fmu, plan.start, plan.stop)
+            begin_initialization()
             self._set(fmu, plan.pieces[0][1])
             if initialized:
                 fmu.exitInitializationMode()
@@ -204,13 +205,17 @@ def new_instance(folder: str, description: Any, *, logging: bool = False) -> Any
     return instantiate_fmu(folder, description, "CoSimulation", debug_logging=logging, logger=keep_message)
 
 
-def enter_initialization(fmu: Any, start: float, stop: float, tolerance: float | None = None) -> None:
-    """Begin the initialization of an instance of FMI 2.0 or 3.0. Times are in s."""
+def set_up(fmu: Any, start: float, stop: float, tolerance: float | None = None) -> Callable[[], object]:
+    """Tell an instance the times of a run, s, and return the function with which its initialization begins.
+
+    FMI 2.0 has the times before the start values, and 3.0 as the initialization begins.
+    """
     times = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
-    if _version(fmu) == "2":
-        fmu.setupExperiment(**times)
-        times = {}
-    fmu.enterInitializationMode(**times)
+    if _version(fmu) == "3":
+        return partial(fmu.enterInitializationMode, **times)
+    fmu.setupExperiment(**times)
+    begin: Callable[[], object] = fmu.enterInitializationMode
+    return begin
 
 
 def free_instance(fmu: Any) -> None:

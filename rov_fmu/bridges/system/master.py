@@ -16,11 +16,11 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.prove.runs import (
     RunError,
-    enter_initialization,
     free_instance,
     function_of,
     last_message,
     new_instance,
+    set_up,
 )
 
 Name = tuple[str, str]
@@ -99,9 +99,10 @@ class Master:
 
     def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
         fmu = self._fmus[name] = new_instance(self._folders[name], self._descriptions[name])
+        begin_initialization = set_up(fmu, start, stop)
         for _, names, put in self._calls("set", [(name, variable) for variable in values]):
             put([values[variable] for _, variable in names])
-        enter_initialization(fmu, start, stop)
+        begin_initialization()
         fmu.exitInitializationMode()
 
     def _calls(self, verb: str, names: Iterable[Name]) -> list[tuple[str, list[Name], Callable[..., Any]]]:

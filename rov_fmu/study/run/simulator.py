@@ -18,10 +18,10 @@ from rov_fmu.prove.runs import (
     WARNING,
     Array,
     RunError,
-    enter_initialization,
     free_instance,
     last_message,
     new_instance,
+    set_up,
     status_word,
 )
 from rov_fmu.study.plan.model import TYPES, Variable
@@ -120,7 +120,7 @@ class Simulator:
     def _initialize(self) -> None:
         fmu, tolerance, start, end = self._fmu, self._job.plan.tolerance, self._times[0], self._times[-1]
         try:
-            enter_initialization(fmu, start, end, tolerance)
+            set_up(fmu, start, end, tolerance)()
             for put, references, count, address in self._changes.get(0, ()):
                 _check(put(fmu.component, references, count, address), "setting the inputs", start)
             fmu.exitInitializationMode()
