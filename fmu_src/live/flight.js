@@ -3,7 +3,7 @@
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 20000;
 const RESTING = 0.55; // of the vehicle's size: the height of its middle above the seabed on which it rests
-const NO_SURFACE = 1e6; // m; over such a height, buoyancy and thrust do not fade out
+const NO_SURFACE = 1e30; // m; over such a height, nothing of buoyancy and thrust fades out
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
 /** Returns the last place at which ascending numbers are at most x, or 0. @param {number[]} numbers @param {number} x */

@@ -13,7 +13,7 @@ from rov_fmu.report.page.live import Flown, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
-from tests.vehicles import EVERYTHING, SIX, THRUST_EFFECTS, a_vehicle, four_axes, with_rotors
+from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, a_vehicle, with_rotors
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page, Playwright
@@ -98,10 +98,10 @@ _FILES = {
 
 @cache
 def flown_vehicle(kind: str) -> Vehicle:
-    """Return a vehicle by the name of its page. The `heavy` is the BlueROV2 Heavy without roll and pitch."""
+    """Return a vehicle by the name of its page. The `heavy` is HEAVY, of whose FMU `heavy_dir` is the folder."""
     if kind in ("six", "rotors"):
         return a_vehicle(SIX if kind == "six" else with_rotors(SIX))
-    return four_axes(load_vehicle(SHIPPED["bluerov2_heavy"])) if kind == "heavy" else load_vehicle(_FILES[kind])
+    return HEAVY if kind == "heavy" else load_vehicle(_FILES[kind])
 
 
 def write_page(path: Path, *vehicles: Vehicle, compact: bool = False) -> str:

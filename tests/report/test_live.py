@@ -23,6 +23,7 @@ from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.report.conftest import Visit, chart, flown_vehicle, get, until
+from tests.vehicles import without_surface
 from verification.references.fmpy_slave import fmpy_slave
 
 pytestmark = pytest.mark.interop
@@ -200,7 +201,7 @@ def test_a_step_test_stands_beside_what_was_measured_and_stops_at_its_end(page: 
 
 
 def test_another_vehicle_flies_the_same_commands_as_a_ghost(tmp_path: Path, fly: Fly) -> None:
-    other = load_vehicle(SHIPPED["bluerov2"])
+    other = without_surface(load_vehicle(SHIPPED["bluerov2"]))
     assert main(["fly", "videoray", "--against", "bluerov2", "-o", str(tmp_path / "both.html")]) == 0
     page = fly((tmp_path / "both.html").as_uri())
     ghost = page.evaluate(
