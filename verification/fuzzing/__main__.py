@@ -8,6 +8,7 @@ from base64 import b64encode
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from itertools import product
 from os import cpu_count
 from pathlib import Path
@@ -128,7 +129,9 @@ def _try_logs(inputs: Sequence[Path], count: int) -> None:
 
 def _build(pair: tuple[str, int], target: Path) -> None:
     vehicle, version = pair
-    build_target(native_content(load_vehicle(VEHICLES[vehicle]), fmi=version).sources, target, version)
+    rov = load_vehicle(VEHICLES[vehicle])
+    deep = rov.with_(replace(rov.layout, surface=False))  # the laws are those of a vehicle under water
+    build_target(native_content(deep, fmi=version).sources, target, version)
 
 
 def _keep(command: str, found: Path) -> str:

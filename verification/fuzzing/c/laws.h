@@ -65,8 +65,8 @@ static void sizes_at(const fmu *f, const double y[N_SERIES], int back, double si
 {
     model_held held;
     double start[N_SERIES], scale[N_SERIES];
-    int reverse[N_VELOCITIES];
-    for (int a = 0; a < N_VELOCITIES; a++) {
+    int reverse[N_MONITORED];
+    for (int a = 0; a < N_MONITORED; a++) {
         reverse[a] = back;
     }
     model_start(f->now.values, &f->numbers, &held, start, scale);
