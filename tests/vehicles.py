@@ -25,7 +25,7 @@ from rov_fmu.equation.parts import (
 )
 from rov_fmu.vehicle.schema import Basis, Estimated
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 
 Values = Mapping[str, float]
 _Vehicle = TypeVar("_Vehicle", bound=Vehicle)
@@ -181,11 +181,6 @@ def carried(vehicle: Vehicle) -> tuple[object, ...]:
     layout = vehicle.layout
     measured = {curve.name: (*curve.tables, curve.electric_current) for curve in layout.curves}
     return {name: [table and table.path for table in own] for name, own in measured.items()}, layout.voltage_source
-
-
-def without_surface(rov: _Vehicle) -> _Vehicle:
-    """Return a vehicle that buoyancy and thrust move above the surface, too."""
-    return rov.with_(replace(rov.layout, surface=False))
 
 
 def four_axes(vehicle: Vehicle) -> Vehicle:

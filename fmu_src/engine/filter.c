@@ -93,7 +93,7 @@ typedef struct {
     const double *tilt_time, *roll, *pitch;
     const double *beside; /* rows x N_AXES: the size of each short force after a row, relative to its size in `parameters`. If it is
                              not NULL, commands change along straight lines, and no change has a time of its own */
-    const double *averaged;      /* of each sample: the time from which it is the mean; NULL if samples are of a moment */
+    const double *averaged; /* of each sample: the time from which it is the mean; NULL if samples are of a moment */
     double longest, changing;    /* the longest step, and the longest one in which a command changes, s */
     double share;                /* the longest step relative to the fastest time constant */
 } record;
@@ -1118,10 +1118,10 @@ static int pieces_over(const filter *f, double from, double to)
 }
 #endif
 
-/* Find the next sample of a sensor from one on. */
+/* Find the first sample of a sensor of means from sample k on. After the last one, it stays this one. */
 static void find_next(filter *f, ptrdiff_t k, ptrdiff_t sensor)
 {
-    for (; k < f->log->samples; k++) {
+    for (; f->log->averaged && k < f->log->samples; k++) {
         if (f->log->sensor[k] == sensor) {
             f->next[sensor] = k;
             return;

@@ -196,7 +196,7 @@ class Flight {
     for (const since of this.since) Object.assign(since, { time: 0, velocity: 0 });
   }
 
-  /** Lets the surface of the models act, but not in recordings and step tests, in which the vehicles are as deep under water. */
+  /** Lets the surface of the models act, except in recordings and step tests, where the vehicles move as deep under water. */
   surface() {
     const acts = this.isBounded && !this.test && !this.replay;
     for (const { model } of [this.pilot, this.ghost]) {

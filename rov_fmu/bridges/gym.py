@@ -1,11 +1,10 @@
 """Gymnasium environments of a vehicle: one, or many with coefficients drawn from their uncertainty.
 
 The task is to hold station: the vehicle starts at rest in a random place near the origin and should return there and
-stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states. Depth is
-from the place to hold, deep under water, so that a vehicle with a surface has none here.
+stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states. The depth
+counts from the place to hold, which is deep under water, so that no surface acts.
 """
 
-from dataclasses import replace
 from typing import Any, Literal
 
 import gymnasium
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.c.stepper import LaneStepper
 from rov_fmu.io.messages import InputError, shown
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 
 Array = NDArray[np.float64]
 STEP = 0.1
@@ -52,7 +51,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         for name, value in {"count": count, "step": step, "steps": steps}.items():
             if not value > 0:
                 raise InputError(f"{name} = {shown(value)}: must be above 0")
-        vehicle = vehicle.with_(replace(vehicle.layout, surface=False))
+        vehicle = without_surface(vehicle)
         layout = vehicle.layout
         self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
         self.draws: Draws = draws if len(vehicle.uncertainty.names) else False

@@ -20,7 +20,7 @@ from rov_fmu.io.groups import grouped
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
 _SHARED = 0.1
-"""Times are not told apart where one has this share of its variance in common with the other."""
+"""A time is not told from another one whose knowledge would take away this share of its variance."""
 
 
 def effects_of(fit: Fit) -> Iterator[Effect]:
@@ -124,11 +124,10 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
 
 
 def times_of(fit: Fit) -> tuple[str, ...]:
-    """Return the times from a command to what a sensor shows that the logs do not tell apart, in words; none, if they
-    tell the first one.
+    """Return, in words, a time from a command to what a sensor shows, and the others that the logs do not tell from it.
 
-    Its interval, whatever the others are, then contains both its absence and its usual size. The others are those whose
-    knowledge would take away a tenth of its variance.
+    The interval of the first one then contains both its absence and its usual size. To know one of the others would
+    take away a tenth of its variance. There are none if the logs tell the first one.
     """
     posterior, parameters = fit.posterior, fit.posterior.table.parameters
     times = grouped((p.of_kind.time, n) for n, p in enumerate(parameters) if p.of_kind.time and not p.is_fixed)

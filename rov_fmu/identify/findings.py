@@ -273,8 +273,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             size = size_in_words(sensor.wander, sensor.unit)
             findings.append(about("", "estimator", sensor.axis.name, size=size))
     findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
-    first, *others = (f"the {time}" for time in identification.times or ("",))
-    findings += [about("", "times", first=first, others=listed(others))] if others else []
+    findings += _times(identification)
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
     findings += filter(None, map(_structure, identification.structures))
     for slip in identification.slips:
@@ -684,6 +683,13 @@ def _on_log(identification: Identification, log: Log) -> Iterator[Finding]:
         surge, sway, yaw = (any(c.quantity.axis is a and not c.unused for c in log.channels) for a in COUPLED_AXES)
         if yaw and (surge or sway):
             yield Finding("coupling left out", file=log.file)
+
+
+def _times(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding about the times that the logs do not tell apart, if there are any."""
+    if len(identification.times) > 1:
+        first, *others = (f"the {time}" for time in identification.times)
+        yield about("", "times", first=first, others=listed(others))
 
 
 def _structure(structure: Structure) -> Finding | None:

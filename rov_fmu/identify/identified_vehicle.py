@@ -283,9 +283,9 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     """Return the layout without the effects that are absent, and with the surface of the base where it can be."""
     file = fit.file.posterior
     table = file.table
-    effects_of_file = [p for n, p in enumerate(table.parameters) if n not in file.absent]
-    present = {(p.kind, p.of) for p in effects_of_file}
-    lasting = {key for p in effects_of_file if p.of_kind.is_in_all for key in p.of_kind.keys}
+    parameters = [p for n, p in enumerate(table.parameters) if n not in file.absent]
+    present = {(p.kind, p.of) for p in parameters}
+    lasting = {key for p in parameters if p.of_kind.is_in_all for key in p.of_kind.keys}
     base, given = tests.base, tests.description.known
     coefficients: dict[str, float] = table.coefficients(file.z)
 

@@ -8,7 +8,7 @@ from itertools import chain
 from math import inf, isfinite, sin
 from numbers import Real
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from typing_extensions import Self
 
@@ -49,6 +49,9 @@ class VehicleFileError(FileError):
 
 
 Values = Mapping[str, float]
+
+
+_Vehicle = TypeVar("_Vehicle", bound="Vehicle")
 
 
 class _Formulas:
@@ -483,6 +486,11 @@ def _contradictions(layout: Layout, coefficients: Mapping[str, float]) -> Iterat
     if layout.has_arm and coefficients["R"] * sin(coefficients["gamma"]) == 0.0:
         yield "R, gamma: must both be more than 0, because R sin γ is the arm of the thrusters"
     yield from check_mass(layout, coefficients)
+
+
+def without_surface(vehicle: _Vehicle) -> _Vehicle:
+    """Return a vehicle that moves everywhere as deep under water."""
+    return vehicle.with_(replace(vehicle.layout, surface=False))
 
 
 def load_vehicle(path: Path, *, coming: Path | None = None) -> Vehicle:

@@ -30,9 +30,9 @@ from rov_fmu.interface.arguments import with_axes
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, frictionless, passed, tied, without_surface
+from tests.vehicles import VEHICLES, frictionless, passed, tied
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 

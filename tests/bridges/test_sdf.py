@@ -26,9 +26,9 @@ from rov_fmu.equation.catalogue import cross_of
 from rov_fmu.io.messages import InputError
 from rov_fmu.io.output import sealed
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.commands import BARE, ROOT
-from tests.vehicles import VEHICLES, extended, pulsed, without_surface
+from tests.vehicles import VEHICLES, extended, pulsed
 from verification.references.rigid_body import coriolis, quaternion_of, rigid_body_mass, rotation, skew
 
 Array = NDArray[np.float64]

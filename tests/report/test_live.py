@@ -21,9 +21,8 @@ from rov_fmu.tank.columns import Names, columns_of_log
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.report.conftest import Visit, chart, flown_vehicle, get, until
-from tests.vehicles import without_surface
 from verification.references.fmpy_slave import fmpy_slave
 
 pytestmark = pytest.mark.interop

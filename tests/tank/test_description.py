@@ -16,7 +16,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.tank.description import ROV_FILE
 from rov_fmu.tank.findings import Finding
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle
+from rov_fmu.vehicle.vehicle import VehicleFileError, load_vehicle, without_surface
 from tests.commands import TESTS
 from tests.folders import (
     BLUEROV2,
@@ -35,7 +35,6 @@ from tests.tank.logs import commanded
 from tests.tank.readers import writers
 from tests.tank.readers.motion import DIVE, THRUSTERS, TIME
 from tests.tank.test_description_mistakes import LIMITS
-from tests.vehicles import without_surface
 
 DOCS = Path(__file__).parents[2] / "docs"
 

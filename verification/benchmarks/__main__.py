@@ -3,7 +3,7 @@
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
@@ -15,7 +15,7 @@ from rov_fmu.c.simulation import usable_cores
 from rov_fmu.io.output import Output, check_targets, write_whole
 from rov_fmu.process import exit_code
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 
 from . import kalman, picture, runs, simulators, taylor
 from .page import Section, machine, print_sections
@@ -65,8 +65,7 @@ def _command(quick: bool, picture_file: Path | None) -> None:
 
 def _deep(name: str) -> Vehicle:
     """Return a vehicle that ships, without its surface, which the other solvers and the references lack."""
-    vehicle = load_vehicle(SHIPPED[name])
-    return vehicle.with_(replace(vehicle.layout, surface=False))
+    return without_surface(load_vehicle(SHIPPED[name]))
 
 
 def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterator[Section]:

@@ -8,7 +8,6 @@ from base64 import b64encode
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
-from dataclasses import replace
 from itertools import product
 from os import cpu_count
 from pathlib import Path
@@ -21,7 +20,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, table
 from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY
-from rov_fmu.vehicle.vehicle import load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle, without_surface
 from verification.references.vehicles import THRUST
 
 from .campaign import Counts, FindingError, build_target, fuzz, pack_corpus, replay, unpack_corpus
@@ -129,8 +128,7 @@ def _try_logs(inputs: Sequence[Path], count: int) -> None:
 
 def _build(pair: tuple[str, int], target: Path) -> None:
     vehicle, version = pair
-    rov = load_vehicle(VEHICLES[vehicle])
-    deep = rov.with_(replace(rov.layout, surface=False))  # the laws are those of a vehicle under water
+    deep = without_surface(load_vehicle(VEHICLES[vehicle]))  # the laws are those of a vehicle under water
     build_target(native_content(deep, fmi=version).sources, target, version)
 
 

@@ -36,7 +36,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     ]
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
-    parts, unread, size = dict[str, Part](), list[str](), 0
+    parts, unread = dict[str, Part](), list[str]()
     ready: dict[str, Part] = {}
     vehicles: dict[str, Vehicle] = {}
     kinds = {  # components of one kind have one FMU
@@ -45,7 +45,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     for name, table in plan.component.items():
         kind = kinds[name]
         try:
-            if kind not in ready and table.vehicle:
+            if table.vehicle and kind not in ready:
                 vehicles[kind] = _vehicle(name, table, path)
                 ready[kind] = _description(vehicles[kind])
             elif kind not in ready:
@@ -56,8 +56,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
             unread += [f"{where}{line}" for line in str(error).split("\n")]
             continue
         parts[name] = ready[kind]
-        if (size := size + len(parts[name].content)) > _MOST_BYTES:
-            raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
+        _check_size(parts, name, path)
     if unread:
         raise SystemPlanError(*unread)
     values: dict[str, dict[str, Value]] = {}
@@ -73,7 +72,15 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         if vehicle := vehicles.pop(kind, None):
             on_part(name)
             ready[kind] = replace(ready[kind], content=_built(vehicle))
-    return Structure({name: ready[kind] for name, kind in kinds.items()}, values, connections)
+        parts[name] = ready[kind]
+        _check_size(parts, name, path)
+    return Structure(parts, values, connections)
+
+
+def _check_size(parts: Mapping[str, Part], name: str, path: Path) -> None:
+    """Raise SystemPlanError, which names the last component, if the FMUs are too large together."""
+    if sum(len(part.content) for part in parts.values()) > _MOST_BYTES:
+        raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
 
 
 def _part(table: ComponentTable, path: Path) -> Part:

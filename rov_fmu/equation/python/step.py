@@ -192,7 +192,7 @@ class Motion:
                     found = _root(velocity, length, self.y[i] * sign, reached), i
                     continue
                 if self.is_rounding(i, self.rate[i]):
-                    if self.is_rounding(i, reached / h):
+                    if self.is_rounding(i, reached / h):  # forces that cancel each other leave no direction
                         continue
                     self.direction[name] = -sign
                     self.find_numbers()

@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intc]
+_Value = TypeVar("_Value")
 Number = float | Array
 """A number, or an array of one for each set of parameters."""
 
@@ -326,9 +328,8 @@ class Filter:
         for name, value in parameters.coefficients.items():
             if name in self._indices:
                 at[self._indices[name]] = value
-        rest = MOST_SENSORS - len(parameters.noise)
-        slow = [*parameters.slow, *[Slow()] * rest]
-        levers = [*parameters.levers, *[AT_ORIGIN] * (MOST_SENSORS - len(parameters.levers))]
+        slow = [*parameters.slow, *[Slow()] * (MOST_SENSORS - len(parameters.noise))]
+        levers = _for_all(parameters.levers, AT_ORIGIN)
         lags = [lag if lag is not None else 0.0 for lag in parameters.lags]
         units: list[Number] = [1.0] * self.states
         axes = [form.axis.name for form in self.layout.axes]
@@ -339,12 +340,12 @@ class Filter:
             *at,
             *(one.size for one in slow),
             *(one.time_constant for one in slow),
-            *(*parameters.white, *[1.0] * rest),
-            *(*lags, *[0.0] * (MOST_SENSORS - len(lags))),
+            *_for_all(parameters.white, 1.0),
+            *_for_all(lags, 0.0),
             *(part for lever in levers for part in lever),
             parameters.turn,
-            *(*parameters.scales, *[1.0] * (MOST_SENSORS - len(parameters.scales))),
-            *(*parameters.offsets, *[0.0] * (MOST_SENSORS - len(parameters.offsets))),
+            *_for_all(parameters.scales, 1.0),
+            *_for_all(parameters.offsets, 0.0),
             *(*parameters.mean_drifts, 0.0),
             *units,
             *(number for column in zip(*powers, strict=True) for number in column),
@@ -413,6 +414,11 @@ def _inputs(record: Record, parameters: Parameters) -> Array:
     """Return the rows of inputs of each set. The C code reads as many as the record has."""
     found = np.ascontiguousarray(record.inputs if parameters.inputs is None else parameters.inputs, np.float64)
     return np.broadcast_to(found, (parameters.count, *record.inputs.shape))
+
+
+def _for_all(values: Sequence[_Value], absent: _Value) -> list[_Value]:
+    """Return the values of MOST_SENSORS sensors, of which the last ones are absent."""
+    return [*values, *[absent] * (MOST_SENSORS - len(values))]
 
 
 def _where(layout: Layout, indices: Mapping[str, int]) -> Sequence[int]:

@@ -180,8 +180,10 @@ def fit_all(
     told, least, bent = full, best, full.table.known.bent
     of_measured = bent.intersection(measured)
     if of_measured < bent:
-        told, least = _less_bent(full, of_measured, best, most, work)
-    file = _less_bent(full, frozenset(), least, most, work) if of_measured else (told, least)
+        told, least = _less_bent(full, of_measured, best, work, refines=not is_wrong)
+    file = (told, least)
+    if of_measured:
+        file = _less_bent(full, frozenset(), least, work, refines=not is_wrong)
     misfits = with_shared(full.table.layout, structure(told, least))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
     unseen = unseen_errors(told, least.z, before, misfits)
@@ -209,11 +211,12 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
 
 
 def _less_bent(
-    objective: Objective, bent: frozenset[str], near: Minimum, most: int, work: Work
+    objective: Objective, bent: frozenset[str], near: Minimum, work: Work, *, refines: bool
 ) -> tuple[Objective, Minimum]:
     """Return J where only some curves bend, and its minimum, from that where more do."""
     other, show = _bending(objective, bent), work.steps("quadratic thrust")
-    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK, last=most > _UNREFINED)
+    most = MOST_STEPS if refines else _UNREFINED
+    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK, last=refines)
 
 
 def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:

@@ -174,7 +174,7 @@ def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
 
 
 def _slow_tables(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield the files that are tables with rows far apart."""
+    """Yield one suspect, about all tables with rows far apart, if there are any."""
     files = [one.log.file for one in logs if one.is_slow_table]
     if files:
         yield tuple(files)

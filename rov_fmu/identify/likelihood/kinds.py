@@ -146,7 +146,8 @@ class Kind(Coordinate):
     hides_structure: bool = False
     """True if it may make up for a wrong structure. Where this is judged, it is no larger than usual."""
     least_unseen: float = 0.0
-    """Its least size where unseen data are predicted."""
+    """The least size of a process where unseen data are predicted, or the least standard deviation in an unseen log of
+    what differs by log."""
     is_of_structure: bool = False
     """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
     differs_by_log: bool = False

@@ -109,7 +109,7 @@ def has_place(sensor: Sensor) -> bool:
 
 
 def _of_estimator(part: str) -> str:
-    """Return which offset of an estimator is meant: it integrates accelerations in the frame of the earth."""
+    """Return the name of an estimator's offset to the north or the east: it integrates accelerations along these."""
     return f"velocity {part}"
 
 

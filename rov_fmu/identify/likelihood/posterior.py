@@ -70,7 +70,7 @@ class Posterior:
         `unseen` is the covariance of the parameters by errors that the data do not show.
         """
         wider = self._with_less_information(ratios)
-        is_free = np.diag(self.covariance) > 0.0
+        is_free = np.diag(self.covariance) > 0.0  # what is fixed or absent has no error
         unseen = unseen * np.outer(is_free, is_free)
         return replace(wider, covariance=wider.covariance + unseen) if unseen.any() else wider
 

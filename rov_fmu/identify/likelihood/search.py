@@ -194,7 +194,7 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
         if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (CONSTANTS["late"].value * max(widths) / time) ** 2)
     shortest = min((one.interval if one.lost else 0.0 for one in objective.logs), default=0.0) * SHORTEST_LAG
-    lags = np.array([p.of_kind.is_lag * (-1.0 if p.part else 1.0) for p in parameters])
+    lags = np.array([p.of_kind.is_lag * (-1.0 if p.part else 1.0) for p in parameters])  # those of sensors have a part
     if shortest and lags.max() > 0.0:
         shared = min(z[lags < 0.0], default=0.0)
         found += (shortest**2 + (shared / QUANTILE) ** 2) * np.outer(lags, lags)
@@ -385,9 +385,9 @@ def refitted(plain: Objective, starts: Starts, prior: float, near: StructureFit)
 
 
 def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
-    """Return the fit with samples that do not mislead the search, and the odds of the hypotheses that change these.
+    """Return the fit to samples that do not mislead the search, and the odds of the hypotheses that change the samples.
 
-    Only J of the samples that none leaves out is compared.
+    J is compared over the samples that no hypothesis leaves out.
     """
     odds = dict[Suspect, float]()
     for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):

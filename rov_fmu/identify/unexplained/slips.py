@@ -49,7 +49,7 @@ _CERTAIN, _WEIGHED = 2.0, 0.05
 and the water inside change from dive to dive."""
 _CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
 """The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
-which difference of J quick fits go on to their end."""
+which difference of J quick fits go on to their end: the evidence of a slip is hundreds."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -123,6 +123,7 @@ def slips(
     fits = dict[Scaling, tuple[Objective, Minimum]]()
 
     def least(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
+        """Return J of an explanation by a quick fit, or by one to its end if a quick fit of it was made before."""
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
         try:
             if is_exact := scaling in fits:

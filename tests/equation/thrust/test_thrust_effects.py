@@ -16,7 +16,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.equation.parts import SourcedVector
 from rov_fmu.equation.python.step import Change
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.equation.steps import in_engine
 from tests.vehicles import (
     EVERYTHING,
@@ -28,7 +28,6 @@ from tests.vehicles import (
     extended,
     random_inputs,
     random_state,
-    without_surface,
 )
 from verification.references import rigid_vehicle
 from verification.references.equations import steady_forces

@@ -14,10 +14,10 @@ from rov_fmu.cli import main
 from rov_fmu.equation.words import LEFT_WATER
 from rov_fmu.identify.likelihood.filter import Filter
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle, without_surface
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.equation.steps import in_engine, in_python
-from tests.vehicles import SIX, VIDEORAY, Values, at_rest, random_inputs, random_state, still, surfaced, without_surface
+from tests.vehicles import SIX, VIDEORAY, Values, at_rest, random_inputs, random_state, still, surfaced
 from verification.references import rigid_body
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body, compared, places

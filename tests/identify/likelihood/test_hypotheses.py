@@ -53,9 +53,9 @@ from rov_fmu.interface.model import VehicleModel
 from rov_fmu.tank import log as tank_log
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.folders import HEAD, folder_of
-from tests.vehicles import VIDEORAY, without_surface
+from tests.vehicles import VIDEORAY
 from verification.references.autopilot.flights import flown
 
 SECONDS, INTERVAL = 45.0, 0.1
