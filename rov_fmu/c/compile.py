@@ -299,14 +299,14 @@ def engine_flags(file: str = ENGINE_FILE.name, platform: str | None = None) -> l
     The library is for one of PLATFORMS, by default for this machine.
 
     The files that compute in the lanes of a vector are compiled for the widest vectors of this processor. The compiler
-    warns wrongly about conditions that are vectors (-Wno-conversion). The file for many vehicles is compiled together
-    with the engine. There, a product and a sum are one operation with one rounding error, which takes a sixth of the
-    time away: the numbers need not be those of the FMU to the last bit.
+    warns wrongly about conditions that are vectors (-Wno-conversion). There, a product and a sum are one operation with
+    one rounding error, which takes up to a sixth of the time away: the numbers need not be those of the FMU to the last
+    bit. The file for many vehicles is compiled together with the engine.
     """
     name = platform or host_platform(fmi=3)
     in_lanes, of_vehicles = file in (LANES_FILE.name, FILTER_LANES_FILE.name), file == LANES_FILE.name
     target = ["-target", PLATFORMS[name].target] if name else []
-    vectors = ["-mcpu=native", "-Wno-conversion", *(["-ffp-contract=on"] if of_vehicles else [])]
+    vectors = ["-mcpu=native", "-Wno-conversion", "-ffp-contract=on"]
     processor = vectors if in_lanes else [] if name else ["-mcpu=baseline"]
     libraries = _platform_flags(PLATFORMS[name]) if name else ("-lm",)
     files = [file, ENGINE_FILE.name] if of_vehicles else [file]

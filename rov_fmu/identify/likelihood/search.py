@@ -35,7 +35,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import Minimum, evidence_at, least_from, minimise, scaled, start_of, total
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence_at, minimise, scaled, start_of, total
 from rov_fmu.identify.result import ALARM, CONSTANTS, USUAL, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -360,27 +360,23 @@ def _fit_of(starts: Starts, objective: Objective, end: Minimum, prior: float, qu
     return StructureFit(ends, objective, end, evidence_at(objective, end) + prior, quick)
 
 
-def fitted(plain: Objective, starts: Starts, prior: float, enough: float = -inf) -> StructureFit | None:
+def fitted(
+    near: StructureFit, plain: Objective, starts: Starts, prior: float, enough: float = -inf
+) -> StructureFit | None:
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
-    `prior` is 2 ln of their prior probability. The result is None if a motion diverges, or if the evidence of thinned
-    logs is below `enough`.
+    `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. The fit begins where another
+    one ended, but where the hypotheses expect something else, and from scratch if a motion diverges there. The result
+    is None if one diverges from both, or if the evidence of thinned logs is below `enough`.
     """
     thinned, objective = applied(plain, starts, thinned=True), applied(plain, starts)
-    with suppress(DivergedError):
-        end = least_from(thinned, begun(thinned, start_of(thinned), starts))
-        quick = evidence_at(thinned, end)
-        if quick > enough:
+    for z in (np.where(thinned.mean == near.objective.mean, near.minimum.z, thinned.mean), start_of(thinned)):
+        with suppress(DivergedError):
+            end = minimise(thinned, begun(thinned, z, starts), enough=QUICK, last=False)
+            quick = evidence_at(thinned, end)
+            if not quick > enough:
+                return None
             return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
-    return None
-
-
-def refitted(plain: Objective, starts: Starts, prior: float, near: StructureFit) -> StructureFit | None:
-    """Return the minimum of J with some hypotheses, from the end of another fit; None if a motion diverges."""
-    objective = applied(plain, starts)
-    with suppress(DivergedError):
-        end = minimise(objective, begun(objective, near.minimum.z, starts), last=False)
-        return _fit_of(starts, objective, end, prior, near.quick)
     return None
 
 
@@ -395,7 +391,7 @@ def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
             every = [*HYPOTHESES[kind].suspects(plain.objective.table.known, plain.objective.logs)]
             for of in every:
                 prior = 2.0 * log(HYPOTHESES[kind].probability / len(every))
-                fit = fitted(plain.objective, {(kind, of): None}, prior)
+                fit = fitted(plain, plain.objective, {(kind, of): None}, prior)
                 if fit and (gain := fit.score - plain.score - _left_out(plain, fit.objective)) > WINS:
                     odds[kind, of] = gain
                     plain = replace(fit, starts={}, score=fit.score - prior)
@@ -507,7 +503,7 @@ class StructureSearch:
         if len(rest) == len(fit.starts):
             return fit
         key = frozenset(rest)
-        other, before = refitted(self.plain.objective, rest, self._prior(rest), fit), self.tried.get(key)
+        other, before = fitted(fit, self.plain.objective, rest, self._prior(rest)), self.tried.get(key)
         if not other or (before and before.score >= other.score):
             return fit
         self.tried[key] = other
@@ -553,7 +549,7 @@ class StructureSearch:
                 continue
             enough = max(one.quick for one in (self.now, *fits)) - WINS
             self.on_fit()
-            fit = fitted(self.plain.objective, starts, self._prior(starts), enough)
+            fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)
             # Without a fit, the evidence of thinned logs is not enough.
             is_worse = fit.score < self.now.score if fit else enough < self.now.quick
             if gain > -inf and is_worse and starts.keys() > self.now.starts.keys():

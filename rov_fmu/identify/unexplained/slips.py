@@ -125,26 +125,37 @@ def slips(
     def least(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
         """Return J of an explanation by a quick fit, or by one to its end if a quick fit of it was made before."""
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
+        unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
+
+        def promises(value: float, _: Array) -> bool:
+            return is_close(value + unlikely)
+
         try:
             if is_exact := scaling in fits:
                 quick, start = fits[scaling][0], fits[scaling][1].z
             else:
                 quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
                 start = start_of(quick) if start is None else start
-            end = minimise(quick, start, most=most, enough=ENOUGH if is_exact else QUICK, last=False)
+            enough = ENOUGH if is_exact else QUICK
+            end = minimise(quick, start, most=most, enough=enough, last=False, promises=promises if scaling else None)
         except DivergedError:
             return inf
         fits[scaling] = quick, end
-        return end.value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling) + unlikely
+        return end.value + unlikely
 
-    as_it_is, J = least(frozenset(), best, 1), dict[Scaling, float]()
+    J = dict[Scaling, float]()
+    as_it_is = least(frozenset(), best, 1)
+
+    def is_close(value: float) -> bool:
+        return value < min((as_it_is, *J.values())) + _CLOSE
+
     while untried:  # The best explanation may need fewer channels than it has.
         J |= {one: least(one) for one in untried}
-        J |= {one: least(one) for one in untried if J[one] < min(J.values()) + _CLOSE}
+        J |= {one: least(one) for one in untried if is_close(J[one])}
         first = min(J, key=lambda one: J[one])
-        fewer = set[Scaling]() if first in frames else {first - {member} for member in first}
+        fewer = set[Scaling]() if first in frames or not is_close(J[first]) else {first - {member} for member in first}
         untried = fewer - J.keys() - {frozenset()}
-    if as_it_is < min(J.values()) + _CLOSE:
+    if is_close(J[first]) and is_close(as_it_is):
         as_it_is = least(frozenset())
     most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
     for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
