@@ -156,12 +156,12 @@ def fit_all(
     for curve in () if is_wrong else measured:
         other, needed = _bending(full, full.table.known.bent | {curve}), evidence_at(full, near) + KEPT
 
-        def bends(value: float, information: Array, other: Objective = other, needed: float = needed) -> bool:
+        def bends(value: float, information: Array, _: float, other: Objective = other, needed: float = needed) -> bool:
             return evidence(other, value, information) > needed
 
         show = work.steps("shape of the thrust", f"the shape of the thrust of {curve}")
         found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
-        if bends(found.value, found.information):
+        if bends(found.value, found.information, 0.0):
             full, near = other, minimise(other, found.z, last=False)
     best = near
     if not is_wrong:

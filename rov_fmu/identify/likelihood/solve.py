@@ -58,20 +58,22 @@ def minimise(
     most: int = MOST_STEPS,
     enough: float = ENOUGH,
     last: bool = True,
-    promises: Callable[[float, Array], bool] | None = None,
+    promises: Callable[[float, Array, float], bool] | None = None,
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
     All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The first
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
-    less than `enough`, the second time exact ones, and early where J within reach, with the information, promises
-    nothing. Data and information of a `last` fit have exact derivatives: those of the step before if J hardly fell, and
-    otherwise others, after one more step with them, unless motions beside the minimum diverge. Those of a fit that is
-    not the last are of the step before.
+    less than `enough`, the second time exact ones. It ends early where nothing promises more, by J within reach, the
+    information, and the reduction of J by the derivatives before, which is infinite at first. Data and information of a
+    `last` fit have exact derivatives: those of the step before if J hardly fell, and otherwise others, after one more
+    step with them, unless motions beside the minimum diverge. Those of a fit that is not the last are of the step
+    before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
     now, stalled = Minimum(z, objective.value(z, runs), runs, near, np.diag(2.0 / objective.deviation**2)), 0
+    gain = np.inf
     for count in range(1, most + 1):
         on_step(count)
         try:
@@ -85,13 +87,14 @@ def minimise(
                 raise
             break
         before = now = replace(now, data=data, information=information)
-        if promises and not promises(*_within_reach(objective, now)):
+        if promises and not promises(*_within_reach(objective, now), gain):
             break
         now = _descended(objective, now)
-        stalled = stalled + 1 if before.value - now.value < enough else 0
+        gain = before.value - now.value
+        stalled = stalled + 1 if gain < enough else 0
         if stalled == _STALLED:
             break
-    if last and not (stalled == _STALLED and before.value - now.value < ENOUGH):
+    if last and not (stalled == _STALLED and gain < ENOUGH):
         try:
             now = _descended(objective, replace(now, data=objective.data(now.z, now.runs)))
         except DivergedError:  # beside the minimum; the derivatives of the step before are near

@@ -70,7 +70,7 @@ def _evidence(objective: Objective, best: Minimum, posterior: Posterior, index: 
         first = evidence(objective.value(z, objective.runs(z, best.runs)))
         if first <= KEPT:
             return first
-        end = minimise(without, z, near=best.data, most=_STEPS, last=False, promises=lambda J, _: evidence(J) <= KEPT)
+        end = minimise(without, z, near=best.data, most=_STEPS, last=False, promises=lambda J, *_: evidence(J) <= KEPT)
         return evidence(end.value)
     except DivergedError:
         return inf

@@ -50,6 +50,8 @@ and the water inside change from dive to dive."""
 _CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
 """The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
 which difference of J quick fits go on to their end: the evidence of a slip is hundreds."""
+_LEFT = 10.0
+"""A fit goes on while J may still fall by so many times what it just fell by: each step by 0.9 of the step before."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -127,8 +129,8 @@ def slips(
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
         unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
-        def promises(value: float, _: Array) -> bool:
-            return is_close(value + unlikely)
+        def promises(value: float, _: Array, gain: float) -> bool:
+            return not scaling or is_close(value - _LEFT * gain + unlikely)
 
         try:
             if is_exact := scaling in fits:
@@ -137,7 +139,7 @@ def slips(
                 quick = applied(_corrected(tests, scaling), starts or {}, thinned=True)
                 start = start_of(quick) if start is None else start
             enough = ENOUGH if is_exact else QUICK
-            end = minimise(quick, start, most=most, enough=enough, last=False, promises=promises if scaling else None)
+            end = minimise(quick, start, most=most, enough=enough, last=False, promises=promises)
         except DivergedError:
             return inf
         fits[scaling] = quick, end

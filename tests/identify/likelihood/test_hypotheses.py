@@ -708,16 +708,16 @@ def test_a_hypothesis_leaves_if_a_later_one_explains_as_much_without_it(
     scores = {frozenset[Suspect](): 0.0, frozenset({DEAD, REVERSED}): 30.0}
     scores |= {frozenset({REVERSED}): alone, frozenset({DEAD}): 12.0}
 
-    def fit(_: object, starts: Starts, *__: object) -> StructureFit:
+    def fit(_: object, __: object, starts: Starts, *___: object) -> StructureFit:
         score = scores[frozenset(starts)]
         return StructureFit(starts, reversed_model, cast("Minimum", None), score, score)
 
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
     monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
-    search = StructureSearch(fit(None, {}))
+    search = StructureSearch(fit(None, None, {}))
     search.suspects, search.apart = {REVERSED: (None,), DEAD: (0.5,)}, {}
-    search.now = fit(None, {DEAD: 0.5, REVERSED: None})
+    search.now = fit(None, None, {DEAD: 0.5, REVERSED: None})
     search.tried[frozenset(search.now.starts)] = search.now
     search.run()
     assert {*search.odds} == {*names}
@@ -746,7 +746,7 @@ def test_another_minimum_is_no_evidence_for_a_hypothesis(
     def fit(starts: Starts, score: float) -> StructureFit:
         return StructureFit(starts, reversed_model, cast("Minimum", None), score, 0.0)
 
-    monkeypatch.setattr("rov_fmu.identify.likelihood.search.refitted", lambda _, starts, *__: fit(starts, again))
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", lambda _, __, starts, *___: fit(starts, again))
     monkeypatch.setattr("rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {})
     monkeypatch.setattr(
         StructureFit, "needed", property(lambda self: {k: z for k, z in self.starts.items() if k != DEAD})
@@ -769,7 +769,7 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch
     near = minimise(quick, start_of(quick), enough=8.0, last=False)
     start = evidence(quick, near.value, near.information)
     search = StructureSearch(StructureFit({}, quick, near, start, start))
-    dead = fitted(reversed_model, {DEAD: 0.0}, 0.0)
+    dead = fitted(search.now, reversed_model, {DEAD: 0.0}, 0.0)
     assert dead
     assert dead.score > search.now.score
     search.tried[frozenset({DEAD})] = search.now = dead
