@@ -23,10 +23,6 @@ from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.vehicle import Vehicle
-
-UNKNOWN = 1.0
-"""The value of a coefficient that is yet to be identified."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +33,10 @@ class Tests:
     """Its findings also tell what was left out of the vehicle and of the files, and its inputs have the base, too."""
     logged: Collection[str]
     """The names of the axes that logs test."""
-    vehicle: Vehicle
-    """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
-    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
-    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
+    layout: Layout
+    """The axes that are tested or known, and the thrusters that act on them. Of the coefficients to be identified, it
+    has only those that every curve and axis needs. The fits add reverse thrust, dead band, lag and load if they find
+    them."""
     known: Mapping[str, Quantity]
     """The coefficients that are given, not identified."""
     base: Mapping[str, float]
@@ -61,8 +57,7 @@ class Tests:
 
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
-        layout = self.vehicle.layout
-        names = layout.curves_by_name if kind == "thrust" else layout.by_name
+        names = self.layout.curves_by_name if kind == "thrust" else self.layout.by_name
         for (other, subject), some in self.folder.rows.items():
             if other == kind and subject in names:
                 yield subject, some
@@ -82,7 +77,7 @@ def narrowed(folder: Folder, description: Description, logged: Collection[str], 
     known = {**_kept_from_base(folder, description, logged), **description.known}
     tested = axes_of(folder, logged)
     wide = _without_unknown_options(description.layout, known)
-    axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
+    axes = [a for a in wide.bare_axes if a.name in tested or {a.coefficient("a_d"), a.coefficient("b_d")} <= {*known}]
     layout = with_axes_alone(wide, axes)
     if not layout.axes:
         line = f"{folder.path}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
@@ -104,12 +99,11 @@ def narrowed(folder: Folder, description: Description, logged: Collection[str], 
         folder.mistakes += lines_on(folder.path, tests)
         return None
     folder.findings[:0] = _left_out(folder, description, layout)
-    names = layout.coefficients
     return Tests(
         folder=folder,
         logged=logged,
-        vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
-        known={name: known[name] for name in names if name in known},
+        layout=layout,
+        known={name: known[name] for name in layout.coefficients if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
         thrusters=own,
     )
@@ -144,10 +138,6 @@ def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
     kinds = AXIS | CURVE
     deep = replace(layout, surface=False)
     return deep.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
-
-
-def _is_tested_or_known(axis: Axis, tested: Collection[str], known: Collection[str]) -> bool:
-    return axis.name in tested or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
 
 
 def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
@@ -189,27 +179,23 @@ def thrusters_along_no_other(layout: Layout, axes: Collection[Axis], kept: Colle
     return [] if layout.has_wrench else [name for name in along if name not in driving]
 
 
-def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
-    """Return the vehicle, also with the axes about which nothing is known but on whose motion those shown depend.
+def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Layout:
+    """Return the layout, also with the axes about which nothing is known but on whose motion those shown depend.
 
     The thrusters that turn a vehicle in a dive move it along these axes, too, and this motion takes thrust from them.
     Without a turn, such an axis takes thrust from no other. An axis is left out where more thrusters push along it. If
     the axes are coupled, unseen motion would turn the vehicle by moments that nothing tells, so none is added.
     """
-    vehicle, base = tests.vehicle, tests.base
-    layout, wide = vehicle.layout, _without_unknown_options(tests.description.layout, tests.known)
+    layout, wide = tests.layout, _without_unknown_options(tests.description.layout, tests.known)
 
     def is_unseen(axis: Axis) -> bool:
         pushing = {*wide.thrusters_along(axis)}
-        return not axis.is_rotation and axis.inertia in base and bool(pushing) and pushing <= {*layout.thrusters}
+        return not axis.is_rotation and axis.inertia in tests.base and bool(pushing) and pushing <= {*layout.thrusters}
 
-    axes = [form.axis for form in wide.axes if layout.has(form.axis) or is_unseen(form.axis)]
+    axes = [axis for axis in wide.bare_axes if layout.has(axis) or is_unseen(axis)]
     turns = any(axis.is_rotation for axis in shown)
-    if layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes):
-        return vehicle
-    layout = with_axes_alone(wide, axes)
-    values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}
-    return Vehicle(layout, {**values, **vehicle.coefficients})
+    is_whole = layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes)
+    return layout if is_whole else with_axes_alone(wide, axes)
 
 
 def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:

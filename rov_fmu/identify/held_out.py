@@ -249,17 +249,14 @@ def ahead(
 # ---- Rows of tables --------------------------------------------------------------------------------------------------
 
 
-def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
-    """Yield the rows of tables with what the vehicle says about them, also held out."""
-    for row, table_row in table_rows(tests, vehicle.layout, kind):
-        subject = table_row.subject.name
-        if only and subject != only:
-            continue
-        unit = {"thrust": "N", "time_constant": "s"}.get(kind) or AXES[subject].unit
-        out = values.get((table_row.quantity, subject, row.command), np.nan)
-        counts = tests.folder.counts(kind, subject, row.command)
-        numbers = row.command, row.value, float(modelled([table_row], vehicle, NO_SHAPES)[0]), out
-        yield Point(subject, table_row.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+def points_of(tests: Tests, values: Values, vehicle: Vehicle) -> Iterator[Point]:
+    """Yield the rows of all tables with what the vehicle says about them, also held out."""
+    for row, file, counts in table_rows(tests, vehicle.layout):
+        subject = row.subject.name
+        unit = {"force": "N", "Tau": "s"}.get(row.quantity) or AXES[subject].unit
+        out = values.get((row.quantity, subject, row.command), np.nan)
+        numbers = row.command, row.measured, float(modelled([row], vehicle, NO_SHAPES)[0]), out
+        yield Point(subject, row.quantity, unit, file, *numbers, counts)  # type: ignore[arg-type]
 
 
 def held_out_rows(objective: Objective, best: Minimum) -> Values:

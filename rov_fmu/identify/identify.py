@@ -15,7 +15,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
 from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
-from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
+from rov_fmu.identify.held_out import HeldOut, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -31,6 +31,7 @@ from rov_fmu.identify.result import (
     Disturbance,
     Effect,
     Identification,
+    Point,
     Prediction,
     Slip,
     Tested,
@@ -96,7 +97,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = wrong or slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts)[0]
-    values = held_out_rows(fit.objective, fit.best)
+    points = [*points_of(tests, held_out_rows(fit.objective, fit.best), vehicle)]
     effects = tuple(effects_of(fit))
     of_file = with_own_inputs(vehicle, tests)
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
@@ -104,7 +105,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
         push = assess.push_of_thrusters(vehicle, of_file, axis)
         of_axis = axis, tested[axis], push
-        found = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)
+        found = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, points, effects)
         if against and against.layout.has(axis):
             found = replace(found, compared=assess.answers_of_file(against, axis))
         axes.append(found)
@@ -120,7 +121,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         axes=tuple(axes),
         axes_of_base=tuple(_of_base(tests, fit, of_file)),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
-        forces=tuple(points_of(tests, values, vehicle, "thrust")),
+        forces=tuple(p for p in points if p.quantity == "force"),
         effects=effects,
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
@@ -149,7 +150,7 @@ def _axis(
     predicted: Sequence[Prediction],
     slow: Sequence[Disturbance],
     wrong: Sequence[Slip],
-    values: Values,
+    points: Sequence[Point],
     effects: Sequence[Effect],
 ) -> AxisResult:
     is_told = _is_thrust_told(tests, vehicle, axis)
@@ -168,7 +169,6 @@ def _axis(
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
-    steady, times = (points_of(tests, values, vehicle, kind, axis.name) for kind in ("steady", "time_constant"))
     limits = tests.description.tables.limits
     shown = replace(fit.posterior, z=fit.file.posterior.z)
     result = AxisResult(
@@ -177,7 +177,7 @@ def _axis(
         tested=tested_own,
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
-        points=(*steady, *times),
+        points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
         structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
         disturbances=[d for d in slow if d.concerns(axis)],

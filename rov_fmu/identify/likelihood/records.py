@@ -246,14 +246,9 @@ class SampledLog:
         return replace(m, channel=replace(m.channel, time=m.channel.time[kept], values=m.channel.values[kept]))
 
     @property
-    def has_positions(self) -> bool:
-        """True if a horizontal position is measured."""
-        return any(not s.is_velocity and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors)
-
-    @property
-    def has_velocities(self) -> bool:
-        """True if a horizontal velocity over ground is measured."""
-        return any(s.is_horizontal_velocity for s in self.record.sensors)
+    def shows_horizontal(self) -> bool:
+        """True if a horizontal position is measured, or a horizontal velocity over ground."""
+        return any(s.is_level and (s.over_ground or not s.is_velocity) for s in self.record.sensors)
 
     def vehicle(self, coefficients: Mapping[str, float]) -> Vehicle:
         """Return the part of a vehicle that the log concerns."""
