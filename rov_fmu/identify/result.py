@@ -259,7 +259,6 @@ class Structure:
     model is then without it."""
     value: float = nan
     """The number of its parameter; NaN if it has none."""
-    interval: Interval = (nan, nan)
     unit: str = "1"
     words: tuple[tuple[str, str], ...] = ()
     """What else its sentence needs."""

@@ -6,12 +6,14 @@ which keeps what they tell and bounds the time of a fit.
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, inf, pi, sin
+from math import inf, pi
 from typing import Any
 
 import numpy as np
 
+from rov_fmu.equation.attitude import INITIAL, QUATERNION, start_formulas
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
@@ -217,7 +219,7 @@ class SampledLog:
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
-            angles = {"psi", *_quaternion(0.0, 0.0, 0.0)} & {*start}
+            angles = {"psi", *QUATERNION} & {*start}
             start = {**start, **{name: _start(measured, self.layout, ())[0][name] for name in angles}}
             errors = {**errors, **dict.fromkeys(angles, _UNKNOWN_ANGLE)}
 
@@ -545,10 +547,8 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
         for n, v in enumerate(value):
             if abs(v - value[kept[-1]]) > _LEAST_CHANGE * abs(value[kept[-1]]):
                 kept.append(n)
-        changes = np.setdiff1d(time[kept], told)
-        told, since = np.concatenate([told, changes]), np.concatenate([since, changes])
-        order = np.argsort(told)
-        told, since = told[order], since[order]
+        rows = np.union1d(told, time[kept])
+        told, since = rows, np.where(np.isin(rows, told), held(told, since, rows), rows)
     inputs = np.zeros((len(told), len(layout.inputs)))
     names = [*layout.inputs]
     values = commands.at(told)
@@ -574,6 +574,9 @@ def _tilt(log: Log, layout: Layout) -> Array:
     if min(len(times), len(time)) < LEAST_SAMPLES:
         return np.zeros((3, 0))
     return np.array([time, np.interp(time, times, rolls), pitches])
+
+
+_attitude = compiled(start_formulas())
 
 
 def _start(
@@ -607,23 +610,12 @@ def _start(
                 errors[position] = _CALM
     angles = [of(axis, is_velocity=False) for axis in (ROLL, PITCH, YAW)]
     if layout.has_attitude:
-        phi, theta, psi = (angle[0] if angle else 0.0 for angle in angles)
-        start |= _quaternion(phi, theta, psi)
-        errors |= dict.fromkeys(_quaternion(0.0, 0.0, 0.0), _LEVEL)
+        attitude = _attitude({name: angle[0] if angle else 0.0 for name, angle in zip(INITIAL, angles, strict=True)})
+        start |= {name: attitude[name] for name in QUATERNION}
+        errors |= dict.fromkeys(QUATERNION, _LEVEL)
     elif "psi" in layout.state:
         start["psi"], errors["psi"] = angles[2] or (0.0, _LEVEL)
     return start, errors
-
-
-def _quaternion(phi: float, theta: float, psi: float) -> dict[str, float]:
-    """Return the quaternion of Euler angles (zyx), rad."""
-    (a, b, c), (d, e, f) = ([g(0.5 * angle) for angle in (phi, theta, psi)] for g in (cos, sin))
-    return {
-        "eta": a * b * c + d * e * f,
-        "epsilon_1": d * b * c - a * e * f,
-        "epsilon_2": a * e * c + d * b * f,
-        "epsilon_3": a * b * f - d * e * c,
-    }
 
 
 def typical(some: Sequence[SampledLog], axis: Axis) -> float:
