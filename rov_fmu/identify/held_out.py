@@ -170,7 +170,9 @@ def _predicted(
 ) -> Iterator[Prediction]:
     """Yield the predictions of what is held out: over its whole length, and over a shorter time.
 
-    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows.
+    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows. The
+    vehicle to compare with has the usual noise. That of a fit is too small for it: the filter would explain its errors
+    by a thrust that fades to 0.
     """
     sampled, record = objective.logs[out.log], objective.records[out.log]
     inside = np.zeros(len(record.time), bool)
@@ -179,7 +181,7 @@ def _predicted(
     for span in (inf, sampled.horizon):
         try:
             off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
-            usual = _usual_noise(objective, z)
+            usual = np.where(objective.table.each("of_motion"), z, objective.mean)
             compared = objective.run(usual, out.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
@@ -210,14 +212,6 @@ def _predicted(
                 loss=cost(off, deviation**2) / len(off),
                 compared=measured - compared.innovations[at] if compared else None,
             )
-
-
-def _usual_noise(objective: Objective, z: Array) -> Array:
-    """Return the parameters with the means of the priors of the noise, for a vehicle that was not fitted.
-
-    The noise of a fit is too small for it: the filter would explain its errors by a thrust that fades to 0.
-    """
-    return np.where(objective.table.each("of_motion"), z, objective.mean)
 
 
 def ahead(

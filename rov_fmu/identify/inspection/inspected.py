@@ -83,16 +83,11 @@ class Inspected:
         return Output(self.path, completed(self.own, self.text).encode())
 
     @property
-    def dives(self) -> list[Log]:
-        """The logs with commands, each with the channels of the files without commands that belong to it."""
-        return _dives(self.path, self.logs)
-
-    @property
     def undetermined(self) -> list[str]:
         """A sentence for everything that the logs cannot determine, whatever a fit finds."""
         if not self.description:
             return []
-        dives = self.dives
+        dives = _dives(self.path, self.logs)
         if self.description.layout.has_wrench:
             dives = [replace(log, commands=c.relative_to(c.largest)) for log in dives if (c := log.commands)]
         unread = [title for one in self.logs for title in one.unread]

@@ -133,7 +133,6 @@ class Table:
     full: Mapping[str, float]
     """By axis: the thrust or torque at full command, N or N m."""
     parameters: tuple[Parameter, ...]
-    shape_deviation: float = PRIORS["thrust_shape"].deviation
     exact: frozenset[str] = frozenset()
     """The names of the coefficients that no parameter changes."""
     prior: Prior | None = None
@@ -238,8 +237,9 @@ class Table:
     def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
         deviations, bands = {}, {}
         for curve in self.layout.curves:
-            if (first := self.index("thrust shape", curve.name, "1")) is not None:
-                deviations[curve.name] = self.shape_deviation * z[first : first + COUNT]
+            is_exact = {curve.coefficient("a_t"), curve.coefficient("b_t")} <= self.exact
+            if (first := self.index("thrust shape", curve.name, "1")) is not None and not is_exact:
+                deviations[curve.name] = self.parameters[first].number(z[first : first + COUNT])
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
@@ -288,7 +288,7 @@ class Table:
             ahead = values.get(names.get((*part, key.removesuffix(REVERSE)), ""))
             if name not in values and tuple(part) in parts and (value := ABSENT.get(key, ahead)) is not None:
                 values[name] = value
-        return replace(self, base={**self.base, **values}, exact=frozenset(values), shape_deviation=0.0)
+        return replace(self, base={**self.base, **values}, exact=frozenset(values))
 
     def of_log(self, z: Array, sampled: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
@@ -425,9 +425,8 @@ def _ramped(values: Sequence[float], spans: Sequence[float], rise: float) -> Ite
 
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
-    shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
     parameters = tuple(p for p in _parameters(known, logs, row_noises) if p.deviation > 0.0)
-    return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact, known)
+    return Table(known.layout, known.coefficients, known.full, parameters, known.exact, known)
 
 
 Make = Callable[..., Parameter]
@@ -490,7 +489,7 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
-            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0) for n in range(COUNT)]
+            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0, factor=shape) for n in range(COUNT)]
             linear = [
                 make(
                     "linear thrust",

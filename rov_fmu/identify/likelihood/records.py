@@ -394,8 +394,8 @@ def lost_between_rows(log: Log, layout: Layout) -> dict[str, float]:
         return {}
     if len({*commands.time.tolist()}) < _MOST_CHANGE * len(commands.rows):
         return {}
-    values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
-    pushes = {form.axis.name: push_along(layout, form.axis, values) for form in layout.axes}
+    values = commands.in_rows
+    pushes = {axis.name: push_along(layout, axis, values) for axis in layout.bare_axes}
     lost = {axis: beside_lines(push) for axis, push in pushes.items() if np.ptp(push) > LEAST_COMMAND}
     return {axis: share for axis, share in lost.items() if share > _LEAST_LOST}
 
