@@ -4,8 +4,9 @@ Nothing is resampled onto a common grid. Samples that come faster than the vehic
 which keeps what they tell and bounds the time of a fit.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from math import inf, pi
 from typing import Any
 
@@ -17,10 +18,11 @@ from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, gaps, held
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps_in_words, jumps
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -80,6 +82,11 @@ class SampledChannel:
     noise: float
     """A first guess of the standard deviation of its white noise, SI units."""
 
+    def some_of(self, kept: Flags) -> "SampledChannel":
+        """Return the channel with some of its samples."""
+        time, values = self.channel.time[kept], self.channel.values[kept]
+        return replace(self, channel=replace(self.channel, time=time, values=values))
+
 
 @dataclass(frozen=True, eq=False)
 class SampledLog:
@@ -112,9 +119,13 @@ class SampledLog:
         """True if commands change at times that its rows do not tell exactly."""
         return self.has_means or bool(self.lost)
 
+    def _changed(self, change: Callable[[Record], Record], **own: Any) -> "SampledLog":
+        """Return the log with a change of what the filter reads, of all samples and of fewer."""
+        return replace(self, record=change(self.record), thinned=change(self.thinned), **own)
+
     def _with_rows(self, **columns: Any) -> "SampledLog":
         """Return the log with other columns of its rows."""
-        return replace(self, record=replace(self.record, **columns), thinned=replace(self.thinned, **columns))
+        return self._changed(lambda record: replace(record, **columns))
 
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
@@ -137,27 +148,19 @@ class SampledLog:
         def counts(m: SampledChannel) -> SampledChannel:
             if not m.sensor.is_horizontal:
                 return m
-            later = m.channel.time >= time
-            left = replace(m, channel=replace(m.channel, time=m.channel.time[later], values=m.channel.values[later]))
+            left = m.some_of(m.channel.time >= time)
             return replace(left, noise=_least_noise(left)) if self.lost else left
 
-        def some(record: Record) -> Record:
+        def later(record: Record) -> Record:
             horizontal = np.array([sensor.is_horizontal for sensor in record.sensors])
             kept = (record.time >= time) | ~horizontal[record.sensor]
             some = [] if kept.all() else [s for s in record.sensors if s.is_horizontal]
             velocities = dict.fromkeys((s.axis.velocity for s in some if s.is_velocity), _CALM)
             positions = dict.fromkeys((DRIFTS[s.axis.place] for s in some if not s.is_velocity), _ANYWHERE)
-            return replace(
-                record,
-                time=record.time[kept],
-                value=record.value[kept],
-                sensor=record.sensor[kept],
-                start={**record.start, **dict.fromkeys(velocities, 0.0)},
-                errors={**record.errors, **velocities, **positions},
-            )
+            start = {**record.start, **dict.fromkeys(velocities, 0.0)}
+            return _some_of(record, kept, start=start, errors={**record.errors, **velocities, **positions})
 
-        measured = tuple(counts(m) for m in self.measured)
-        return replace(self, measured=measured, record=some(self.record), thinned=some(self.thinned), settled=time)
+        return self._changed(later, measured=tuple(map(counts, self.measured)), settled=time)
 
     @property
     def spans(self) -> Array:
@@ -215,7 +218,7 @@ class SampledLog:
         ]
         told = np.unique(np.concatenate([time for time, _ in columns]))
         then = [held(time, values, told) for time, values in columns]
-        made: dict[str, Any] = {"told": told, "since": told, "inputs": np.column_stack(then)}
+        made = {"told": told, "since": told, "inputs": np.column_stack(then)}
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
@@ -230,22 +233,17 @@ class SampledLog:
                 before, time = record.time[own[:-1]], record.time[own[1:]]
                 begin[own[1:]] = np.where(time - before > _GAP_OF_ROWS * span, time - span, before)
                 kept[own] = np.isin(record.time[own], m.channel.time)
-            columns: dict[str, Any] = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
             tilt = record.tilt - np.array([[0.5 * span], [0.0], [0.0]])
-            some: dict[str, Any] = {"start": start, "errors": errors, "averaged": begin[kept], "tilt": tilt}
-            return replace(record, **columns, **made, **some)
+            return _some_of(record, kept, **made, start=start, errors=errors, averaged=begin[kept], tilt=tilt)
 
-        full, thin = map(of_means, (self.record, self.thinned))
-        return replace(self, measured=tuple(measured), record=full, thinned=thin, lost={}, has_means=True)
+        return self._changed(of_means, measured=tuple(measured), lost={}, has_means=True)
 
     def _clear(self, m: SampledChannel) -> SampledChannel:
         """Return a channel without the means of an angle that may contain a jump by a full turn."""
         raw = self.log.used(m.channel.quantity.name)
         if raw is None or raw.unwrapped[1] is raw.samples[1]:
             return m
-        seam = 0.0 if raw.samples[1].min() > -_AT_SEAM else pi
-        kept = _clear_of(seam, m.channel.values)
-        return replace(m, channel=replace(m.channel, time=m.channel.time[kept], values=m.channel.values[kept]))
+        return m.some_of(_clear_of(0.0 if raw.samples[1].min() > -_AT_SEAM else pi, m.channel.values))
 
     @property
     def shows_horizontal(self) -> bool:
@@ -276,6 +274,12 @@ class SampledLog:
         after = np.pad(ends[1:], ((0, 1), (0, 0)))
         beside = np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2)
         return replace(self._with_rows(beside=beside), is_momentary=True)
+
+
+def _some_of(record: Record, kept: Flags, **columns: Any) -> Record:
+    """Return a record with some of its samples, and with other columns."""
+    samples = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
+    return replace(record, **samples, **columns)
 
 
 def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
@@ -365,20 +369,18 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     slowing: dict[Axis, bool] = {}
     findings = []
     for axis, channel in _channels(log, layout):
-        found = Finding("gaps", axis.name, file=channel.file or log.file, words={"quantity": channel.quantity.name})
+        file, quantity = channel.file or log.file, channel.quantity.name
         if kind := _why_left_out(channel):
             numbers = {"count": channel.count, "least": LEAST_SAMPLES} if kind == "too few samples" else {}
-            findings.append(replace(found, kind=kind, words={**found.words, **numbers}))
+            findings.append(about(file, kind, axis.name, quantity=quantity, **numbers))
             continue
-        measured.setdefault(axis, found.file)
+        measured.setdefault(axis, file)
         slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
-        if some := gaps(channel.time, channel.values):
-            assert log.commands
-            begin = float(log.commands.rows[0])
-            words = {**found.words, "gaps": gaps_in_words(some, begin), "count": len(some)}
-            findings.append(replace(found, words=words))
+        if log.commands and (some := gaps(channel.time, channel.values)):
+            words = gaps_in_words(some, float(log.commands.rows[0]))
+            findings.append(about(file, "gaps", axis.name, quantity=quantity, gaps=words, count=len(some)))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
-    findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
+    findings += [about(measured[axis], kind, axis.name) for axis, kind in kinds.items()]
     return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings
 
 
@@ -478,13 +480,10 @@ def _without_thrust(log: Log, layout: Layout, axis: Axis, slows_down: bool) -> s
     if not drivers:
         return "no thruster"
     strongest = max(abs(t.effect(axis)) for t in drivers)
-    for curve in {t.curve for t in drivers}:
-        own = [(t.effect(axis) / strongest, of[t.name]) for t in drivers if t.curve == curve and t.name in of]
-        for side in (1.0, -1.0):
-            for power in (1, 2):
-                thrust = sum((effect * np.clip(side * c, 0.0, 1.0) ** power for effect, c in own), np.zeros(1))
-                if np.ptp(thrust) > _LEAST_PUSH:
-                    return ""
+    by_curve = grouped((t.curve, (t.effect(axis) / strongest, of[t.name])) for t in drivers if t.name in of)
+    for own, side, power in product(by_curve.values(), (1.0, -1.0), (1, 2)):
+        if np.ptp(sum(effect * np.clip(side * c, 0.0, 1.0) ** power for effect, c in own)) > _LEAST_PUSH:
+            return ""
     moved = any(np.ptp(of[t.name]) > _LEAST_PUSH for t in drivers if t.name in of)
     return "cancelling thrusters" if moved else "constant push"
 
