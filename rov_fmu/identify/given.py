@@ -149,17 +149,14 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     layout = _with_axes(layout, axes)
     thrusters = tuple(t for t in layout.thrusters if any(t in layout.thrusters_along(axis) for axis in axes))
     fins = tuple(fin for fin in layout.fins if any(fin.effect(axis) for axis in axes))
-    names = {thruster.name for thruster in thrusters} | {fin.name for fin in fins}
-    mix = {
-        name: {thruster: gain for thruster, gain in gains.items() if thruster in names}
-        for name, gains in layout.mix.items()
-    }
+    names = {one.name for one in (*thrusters, *fins)}
+    gains_of = ((name, {one: gains[one] for one in gains if one in names}) for name, gains in layout.mix.items())
     layout = replace(
         layout,
         thrusters=thrusters,
         fins=fins,
-        mix={name: gains for name, gains in mix.items() if any(gains.values())},
-        coupled=layout.coupled and all(layout.has(axis) for axis in COUPLED_AXES),
+        mix={name: gains for name, gains in gains_of if any(gains.values())},
+        coupled=layout.coupled and all(map(layout.has, COUPLED_AXES)),
     )
     # An input that drives none of the axes has gains that cancel each other.
     driving = {name for axis in axes for name in layout.signs(axis)}
