@@ -124,7 +124,7 @@ def _kept_from_base(folder: Folder, description: Description, logged: Collection
         name = form.axis.name
         tests = {"log": name in logged, "steady": name in steady, "time_constant": name in times}
         tests["astern"] = steady.get(name, False)
-        told = (kind for kind in KINDS.values() if any(tests[test] for test in kind.told_by))
+        told = (kind for kind in KINDS.values() if any(map(tests.get, kind.told_by)))
         replaced |= {form.name_of(key) for kind in told for key in kind.keys}
     return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
 

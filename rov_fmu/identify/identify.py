@@ -13,7 +13,7 @@ from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
-from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
+from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_commanded, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
 from rov_fmu.identify.held_out import HeldOut, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
@@ -144,7 +144,8 @@ def _axis(
     points: Sequence[Point],
 ) -> AxisResult:
     """Return what concerns an axis; `found` has what concerns all axes, and `vehicle` is that of the fit."""
-    is_told = _is_thrust_told(tests, vehicle, axis)
+    # The thrust of a wrench is the largest force in the logs, if there is any.
+    is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
     fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in found.disturbances if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
@@ -205,13 +206,6 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
         source = ROV_FILE if is_of_file else description.base_name
         lost = thrusters_along_no_other(description.layout, [axis], vehicle.layout.bare_axes) if axis in lacking else ()
         yield AxisOfBase(axis, "" if axis in lacking else source, told, tuple(lost))
-
-
-def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:
-    """Return False if the thrust along an axis is the largest force of the logs, and none of them has any."""
-    drivers = {thruster.name for thruster in vehicle.layout.thrusters_along(axis)}
-    largest = (most for log in tests.folder.logs if log.commands for most in log.commands.largest.items())
-    return not vehicle.layout.has_wrench or any(most for name, most in largest if name in drivers)
 
 
 def _those_of(coefficients: Mapping[str, Coefficient], part: Part, *more: str) -> tuple[Coefficient, ...]:

@@ -168,7 +168,10 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
         headers=headers,
         name=name,
     )
-    return inspected if own else replace(inspected, description=_drafted(inspected).description)
+    if own:
+        return inspected
+    drafted = inspected.draft_for(None) if likely.base else Draft(lacks, "")
+    return replace(inspected, description=read_description(path, draft=drafted).description)
 
 
 def _dives(path: Path, inspections: Sequence[Inspection]) -> list[Log]:
@@ -201,9 +204,3 @@ def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:
     """Return True if a rov.toml that has no vehicle stands for that of the paper, and the logs do not contradict it."""
     layout = described.description.layout if described.description else Layout((), (), ())
     return {*likely.thrusters} <= {thruster.name for thruster in layout.thrusters} | {COMMAND}
-
-
-def _drafted(inspected: Inspected) -> RovFile:
-    """Return what the draft says of the vehicle."""
-    draft = inspected.draft_for(None) if inspected.likely.base else Draft(inspected.text, "")
-    return read_description(inspected.path, draft=draft)

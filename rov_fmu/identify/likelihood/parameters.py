@@ -50,10 +50,10 @@ HORIZONTAL = "horizontal"
 """What has a slow velocity along no axis of the body."""
 CURRENT = ("to the north", "to the east")
 """The parts of a current."""
-_PLACES = ("forward", "to starboard", "down")
-"""The parts of the place of a sensor."""
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
+_PLACES = (*CENTRE,)
+"""The parts of the place of a sensor."""
 _LEAST_POWER = -0.9
 """The least q of quadratic drag. With -1, it would be linear drag once more."""
 _MOTION_STEP = 3e-6
@@ -507,11 +507,10 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
             # Forces that were measured astern are data, and not an effect that may be absent.
             null = {"null": None} if is_told_astern else {}
             yield make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
-        if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
-            band = curve.coefficient("c_0")
+        band, astern = (curve.coefficient(f"c_0{end}") for end in ("", REVERSE))
+        if "c_0" in curve.keys and band not in known.exact and shape:
             yield make("dead band", name, mean=known.coefficients[band], parts=[curve])
-            astern = curve.coefficient(f"c_0{REVERSE}")
-            if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
+            if is_told_astern and astern not in known.exact | {band}:
                 yield make("dead band astern", name)
 
 
