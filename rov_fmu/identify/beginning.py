@@ -141,7 +141,7 @@ def _driven_together(folder: Folder) -> Iterator[Finding]:
     """Yield a finding for each axis that a log measures, but that the thrusters drive only together with others."""
     if folder.layout and folder.logged:
         for log in folder.logs:
-            for axis in (form.axis for form in folder.layout.axes if not folder.logged.has(form.axis)):
+            for axis in (axis for axis in folder.layout.bare_axes if not folder.logged.has(axis)):
                 is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
                 if is_measured and not log.axis and axis not in (ROLL, PITCH):
                     yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
@@ -266,13 +266,12 @@ def _extended(
     layout, of_voltage = _with_voltage(layout, tests)
     values, more = of_voltage | values, dict[str, float]()
     logged, steady = {*tests.logged}, tests.folder.astern("steady")
-    for form in layout.axes:
-        axis = form.axis
-        if axis.name in logged or steady.get(axis.name):
-            more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
-        is_loaded = axis.name in logged or steady.get(axis.name) or axis in shown
-        if is_loaded and not (centres and axis in (ROLL, PITCH)):
-            more[form.name_of("F_0")] = ABSENT["F_0"]
+    for axis in layout.bare_axes:
+        is_tested = axis.name in logged or steady.get(axis.name)
+        if is_tested:
+            more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
+        if (is_tested or axis in shown) and not (centres and axis in (ROLL, PITCH)):
+            more[axis.coefficient("F_0")] = ABSENT["F_0"]
     exact = deviations.get("thrust") == 0.0
     for curve in layout.curves:
         if not curve.tables and not exact:

@@ -415,7 +415,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
                     p.file,
                     f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
                 )
-    pushed: dict[str, list[str]] = {}
+    pushed = list[tuple[str, str]]()
     for d in identification.disturbances:
         others = (f for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file)
         most = max((rms(f.force) for f in others), default=inf)
@@ -428,8 +428,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
             and d.value > _ODD * most
         ):
             size, other = size_in_words(d.value, d.unit), size_in_words(most, d.unit)
-            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
-    for file, forces_of in pushed.items():
+            pushed.append((d.file, f"{size} in {d.axis.name} (at most {other} in the other logs)"))
+    for file, forces_of in grouped(pushed).items():
         acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
         yield file, f"{acting} Check the thrusters and the tether of that dive."
 

@@ -23,6 +23,7 @@ from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Identification, Interval
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
@@ -367,17 +368,17 @@ def tested_ranges(identification: Identification) -> Iterator[Range]:
 
     The ends have three digits, and an end that is next to nothing is no range.
     """
-    ends_of: dict[str, list[float]] = {}
-    for log in identification.folder.logs:
-        for channel in log.channels:
-            if not channel.unused and (name := _variable(channel.quantity)):
-                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                ends_of.setdefault(name, []).extend(ends)
-    for result in identification.axes:
-        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
-        if measured:
-            ends_of.setdefault(result.axis.velocity, []).extend(measured)
-    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
+    used = (c for log in identification.folder.logs for c in log.channels if not c.unused)
+    ends_of = [
+        (name, float(np.nanquantile(channel.values, share)))
+        for channel in used
+        if (name := _variable(channel.quantity))
+        for share in _WITHOUT_OUTLIERS
+    ]
+    steady = ((one.axis, p) for one in identification.axes for p in one.points if p.quantity == "V_ss")
+    ends_of += [(axis.velocity, p.measured) for axis, p in steady]
+    found = grouped(ends_of).items()
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found}
     if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
         yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
         yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)

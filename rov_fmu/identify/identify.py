@@ -195,7 +195,7 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
     shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
     lacking = [AXES[f.axis] for f in tests.folder.findings if f.kind in ("axis left out", "axis not pushed")]
-    for axis in (*(one.axis for one in vehicle.layout.axes if one.axis not in fit.known.fitted), *lacking):
+    for axis in (*(axis for axis in vehicle.layout.bare_axes if axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known
         told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
         if axis.name in tests.axes:

@@ -193,7 +193,7 @@ def _guess(found: Moved, description: Description | None, own: Toml) -> Guess:
     mistakes.
     """
     if description and description.has_hardware_tables:
-        found = replace(found, driven=frozenset(form.axis for form in description.logged.axes))
+        found = replace(found, driven=frozenset(description.logged.bare_axes))
     mass: object = own
     for key in ("body", "m_rov", "value"):
         mass = mass.get(key) if isinstance(mass, dict) else None

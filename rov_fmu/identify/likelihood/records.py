@@ -20,7 +20,7 @@ from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sen
 from rov_fmu.identify.result import least_error
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
-from rov_fmu.tank.clocks import first_in_each, gaps, held
+from rov_fmu.tank.clocks import first_in_each, gaps, held, in_rows
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
@@ -208,17 +208,16 @@ class SampledLog:
         these is also between others: then it changed gradually. An angle whose mean may contain a jump by a full turn
         is left out.
         """
-        commands, names = self.log.commands, [*self.layout.inputs]
+        commands = self.log.commands
         assert commands
         span, rows = self.interval, np.union1d(commands.rows, self.record.told)
         inputs = held(self.record.told, self.record.inputs, rows)
-        columns = [
-            _steps(rows, column, span) if name in self.layout.commands else (rows, column)
-            for name, column in zip(names, inputs.T, strict=True)
-        ]
-        told = np.unique(np.concatenate([time for time, _ in columns]))
-        then = [held(time, values, told) for time, values in columns]
-        made = {"told": told, "since": told, "inputs": np.column_stack(then)}
+        columns = {
+            name: _steps(rows, column, span) if name in self.layout.commands else (rows, column)
+            for name, column in zip(self.layout.inputs, inputs.T, strict=True)
+        }
+        told, then = in_rows(columns)
+        made = {"told": told, "since": told, "inputs": np.column_stack([*then.values()])}
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
@@ -593,8 +592,7 @@ def _start(
         m = first.get((axis.name, is_velocity))
         return (float(m.channel.values[0]), 3.0 * m.noise) if m else None
 
-    for form in layout.axes:
-        axis = form.axis
+    for axis in layout.bare_axes:
         if value := of(axis, is_velocity=True):
             start[axis.velocity], errors[axis.velocity] = value[0], value[1] + 0.1 * _CALM
         elif (m := first.get((axis.name, False))) and (axis in (HEAVE, YAW) or len(layout.axes) == 1):
