@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone, with_unseen_axes
+from rov_fmu.identify.given import Tests, narrowed, with_axes_alone, with_unseen_axes
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.posterior import QUANTILE
@@ -77,7 +77,7 @@ def load_tests(
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
         useless.append(_refusal(folder, log, told))
-    tested = axes_of(contents, logged)
+    tested = {*contents.astern("steady"), *contents.astern("time_constant"), *logged}
     useless = [] if tested else useless
     if not contents.astern("thrust"):
         contents.mistakes += useless
@@ -85,7 +85,7 @@ def load_tests(
     tests = None
     # If no axis was found, it may be in a file that could not be read.
     if description and (tested or not contents.mistakes):
-        tests = narrowed(contents, description, [*logged], useless)
+        tests = narrowed(contents, description, [*logged], tested, useless)
     contents.rov_file_mistakes += _wrong_priors(contents)
     if mistakes := [*contents.rov_file_mistakes, *contents.mistakes]:
         raise (DataFileError if contents.mistakes else VehicleFileError)(*mistakes)

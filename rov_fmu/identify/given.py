@@ -33,6 +33,8 @@ class Tests:
     """Its findings also tell what was left out of the vehicle and of the files, and its inputs have the base, too."""
     logged: Collection[str]
     """The names of the axes that logs test."""
+    axes: Collection[str]
+    """The names of all axes that are tested."""
     layout: Layout
     """The axes that are tested or known, and the thrusters that act on them. Of the coefficients to be identified, it
     has only those that every curve and axis needs. The fits add reverse thrust, dead band, lag and load if they find
@@ -50,11 +52,6 @@ class Tests:
         assert self.folder.rov_file.description
         return self.folder.rov_file.description
 
-    @property
-    def axes(self) -> set[str]:
-        """The names of all axes that are tested."""
-        return axes_of(self.folder, self.logged)
-
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
         names = self.layout.curves_by_name if kind == "thrust" else self.layout.by_name
@@ -63,19 +60,20 @@ class Tests:
                 yield subject, some
 
 
-def axes_of(folder: Folder, logged: Collection[str]) -> set[str]:
-    """Return the names of all axes that are tested, from those that logs test."""
-    return {*folder.astern("steady"), *folder.astern("time_constant"), *logged}
-
-
-def narrowed(folder: Folder, description: Description, logged: Collection[str], useless: Sequence[str]) -> Tests | None:
+def narrowed(
+    folder: Folder,
+    description: Description,
+    logged: Collection[str],
+    tested: Collection[str],
+    useless: Sequence[str],
+) -> Tests | None:
     """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
 
     The mistakes are added to those of the folder, and there is no vehicle then. `logged` has the axes that logs test,
-    and `useless` a line for each log that tests nothing. What is left out of the vehicle is told first.
+    `tested` all that are tested, and `useless` a line for each log that tests nothing. What is left out of the vehicle
+    is told first.
     """
     known = {**_kept_from_base(folder, description, logged), **description.known}
-    tested = axes_of(folder, logged)
     wide = _without_unknown_options(description.layout, known)
     axes = [a for a in wide.bare_axes if a.name in tested or {a.coefficient("a_d"), a.coefficient("b_d")} <= {*known}]
     layout = with_axes_alone(wide, axes)
@@ -102,6 +100,7 @@ def narrowed(folder: Folder, description: Description, logged: Collection[str], 
     return Tests(
         folder=folder,
         logged=logged,
+        axes=tested,
         layout=layout,
         known={name: known[name] for name in layout.coefficients if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},

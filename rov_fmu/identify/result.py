@@ -410,9 +410,8 @@ class AxisOfBase:
     @property
     def verdict(self) -> Verdict:
         """The word, with where its coefficients are from."""
-        if not self.source:
-            return Verdict("not identified", (f"{self.reason}, so {without((self.axis,), self.thrusters)}",))
-        return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+        lacking = f"{self.reason}, so {without((self.axis,), self.thrusters)}"
+        return Verdict("not identified", (f"from {self.source} ({self.reason})" if self.source else lacking,))
 
 
 def without(axes: Iterable[Axis], thrusters: Sequence[str]) -> str:
