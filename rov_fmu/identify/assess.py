@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from math import isfinite
 
 import numpy as np
@@ -154,22 +155,23 @@ def answers(
     ratios = [abs(push) / strongest_of(tested, push) for push in pushes or commands]
     beyond = (_EXPONENT * np.log(np.maximum(ratios, 1.0))) ** 2
     ends = [own - narrowest, own + narrowest]
+
+    def fitted(table: Table, z: Array) -> Array:
+        return of_table(table)(z[:, None]).reshape(own.shape)
+
+    of_table = partial(logarithms, axis=axis, commands=commands, pushes=pushes, with_lag=with_lag)
     for posterior in posteriors:
-        fitted = logarithms(posterior.table, axis, commands, pushes, with_lag=with_lag)
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
-            slopes = posterior.slopes(fitted)
+            slopes = posterior.slopes(of_table(posterior.table))
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
         variances += beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
-        middle = fitted(posterior.z[:, None]).reshape(own.shape)
-        quadratic = logarithms(
-            posterior.table.of_file(posterior.z, speeds or {}), axis, commands, pushes, with_lag=with_lag
-        )
-        misfit = np.abs(quadratic(posterior.z[:, None]).reshape(own.shape) - middle)
+        middle = fitted(posterior.table, posterior.z)
+        misfit = np.abs(fitted(posterior.table.of_file(posterior.z, speeds or {}), posterior.z) - middle)
         ends += [middle - half, middle + half, own - misfit, own + misfit]
     for fit in fits:
-        other = fitted(fit.z[:, None]).reshape(own.shape)
+        other = fitted(posterior.table, fit.z)
         lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
         ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))

@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from rov_fmu.equation.catalogue import AXES, PITCH, RESTORING, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
-from rov_fmu.identify.given import Tests, axes_of, narrowed, with_axes_alone, with_unseen_axes
+from rov_fmu.identify.given import Tests, narrowed, with_axes_alone, with_unseen_axes
 from rov_fmu.identify.likelihood.kinds import ABSENT, PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.likelihood.objective import TableRow
 from rov_fmu.identify.likelihood.posterior import QUANTILE
@@ -48,9 +48,9 @@ _NEVER_EXACT = ("white_noise", "coloured_noise")
 """The priors whose deviation must not be 0."""
 _MOST_REASONS = 3
 """The most reasons in a line that refuses a log."""
-
-
-QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
+_UNKNOWN = 1.0
+"""The value of a coefficient that is yet to be identified."""
+_QUANTITIES = {"thrust": "force", "steady": "V_ss", "time_constant": "Tau"}
 """What the tables of each kind measure."""
 
 
@@ -77,7 +77,7 @@ def load_tests(
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
         useless.append(_refusal(folder, log, told))
-    tested = axes_of(contents, logged)
+    tested = {*contents.astern("steady"), *contents.astern("time_constant"), *logged}
     useless = [] if tested else useless
     if not contents.astern("thrust"):
         contents.mistakes += useless
@@ -85,7 +85,7 @@ def load_tests(
     tests = None
     # If no axis was found, it may be in a file that could not be read.
     if description and (tested or not contents.mistakes):
-        tests = narrowed(contents, description, [*logged], useless)
+        tests = narrowed(contents, description, [*logged], tested, useless)
     contents.rov_file_mistakes += _wrong_priors(contents)
     if mistakes := [*contents.rov_file_mistakes, *contents.mistakes]:
         raise (DataFileError if contents.mistakes else VehicleFileError)(*mistakes)
@@ -141,7 +141,7 @@ def _driven_together(folder: Folder) -> Iterator[Finding]:
     """Yield a finding for each axis that a log measures, but that the thrusters drive only together with others."""
     if folder.layout and folder.logged:
         for log in folder.logs:
-            for axis in (form.axis for form in folder.layout.axes if not folder.logged.has(form.axis)):
+            for axis in (axis for axis in folder.layout.bare_axes if not folder.logged.has(axis)):
                 is_measured = any(channel.quantity.axis is axis and not channel.unused for channel in log.channels)
                 if is_measured and not log.axis and axis not in (ROLL, PITCH):
                     yield Finding("together", axis.name, file=log.file, words={"axis": axis.name})
@@ -170,34 +170,32 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
     deviations = tests.description.tables.priors
     measured = {name: any(row.command < 0.0 for row in rows) for name, rows in tests.rows("thrust")}
     dives = [log for log in tests.folder.logs if not log.axis]
-    shown = {axis for log in dives for axis in shown_axes(log, tests.vehicle.layout)}
-    vehicle = _extended(with_unseen_axes(tests, shown), measured, tests, shown)
-    logs = [sampled for log in tests.folder.logs if (sampled := recorded(log, layout_of(log, vehicle.layout)))]
-    fitted = [form.axis for form in vehicle.layout.axes if _is_fitted(form.axis, tests)]
-    moved = {form.axis for one in logs for form in one.layout.axes}
-    unseen = [form.axis for form in vehicle.layout.axes if form.axis in moved - {*fitted}]
-    driving = {t.curve for axis in fitted for t in vehicle.layout.thrusters_along(axis)}
+    shown = {axis for log in dives for axis in shown_axes(log, tests.layout)}
+    layout, values = _extended(with_unseen_axes(tests, shown), measured, tests, shown)
+    logs = [sampled for log in tests.folder.logs if (sampled := recorded(log, layout_of(log, layout)))]
+    fitted = [axis for axis in layout.bare_axes if _is_fitted(axis, tests)]
+    moved = {axis for one in logs for axis in one.layout.bare_axes}
+    unseen = [axis for axis in layout.bare_axes if axis in moved - {*fitted}]
+    driving = {t.curve for axis in fitted for t in layout.thrusters_along(axis)}
     given_thrust = {name for name, quantity in tests.description.known.items() if not quantity.interval}
-    driving = {c.name for c in vehicle.layout.curves if c.name in driving or c.name in measured}
     curves = [
-        curve
-        for curve in vehicle.layout.curves
-        if curve.name in driving
-        and (curve.name in measured or not {curve.coefficient("a_t"), curve.coefficient("b_t")} <= given_thrust)
+        c
+        for c in layout.curves
+        if c.name in measured
+        or (c.name in driving and not {c.coefficient("a_t"), c.coefficient("b_t")} <= given_thrust)
     ]
-    values = dict(vehicle.coefficients)
     for name, rows in tests.rows("thrust"):
-        rough = _rough_thrust(vehicle, vehicle.layout.curves_by_name[name], rows)
+        rough = _rough_thrust(layout.curves_by_name[name], values, rows)
         values |= {key: value for key, value in rough.items() if key not in tests.known}
-    vehicle = Vehicle(vehicle.layout, values)
-    full = {form.axis.name: vehicle.strongest(form.axis) for form in vehicle.layout.axes}
+    vehicle = Vehicle(layout, values)
+    full = {axis.name: vehicle.strongest(axis) for axis in layout.bare_axes}
     guessed = []
     for axis in (*fitted, *unseen):
         if any(axis.coefficient(key) not in tests.base for key in ("a_d", "b_d")):
             guessed.append(axis.name)
             values |= _rough_drag(vehicle, axis, tests, logs)
     known = Prior(
-        vehicle.layout,
+        layout,
         values,
         fitted,
         curves,
@@ -206,19 +204,13 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         guessed=guessed,
         full=full,
         deviations=deviations,
-        exact=_exact(tests, vehicle.layout, measured, moved, shown),
+        exact=_exact(tests, layout, measured, moved, shown),
         thrust_errors=_thrust_errors(tests, curves),
         unseen=unseen,
         has_times=bool(tests.folder.astern("time_constant")),
         bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
-    counted = [
-        table_row
-        for kind in QUANTITIES
-        for row, table_row in table_rows(tests, vehicle.layout, kind)
-        if tests.folder.counts(kind, table_row.subject.name, row.command)
-    ]
-    return known, logs, counted
+    return known, logs, [row for row, _, counts in table_rows(tests, layout) if counts]
 
 
 def _exact(
@@ -259,31 +251,27 @@ def _is_fitted(axis: Axis, tests: Tests) -> bool:
     return axis.name in tested and not {axis.coefficient(key) for key in ("a_d", "b_d", "beta")} <= {*given}
 
 
-def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, shown: Collection[Axis]) -> Vehicle:
-    """Return the vehicle with every coefficient that a parameter may change, where each effect is absent.
+def _extended(
+    layout: Layout, measured: Mapping[str, bool], tests: Tests, shown: Collection[Axis]
+) -> tuple[Layout, dict[str, float]]:
+    """Return the layout with every coefficient that a parameter may change, and their values where effects are absent.
 
     `measured` has the curves whose forces were measured, and whether astern, too. `shown` has the axes that dives show:
     a load along them stays from dive to dive. About roll and pitch, it is that of the centre of buoyancy.
     """
-    base, deviations = tests.base, tests.description.tables.priors
-    values = {name: base.get(name, value) for name, value in vehicle.coefficients.items()}
-    vehicle = Vehicle(replace(vehicle.layout, mix={}), vehicle.coefficients)  # a log tells thrusters' commands
-    centres = dict.fromkeys(_centres(vehicle.layout, shown), 0.0)
-    restoring = tuple(key for key in RESTORING if key in {*vehicle.layout.restoring, *centres})
-    layout = replace(vehicle.layout, restoring=restoring)
-    vehicle, values = Vehicle(layout, {**centres, **vehicle.coefficients}), {**centres, **values}
-    more: dict[str, float] = {}
+    base, deviations, centres = tests.base, tests.description.tables.priors, _centres(layout, shown)
+    restoring = tuple(key for key in RESTORING if key in {*layout.restoring, *centres})
+    layout = replace(layout, mix={}, restoring=restoring)  # a log tells thrusters' commands
+    values = {name: base.get(name, 0.0 if name in centres else _UNKNOWN) for name in layout.coefficients}
+    layout, of_voltage = _with_voltage(layout, tests)
+    values, more = of_voltage | values, dict[str, float]()
     logged, steady = {*tests.logged}, tests.folder.astern("steady")
-    for form in layout.axes:
-        axis = form.axis
-        if axis.name in logged or steady.get(axis.name):
-            more |= {form.name_of(f"{key}{REVERSE}"): values[form.name_of(key)] for key in ("a_d", "b_d")}
-        is_loaded = axis.name in logged or steady.get(axis.name) or axis in shown
-        if is_loaded and not (centres and axis in (ROLL, PITCH)):
-            more[form.name_of("F_0")] = ABSENT["F_0"]
-    vehicle = _with_voltage(vehicle, base, tests)
-    layout = vehicle.layout
-    values = {**vehicle.coefficients, **values}
+    for axis in layout.bare_axes:
+        is_tested = axis.name in logged or steady.get(axis.name)
+        if is_tested:
+            more |= {axis.coefficient(f"{key}{REVERSE}"): values[axis.coefficient(key)] for key in ("a_d", "b_d")}
+        if (is_tested or axis in shown) and not (centres and axis in (ROLL, PITCH)):
+            more[axis.coefficient("F_0")] = ABSENT["F_0"]
     exact = deviations.get("thrust") == 0.0
     for curve in layout.curves:
         if not curve.tables and not exact:
@@ -299,48 +287,41 @@ def _extended(vehicle: Vehicle, measured: Mapping[str, bool], tests: Tests, show
             more[curve.coefficient("d")] = ABSENT["d"]
             if curve.coefficient("d") not in values:
                 more[curve.name_of(f"d{REVERSE}")] = ABSENT["d"]
-    more = {name: base.get(name, value) for name, value in more.items()}
-    return _with(vehicle.layout, vehicle.coefficients, more | values)
+    return layout.extended(more), {name: base.get(name, value) for name, value in more.items()} | values
 
 
-def _with_voltage(vehicle: Vehicle, base: Mapping[str, float], tests: Tests) -> Vehicle:
-    """Return a vehicle whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it.
+def _with_voltage(layout: Layout, tests: Tests) -> tuple[Layout, dict[str, float]]:
+    """Return a layout whose thrust depends on the voltage, if a logged voltage changes or rov.toml asks for it.
 
     Its usual voltage is that at which the thrust was measured, if that is known, so that the answers are for it.
     """
-    values = tests.folder.voltages
-    if not values or vehicle.layout.voltage is not None:
-        return vehicle
+    values, base, more = tests.folder.voltages, tests.base, dict[str, float]()
+    if not values or layout.voltage is not None:
+        return layout, more
     mean = float(np.mean([np.mean(some) for some in values]))
     ranges = [usual_range(some) for some in values]
     if not tests.description.requests.voltage and max(high - low for low, high in ranges) < _SAG * mean:
-        return vehicle
-    more = {}
+        return layout, more
     is_exact = tests.description.tables.priors.get("voltage") == 0.0
-    curves = [curve for curve in vehicle.layout.curves if len(curve.tables) < 2]
+    curves = [curve for curve in layout.curves if len(curve.tables) < 2]
     told = {c.name: base[c.name_of("V_0")] for c in curves if c.name_of("V_0") in base}
     known = {**tests.description.measured_at, **told}
     for curve in curves:
         more[curve.name_of("V_0")] = known.get(curve.name, mean)
         more[curve.name_of("n_V")] = USUAL_EXPONENT if is_exact else ABSENT["n_V"]
     source = "Voltage of the measured thrust" if known else "Mean voltage of the logs"
-    layout = replace(vehicle.layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
-    return _with(layout, vehicle.coefficients, more)
+    layout = replace(layout, voltage=next(iter(known.values()), round(mean, 3)), voltage_source=source)
+    return layout.extended(more), more
 
 
-def _with(layout: Layout, coefficients: Mapping[str, float], more: Mapping[str, float]) -> Vehicle:
-    """Return a vehicle with other or additional coefficients. They may be beyond the bounds of a vehicle file."""
-    return Vehicle(layout.extended(more), {**coefficients, **more})
-
-
-def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[str, float]:
+def _rough_thrust(curve: Curve, values: Mapping[str, float], rows: Sequence[Row]) -> dict[str, float]:
     """Return the coefficients of a curve that fit its forces roughly, as the centre of their prior.
 
     Both directions share the ratio of a_t to b_t, which are not negative. What else the forces tell is the shape that
     the likelihood fits.
     """
     astern = f"a_t{REVERSE}" in curve.keys
-    c_0 = vehicle.coefficients.get(curve.coefficient("c_0"), 0.0)
+    c_0 = values.get(curve.coefficient("c_0"), 0.0)
     command, F = (np.array([getattr(row, key) for row in rows]) for key in ("command", "value"))
     c, F, is_back = np.maximum(np.abs(command) - c_0, 0.0), np.abs(F), astern & (command < 0.0)
     largest = float(F.max())
@@ -354,12 +335,12 @@ def _rough_thrust(vehicle: Vehicle, curve: Curve, rows: Sequence[Row]) -> dict[s
 
     start = [np.log(largest / max(float(c.max()), 0.05) ** 1.5), USUAL_SQUARE, 0.0]
     fit = least_squares(residuals, start, bounds=([-np.inf, 0.0, -np.inf], [np.inf, 1.0, np.inf])).x
-    values: dict[str, float] = {}
-    for end, ratio in (("", 1.0), (REVERSE, np.exp(fit[2]))):
-        if not end or astern:
-            for key, share in (("a_t", fit[1]), ("b_t", 1.0 - fit[1])):
-                values[curve.name_of(f"{key}{end}")] = float(np.exp(fit[0]) * ratio * share)
-    return values
+    ratios, shares = {"": 1.0} | ({REVERSE: np.exp(fit[2])} if astern else {}), {"a_t": fit[1], "b_t": 1.0 - fit[1]}
+    return {
+        curve.name_of(f"{key}{end}"): float(np.exp(fit[0]) * ratio * share)
+        for end, ratio in ratios.items()
+        for key, share in shares.items()
+    }
 
 
 def _rough_drag(vehicle: Vehicle, axis: Axis, tests: Tests, logs: Sequence[SampledLog]) -> dict[str, float]:
@@ -403,12 +384,14 @@ def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> flo
     return (1.0 if is_whole else _ADDED) * vehicle.effective_inertia(vehicle.layout.by_name[axis.name]) * largest
 
 
-def table_rows(tests: Tests, layout: Layout, kind: str) -> Iterator[tuple[Row, TableRow]]:
-    """Yield the rows of the tables of a kind, with what J reads of them."""
-    for subject, rows in tests.rows(kind):
-        largest = max(abs(row.value) for row in rows)
-        of = layout.curves_by_name[subject] if kind == "thrust" else AXES[subject]
-        for row in rows:
-            scale = largest if kind == "thrust" else abs(row.value)
-            noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
-            yield row, TableRow(noise, of, QUANTITIES[kind], row.command, row.value, scale)
+def table_rows(tests: Tests, layout: Layout) -> Iterator[tuple[TableRow, str, bool]]:
+    """Yield what J reads of the rows of all tables, with their files, and whether they count."""
+    for kind, quantity in _QUANTITIES.items():
+        for subject, rows in tests.rows(kind):
+            largest = max(abs(row.value) for row in rows)
+            of = layout.curves_by_name[subject] if kind == "thrust" else AXES[subject]
+            for row in rows:
+                scale = largest if kind == "thrust" else abs(row.value)
+                noise = f"forces of {subject}" if kind == "thrust" else f"tables of {subject}"
+                counts = tests.folder.counts(kind, subject, row.command)
+                yield TableRow(noise, of, quantity, row.command, row.value, scale), row.file, counts

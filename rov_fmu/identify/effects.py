@@ -69,10 +69,8 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
     for suspect, start, odds in (*won, *((suspect, start, nan) for suspect, start in fit.nearest.items())):
         structure, n = _named(fit, suspect, start, odds), row_of(fit.objective, suspect)
         if n is not None:
-            value, interval = (
-                _number(fit, n) if suspect in fit.odds else (float(parameters[n].number(start)), (nan, nan))
-            )
-            structure = replace(structure, value=value, interval=interval, unit=parameters[n].unit)
+            value = _number(fit, n)[0] if suspect in fit.odds else float(parameters[n].number(start))
+            structure = replace(structure, value=value, unit=parameters[n].unit)
         yield structure
     if files := tuple(one.log.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
         yield _named(fit, ("momentary commands", files), None, inf)

@@ -321,14 +321,19 @@ UNLOGGED = "no log has the commands of its thrusters"
 LOG_OUTPUTS = "Log the outputs to all thrusters: MAVLink 1 has eight, and a .BIN file has more"
 
 
+def is_commanded(axis: Axis, layout: Layout, logs: Sequence[Log]) -> bool:
+    """Return True if a log has a command of a thruster along an axis."""
+    drivers = {thruster.name for thruster in layout.thrusters_along(axis)}
+    largest = (pair for log in logs if log.commands for pair in log.commands.largest.items())
+    return any(most for name, most in largest if name in drivers)
+
+
 def is_unlogged(axis: Axis, layout: Layout, logs: Sequence[Log]) -> bool:
     """Return True if no log has commands of any thruster along an axis, and lacks columns or pulses of them."""
-    drivers = {thruster.name for thruster in layout.thrusters_along(axis)}
-    titles = {f"{form}{name}" for name in drivers for form in ("", "u_")}
-    told = (most for log in logs if log.commands for name, most in log.commands.largest.items() if name in drivers)
+    titles = {f"{form}{thruster.name}" for thruster in layout.thrusters_along(axis) for form in ("", "u_")}
     return (
         not any(log.follows_axis for log in logs)
-        and not any(told)
+        and not is_commanded(axis, layout, logs)
         and any(
             (f.kind == "thrusters without pulse" and f.axis == axis.name)
             or (f.kind == "missing column" and str(f.words["column"]).partition(" [")[0] in titles)
@@ -410,10 +415,10 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
                     p.file,
                     f"The prediction of its {p.quantity} is off by {error}, and one of no change by {unchanged}.",
                 )
-    pushed: dict[str, list[str]] = {}
+    pushed = list[tuple[str, str]]()
     for d in identification.disturbances:
-        forces = [f.force for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file]
-        most = max((rms(force) for force in forces), default=inf)
+        others = (f for f in identification.unknown_forces if f.axis is d.axis and f.file != d.file)
+        most = max((rms(f.force) for f in others), default=inf)
         if (
             d.slow.acts_as == "force"
             and d.axis
@@ -423,8 +428,8 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
             and d.value > _ODD * most
         ):
             size, other = size_in_words(d.value, d.unit), size_in_words(most, d.unit)
-            pushed.setdefault(d.file, []).append(f"{size} in {d.axis.name} (at most {other} in the other logs)")
-    for file, forces_of in pushed.items():
+            pushed.append((d.file, f"{size} in {d.axis.name} (at most {other} in the other logs)"))
+    for file, forces_of in grouped(pushed).items():
         acting = f"An unknown slow force acts in this log: {listed(forces_of)}."
         yield file, f"{acting} Check the thrusters and the tether of that dive."
 

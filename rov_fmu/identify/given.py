@@ -23,10 +23,6 @@ from rov_fmu.tank.folder import Folder
 from rov_fmu.tank.readers.tank_tables import Row
 from rov_fmu.vehicle.geometry import check_layout, check_thruster_places
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.vehicle import Vehicle
-
-UNKNOWN = 1.0
-"""The value of a coefficient that is yet to be identified."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +33,12 @@ class Tests:
     """Its findings also tell what was left out of the vehicle and of the files, and its inputs have the base, too."""
     logged: Collection[str]
     """The names of the axes that logs test."""
-    vehicle: Vehicle
-    """The vehicle with the axes that are tested or known and the thrusters that act on them. Known coefficients have
-    their values, the others UNKNOWN. Of the coefficients to be identified, it has only those that every curve and axis
-    needs. The fits add reverse thrust, dead band, lag and load if they find them."""
+    axes: Collection[str]
+    """The names of all axes that are tested."""
+    layout: Layout
+    """The axes that are tested or known, and the thrusters that act on them. Of the coefficients to be identified, it
+    has only those that every curve and axis needs. The fits add reverse thrust, dead band, lag and load if they find
+    them."""
     known: Mapping[str, Quantity]
     """The coefficients that are given, not identified."""
     base: Mapping[str, float]
@@ -54,35 +52,30 @@ class Tests:
         assert self.folder.rov_file.description
         return self.folder.rov_file.description
 
-    @property
-    def axes(self) -> set[str]:
-        """The names of all axes that are tested."""
-        return axes_of(self.folder, self.logged)
-
     def rows(self, kind: str) -> Iterator[tuple[str, Sequence[Row]]]:
         """Yield the curves or axes of the vehicle that have a table of this kind, with its rows."""
-        layout = self.vehicle.layout
-        names = layout.curves_by_name if kind == "thrust" else layout.by_name
+        names = self.layout.curves_by_name if kind == "thrust" else self.layout.by_name
         for (other, subject), some in self.folder.rows.items():
             if other == kind and subject in names:
                 yield subject, some
 
 
-def axes_of(folder: Folder, logged: Collection[str]) -> set[str]:
-    """Return the names of all axes that are tested, from those that logs test."""
-    return {*folder.astern("steady"), *folder.astern("time_constant"), *logged}
-
-
-def narrowed(folder: Folder, description: Description, logged: Collection[str], useless: Sequence[str]) -> Tests | None:
+def narrowed(
+    folder: Folder,
+    description: Description,
+    logged: Collection[str],
+    tested: Collection[str],
+    useless: Sequence[str],
+) -> Tests | None:
     """Reduce the vehicle to the axes that are tested or known, and check that nothing is missing.
 
     The mistakes are added to those of the folder, and there is no vehicle then. `logged` has the axes that logs test,
-    and `useless` a line for each log that tests nothing. What is left out of the vehicle is told first.
+    `tested` all that are tested, and `useless` a line for each log that tests nothing. What is left out of the vehicle
+    is told first.
     """
     known = {**_kept_from_base(folder, description, logged), **description.known}
-    tested = axes_of(folder, logged)
     wide = _without_unknown_options(description.layout, known)
-    axes = [form.axis for form in wide.axes if _is_tested_or_known(form.axis, tested, known)]
+    axes = [a for a in wide.bare_axes if a.name in tested or {a.coefficient("a_d"), a.coefficient("b_d")} <= {*known}]
     layout = with_axes_alone(wide, axes)
     if not layout.axes:
         line = f"{folder.path}: no axis is tested: there is no steady_, time_constant_ or log_ file of one"
@@ -104,12 +97,12 @@ def narrowed(folder: Folder, description: Description, logged: Collection[str], 
         folder.mistakes += lines_on(folder.path, tests)
         return None
     folder.findings[:0] = _left_out(folder, description, layout)
-    names = layout.coefficients
     return Tests(
         folder=folder,
         logged=logged,
-        vehicle=Vehicle(layout, {name: known[name].value if name in known else UNKNOWN for name in names}),
-        known={name: known[name] for name in names if name in known},
+        axes=tested,
+        layout=layout,
+        known={name: known[name] for name in layout.coefficients if name in known},
         base={name: q.value for name, q in {**description.base_quantities, **known}.items()},
         thrusters=own,
     )
@@ -130,7 +123,7 @@ def _kept_from_base(folder: Folder, description: Description, logged: Collection
         name = form.axis.name
         tests = {"log": name in logged, "steady": name in steady, "time_constant": name in times}
         tests["astern"] = steady.get(name, False)
-        told = (kind for kind in KINDS.values() if any(tests[test] for test in kind.told_by))
+        told = (kind for kind in KINDS.values() if any(map(tests.get, kind.told_by)))
         replaced |= {form.name_of(key) for kind in told for key in kind.keys}
     return {name: quantity for name, quantity in description.base_quantities.items() if name not in replaced}
 
@@ -146,10 +139,6 @@ def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
     return deep.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
 
 
-def _is_tested_or_known(axis: Axis, tested: Collection[str], known: Collection[str]) -> bool:
-    return axis.name in tested or {axis.coefficient("a_d"), axis.coefficient("b_d")} <= {*known}
-
-
 def _with_axes(layout: Layout, axes: Collection[Axis]) -> Layout:
     return replace(layout, axes=tuple(form for form in layout.axes if form.axis in axes))
 
@@ -159,17 +148,14 @@ def with_axes_alone(layout: Layout, axes: Collection[Axis]) -> Layout:
     layout = _with_axes(layout, axes)
     thrusters = tuple(t for t in layout.thrusters if any(t in layout.thrusters_along(axis) for axis in axes))
     fins = tuple(fin for fin in layout.fins if any(fin.effect(axis) for axis in axes))
-    names = {thruster.name for thruster in thrusters} | {fin.name for fin in fins}
-    mix = {
-        name: {thruster: gain for thruster, gain in gains.items() if thruster in names}
-        for name, gains in layout.mix.items()
-    }
+    names = {one.name for one in (*thrusters, *fins)}
+    gains_of = ((name, {one: gains[one] for one in gains if one in names}) for name, gains in layout.mix.items())
     layout = replace(
         layout,
         thrusters=thrusters,
         fins=fins,
-        mix={name: gains for name, gains in mix.items() if any(gains.values())},
-        coupled=layout.coupled and all(layout.has(axis) for axis in COUPLED_AXES),
+        mix={name: gains for name, gains in gains_of if any(gains.values())},
+        coupled=layout.coupled and all(map(layout.has, COUPLED_AXES)),
     )
     # An input that drives none of the axes has gains that cancel each other.
     driving = {name for axis in axes for name in layout.signs(axis)}
@@ -189,27 +175,23 @@ def thrusters_along_no_other(layout: Layout, axes: Collection[Axis], kept: Colle
     return [] if layout.has_wrench else [name for name in along if name not in driving]
 
 
-def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
-    """Return the vehicle, also with the axes about which nothing is known but on whose motion those shown depend.
+def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Layout:
+    """Return the layout, also with the axes about which nothing is known but on whose motion those shown depend.
 
     The thrusters that turn a vehicle in a dive move it along these axes, too, and this motion takes thrust from them.
     Without a turn, such an axis takes thrust from no other. An axis is left out where more thrusters push along it. If
     the axes are coupled, unseen motion would turn the vehicle by moments that nothing tells, so none is added.
     """
-    vehicle, base = tests.vehicle, tests.base
-    layout, wide = vehicle.layout, _without_unknown_options(tests.description.layout, tests.known)
+    layout, wide = tests.layout, _without_unknown_options(tests.description.layout, tests.known)
 
     def is_unseen(axis: Axis) -> bool:
         pushing = {*wide.thrusters_along(axis)}
-        return not axis.is_rotation and axis.inertia in base and bool(pushing) and pushing <= {*layout.thrusters}
+        return not axis.is_rotation and axis.inertia in tests.base and bool(pushing) and pushing <= {*layout.thrusters}
 
-    axes = [form.axis for form in wide.axes if layout.has(form.axis) or is_unseen(form.axis)]
+    axes = [axis for axis in wide.bare_axes if layout.has(axis) or is_unseen(axis)]
     turns = any(axis.is_rotation for axis in shown)
-    if layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes):
-        return vehicle
-    layout = with_axes_alone(wide, axes)
-    values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}
-    return Vehicle(layout, {**values, **vehicle.coefficients})
+    is_whole = layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes)
+    return layout if is_whole else with_axes_alone(wide, axes)
 
 
 def _left_out(folder: Folder, description: Description, layout: Layout) -> Iterator[Finding]:

@@ -170,7 +170,9 @@ def _predicted(
 ) -> Iterator[Prediction]:
     """Yield the predictions of what is held out: over its whole length, and over a shorter time.
 
-    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows.
+    Velocities are predicted over one of the two: over the shorter time if commands are lost between the rows. The
+    vehicle to compare with has the usual noise. That of a fit is too small for it: the filter would explain its errors
+    by a thrust that fades to 0.
     """
     sampled, record = objective.logs[out.log], objective.records[out.log]
     inside = np.zeros(len(record.time), bool)
@@ -179,7 +181,7 @@ def _predicted(
     for span in (inf, sampled.horizon):
         try:
             off_all, deviations = ahead(objective, out.log, z, covariance, begin, span)
-            usual = _usual_noise(objective, z)
+            usual = np.where(objective.table.each("of_motion"), z, objective.mean)
             compared = objective.run(usual, out.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
@@ -212,14 +214,6 @@ def _predicted(
             )
 
 
-def _usual_noise(objective: Objective, z: Array) -> Array:
-    """Return the parameters with the means of the priors of the noise, for a vehicle that was not fitted.
-
-    The noise of a fit is too small for it: the filter would explain its errors by a thrust that fades to 0.
-    """
-    return np.where(objective.table.each("of_motion"), z, objective.mean)
-
-
 def ahead(
     objective: Objective, number: int, z: Array, covariance: Array, begin: float, span: float
 ) -> tuple[Array, Array]:
@@ -249,17 +243,14 @@ def ahead(
 # ---- Rows of tables --------------------------------------------------------------------------------------------------
 
 
-def points_of(tests: Tests, values: Values, vehicle: Vehicle, kind: str, only: str | None = None) -> Iterator[Point]:
-    """Yield the rows of tables with what the vehicle says about them, also held out."""
-    for row, table_row in table_rows(tests, vehicle.layout, kind):
-        subject = table_row.subject.name
-        if only and subject != only:
-            continue
-        unit = {"thrust": "N", "time_constant": "s"}.get(kind) or AXES[subject].unit
-        out = values.get((table_row.quantity, subject, row.command), np.nan)
-        counts = tests.folder.counts(kind, subject, row.command)
-        numbers = row.command, row.value, float(modelled([table_row], vehicle, NO_SHAPES)[0]), out
-        yield Point(subject, table_row.quantity, unit, row.file, *numbers, counts)  # type: ignore[arg-type]
+def points_of(tests: Tests, values: Values, vehicle: Vehicle) -> Iterator[Point]:
+    """Yield the rows of all tables with what the vehicle says about them, also held out."""
+    for row, file, counts in table_rows(tests, vehicle.layout):
+        subject = row.subject.name
+        unit = {"force": "N", "Tau": "s"}.get(row.quantity) or AXES[subject].unit
+        out = values.get((row.quantity, subject, row.command), np.nan)
+        numbers = row.command, row.measured, float(modelled([row], vehicle, NO_SHAPES)[0]), out
+        yield Point(subject, row.quantity, unit, file, *numbers, counts)  # type: ignore[arg-type]
 
 
 def held_out_rows(objective: Objective, best: Minimum) -> Values:

@@ -23,6 +23,7 @@ from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Identification, Interval
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
@@ -57,7 +58,6 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     layout = _layout(tests, fit)
     values = {name: float(value) for name, value in _in_file(file, fit, file.z).items()}
     rov = Vehicle(layout, {name: values.get(name, tests.base.get(name, 1.0)) for name in layout.coefficients})
-    known = {name: q for name, q in tests.known.items() if name in layout.coefficients}
     changed = _changed(file, rov)
     # A file without a dead band has an exact one of 0.
     bands = [name for name, (*_, key) in fit.known.layout.keys_in_file.items() if key in _DEAD_BAND]
@@ -67,9 +67,9 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     forms = (form for form in layout.axes if form.axis in fit.known.unseen)
     unseen = {form.coefficient(key) for form in forms for key in (*form.keys, "beta")}
     identified = {name: one.interval for name, one in coefficients.items() if one.interval and name not in unseen}
-    sources = dict.fromkeys(layout.coefficients, NOT_GIVEN) | {name: q.source for name, q in known.items()}
     base = tests.description.base_quantities
-    sources |= {name: base[name].source for name in layout.coefficients if name in base and name not in known}
+    given = {**base, **tests.known}
+    sources = {name: given[name].source if name in given else NOT_GIVEN for name in layout.coefficients}
     if tests.description.assumed:
         of_base = {*base} & {*sources}
         sources |= {name: f"Assumed, as in {tests.description.base_name}: {sources[name]}" for name in of_base}
@@ -79,16 +79,16 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         for key, source in (("V_0", reference), ("n_V", "The usual exponent, which [priors] takes as exact")):
             if sources[curve.coefficient(key)] == NOT_GIVEN:
                 sources[curve.coefficient(key)] = source
-    intervals = {name: q.interval for name, q in known.items() if q.interval}
+    intervals = {name: q.interval for name, q in tests.known.items() if q.interval}
     estimates: dict[str, Estimated] = {}
     names = [name for name in changed if name in identified or name in intervals]
     for name in changed:
         if name in identified:
             sources[name] = _SOURCE
+        elif name not in {*names, *unseen}:
+            sources[name] = "Assumed: the tests do not determine it"
         elif not isclose(rov[name], tests.base.get(name, inf), rel_tol=_UNCHANGED):
             sources[name] += "; adapted to the tests"
-        if name not in {*names, *unseen}:
-            sources[name] = "Assumed: the tests do not determine it"
     if names:
         held = [name for name in every if name not in {*names, *unseen}]
         indices = [every.index(name) for name in (*names, *held)]
@@ -306,8 +306,8 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
 
     layout = table.layout
     exponents = (coefficients[c.coefficient("n_V")] for c in layout.curves if "n_V" in c.keys)
-    with_voltage = tests.vehicle.layout.voltage is not None or any(n > 0.0 for n in exponents)
-    kept, own = layout.with_keys(has), tests.vehicle.layout
+    with_voltage = tests.layout.voltage is not None or any(n > 0.0 for n in exponents)
+    kept, own = layout.with_keys(has), tests.layout
     written = replace(
         kept,
         axes=tuple(form for form in kept.axes if own.has(form.axis)),
@@ -368,17 +368,17 @@ def tested_ranges(identification: Identification) -> Iterator[Range]:
 
     The ends have three digits, and an end that is next to nothing is no range.
     """
-    ends_of: dict[str, list[float]] = {}
-    for log in identification.folder.logs:
-        for channel in log.channels:
-            if not channel.unused and (name := _variable(channel.quantity)):
-                ends = (float(np.nanquantile(channel.values, share)) for share in _WITHOUT_OUTLIERS)
-                ends_of.setdefault(name, []).extend(ends)
-    for result in identification.axes:
-        measured = [p.measured for p in result.points if p.quantity == "V_ss"]
-        if measured:
-            ends_of.setdefault(result.axis.velocity, []).extend(measured)
-    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in ends_of.items()}
+    used = (c for log in identification.folder.logs for c in log.channels if not c.unused)
+    ends_of = [
+        (name, float(np.nanquantile(channel.values, share)))
+        for channel in used
+        if (name := _variable(channel.quantity))
+        for share in _WITHOUT_OUTLIERS
+    ]
+    steady = ((one.axis, p) for one in identification.axes for p in one.points if p.quantity == "V_ss")
+    ends_of += [(axis.velocity, p.measured) for axis, p in steady]
+    found = grouped(ends_of).items()
+    ranges = {name: tuple(float(f"{end:.3g}") for end in (min(ends), max(ends))) for name, ends in found}
     if some := {name: ends for name, ends in ranges.items() if max(map(abs, ends)) >= LEAST_RANGE}:
         yield Range(EVERY_COMMAND, 0.0, identification.vehicle.command_range[1])
         yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)

@@ -3,7 +3,7 @@
 The objective is stated in objective.py, and the priors in parameters.py. This file is the order of the work.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 from threadpoolctl import threadpool_limits
@@ -13,9 +13,9 @@ from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
-from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_unlogged, may_rock, told
+from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_commanded, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
-from rov_fmu.identify.held_out import HeldOut, Values, held_out, held_out_rows, points_of, predictions
+from rov_fmu.identify.held_out import HeldOut, held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -28,9 +28,8 @@ from rov_fmu.identify.result import (
     AxisOfBase,
     AxisResult,
     Coefficient,
-    Disturbance,
-    Effect,
     Identification,
+    Point,
     Prediction,
     Slip,
     Tested,
@@ -96,32 +95,16 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
             raise DataFileError(f"{tests.folder.path}: {mistake}")
     wrong = wrong or slips(tests, fit.objective, fit.best.z, fit.posterior.errors, fit.starts)[0]
-    values = held_out_rows(fit.objective, fit.best)
-    effects = tuple(effects_of(fit))
-    of_file = with_own_inputs(vehicle, tests)
-    axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
-    for n, axis in enumerate(known.fitted):
-        work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
-        push = assess.push_of_thrusters(vehicle, of_file, axis)
-        of_axis = axis, tested[axis], push
-        found = _axis(tests, fit, vehicle, coefficients, *of_axis, out, predicted, slow, wrong, values, effects)
-        if against and against.layout.has(axis):
-            found = replace(found, compared=assess.answers_of_file(against, axis))
-        axes.append(found)
-    if not tests.description.tables.validity:
-        ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
-        of_file = replace(of_file, tested=ends)
-    of_file = vehicle_of_file(fit, of_file, tests.folder.path)
+    points = [*points_of(tests, held_out_rows(fit.objective, fit.best), vehicle)]
     names, by_name = tuple(vehicle.estimates), vehicle.layout.curves_by_name
-    result = Identification(
-        folder=replace(tests.folder, findings=[*tests.folder.findings, *beyond_thrusters(vehicle, of_file)]),
-        vehicle=of_file,
+    found = Identification(
+        folder=tests.folder,
+        vehicle=with_own_inputs(vehicle, tests),
         against=against,
-        axes=tuple(axes),
-        axes_of_base=tuple(_of_base(tests, fit, of_file)),
+        axes=(),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
-        forces=tuple(points_of(tests, values, vehicle, "thrust")),
-        effects=effects,
+        forces=tuple(p for p in points if p.quantity == "force"),
+        effects=tuple(effects_of(fit)),
         disturbances=tuple(slow),
         logging=tuple(loggers_of(fit)),
         sensors=tuple(sensors_of(fit)),
@@ -134,27 +117,38 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         alike=fit.alike,
         times=times_of(fit),
     )
-    return told(result)
+    axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
+    for n, axis in enumerate(known.fitted):
+        work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
+        axes.append(_axis(found, tests, fit, vehicle, coefficients, axis, tested[axis], out, predicted, points))
+    of_file = found.vehicle
+    if not tests.description.tables.validity:
+        ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
+        of_file = replace(of_file, tested=ends)
+    of_file = vehicle_of_file(fit, of_file, tests.folder.path)
+    folder = replace(tests.folder, findings=[*tests.folder.findings, *beyond_thrusters(vehicle, of_file)])
+    of_base = tuple(_of_base(tests, fit, of_file))
+    return told(replace(found, folder=folder, vehicle=of_file, axes=tuple(axes), axes_of_base=of_base))
 
 
 def _axis(
+    found: Identification,
     tests: Tests,
     fit: Fit,
     vehicle: Vehicle,
     coefficients: Mapping[str, Coefficient],
     axis: Axis,
     tested: Tested,
-    push: Callable[[float], float] | None,
     out: Sequence[HeldOut],
     predicted: Sequence[Prediction],
-    slow: Sequence[Disturbance],
-    wrong: Sequence[Slip],
-    values: Values,
-    effects: Sequence[Effect],
+    points: Sequence[Point],
 ) -> AxisResult:
-    is_told = _is_thrust_told(tests, vehicle, axis)
+    """Return what concerns an axis; `found` has what concerns all axes, and `vehicle` is that of the fit."""
+    # The thrust of a wrench is the largest force in the logs, if there is any.
+    is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
     fits = [one.fit for one in out if axis in one.axes]
-    is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
+    is_steady = all(d.share <= MOST_GAIN for d in found.disturbances if d.changes_thrust and d.kept)
+    against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
     tested_own = assess.commands_that_push(push, tested) if push else tested
@@ -167,8 +161,7 @@ def _axis(
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
-    acting = [effect for effect in effects if effect.of in {"", axis.name, *drivers}]
-    steady, times = (points_of(tests, values, vehicle, kind, axis.name) for kind in ("steady", "time_constant"))
+    acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]
     limits = tests.description.tables.limits
     shown = replace(fit.posterior, z=fit.file.posterior.z)
     result = AxisResult(
@@ -177,12 +170,13 @@ def _axis(
         tested=tested_own,
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
-        points=(*steady, *times),
+        points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
-        disturbances=[d for d in slow if d.concerns(axis)],
+        disturbances=[d for d in found.disturbances if d.concerns(axis)],
         effects=acting,
-        slips=[s for s in wrong if s.file in files],
+        slips=[s for s in found.slips if s.file in files],
         misfits=misfits,
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
         is_assumed=bool(tests.description.assumed),
@@ -201,7 +195,7 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
     shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
     lacking = [AXES[f.axis] for f in tests.folder.findings if f.kind in ("axis left out", "axis not pushed")]
-    for axis in (*(one.axis for one in vehicle.layout.axes if one.axis not in fit.known.fitted), *lacking):
+    for axis in (*(axis for axis in vehicle.layout.bare_axes if axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known
         told = "nothing in the logs shows it" if tests.folder.logs else "no test shows it"
         if axis.name in tests.axes:
@@ -212,13 +206,6 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
         source = ROV_FILE if is_of_file else description.base_name
         lost = thrusters_along_no_other(description.layout, [axis], vehicle.layout.bare_axes) if axis in lacking else ()
         yield AxisOfBase(axis, "" if axis in lacking else source, told, tuple(lost))
-
-
-def _is_thrust_told(tests: Tests, vehicle: Vehicle, axis: Axis) -> bool:
-    """Return False if the thrust along an axis is the largest force of the logs, and none of them has any."""
-    drivers = {thruster.name for thruster in vehicle.layout.thrusters_along(axis)}
-    largest = (most for log in tests.folder.logs if log.commands for most in log.commands.largest.items())
-    return not vehicle.layout.has_wrench or any(most for name, most in largest if name in drivers)
 
 
 def _those_of(coefficients: Mapping[str, Coefficient], part: Part, *more: str) -> tuple[Coefficient, ...]:

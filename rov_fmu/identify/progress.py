@@ -1,8 +1,8 @@
 """What an identification tells while it works: its stages, with their usual shares of the time, and first answers."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from math import exp, hypot, inf
+from math import exp, inf
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from rov_fmu.identify.likelihood.search import SETTLING
 from rov_fmu.identify.likelihood.solve import Minimum
 from rov_fmu.identify.result import LEAST_TESTED
 from rov_fmu.io.messages import Progress, silent
+from rov_fmu.tank.arrays import Array, rms
+from rov_fmu.tank.catalogue import Quantity
 
 OnAnswer = Callable[[str, str], None]
 """A function that is called with the name of an axis, and with what is known about it so far."""
@@ -90,20 +92,18 @@ def so_far(objective: Objective, minimum: Minimum) -> Iterator[tuple[Axis, str]]
 
 def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
     """Return by how much predictions over 10 s are wrong (RMS), in words, with the first quantity of each axis."""
-    squares: dict[Axis, tuple[str, str, float, int]] = {}
+    errors = dict[Axis, dict[Quantity, list[Array]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         off = objective.run(minimum.z, n, begin=SETTLING, span=AHEAD).innovations
         usual = np.abs(minimum.data[n].normalised) < OUTLYING
         for number, m in enumerate(sampled.measured):
-            own = off[usual & (record.sensor == number)]
-            name, unit, sum_, count = squares.get(m.sensor.axis, (m.channel.quantity.name, "", 0.0, 0))
-            if name == m.channel.quantity.name and len(own):
-                unit = m.channel.quantity.unit
-                squares[m.sensor.axis] = name, unit, hypot(sum_, float(np.linalg.norm(own))), count + len(own)
-    return {axis: _in_words(name, unit, size / count**0.5) for axis, (name, unit, size, count) in squares.items()}
+            if len(own := off[usual & (record.sensor == number)]):
+                errors.setdefault(m.sensor.axis, {}).setdefault(m.channel.quantity, []).append(own)
+    return {axis: _in_words(*next(iter(own.items()))) for axis, own in errors.items()}
 
 
-def _in_words(name: str, unit: str, error: float) -> str:
-    """Return the error of a quantity, such as `depth to 2 cm`."""
+def _in_words(quantity: Quantity, errors: Sequence[Array]) -> str:
+    """Return the errors of a quantity, such as `depth to 2 cm`."""
+    error, unit = rms(np.concatenate(errors)), quantity.unit
     factor, unit = (100.0, "cm") if unit == "m" and error < 1.0 else in_degrees(unit)
-    return f"{name} to {factor * error:.2g} {unit}"
+    return f"{quantity.name} to {factor * error:.2g} {unit}"

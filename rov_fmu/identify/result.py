@@ -259,7 +259,6 @@ class Structure:
     model is then without it."""
     value: float = nan
     """The number of its parameter; NaN if it has none."""
-    interval: Interval = (nan, nan)
     unit: str = "1"
     words: tuple[tuple[str, str], ...] = ()
     """What else its sentence needs."""
@@ -411,9 +410,8 @@ class AxisOfBase:
     @property
     def verdict(self) -> Verdict:
         """The word, with where its coefficients are from."""
-        if not self.source:
-            return Verdict("not identified", (f"{self.reason}, so {without((self.axis,), self.thrusters)}",))
-        return Verdict("not identified", (f"from {self.source} ({self.reason})",))
+        lacking = f"{self.reason}, so {without((self.axis,), self.thrusters)}"
+        return Verdict("not identified", (f"from {self.source} ({self.reason})" if self.source else lacking,))
 
 
 def without(axes: Iterable[Axis], thrusters: Sequence[str]) -> str:

@@ -131,6 +131,11 @@ class Commands:
         return float(self.rows[-1]) + self.interval
 
     @property
+    def in_rows(self) -> dict[str, Array]:
+        """The command of each thruster in each row, by its name."""
+        return dict(zip(self.thrusters, self.at(self.rows).T, strict=True))
+
+    @property
     def largest(self) -> dict[str, float]:
         """The size of the largest command of each thruster."""
         by_thruster = (np.abs(self.value[self.thruster == n]) for n in range(len(self.thrusters)))

@@ -121,7 +121,7 @@ OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -
 SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
-HEALTH = Structure("health", "l", 0.999, 0.5, (0.48, 0.52))
+HEALTH = Structure("health", "l", 0.999, 0.5)
 LOST = Structure("momentary commands", "a.csv", 1.0, words=(("share", "30%"), ("axis", "yaw"), ("rate", "10")))
 
 

@@ -140,7 +140,7 @@ def test_what_a_base_knows_is_kept_where_no_test_tells_anew(tmp_path: Path) -> N
     base = load_vehicle(REFIT)
     by_hand = '[known]\nbeta_w = { value = 0.6, unit = "1", source = "by hand", interval = [0.5, 0.7] }\n'
     tests = read(tmp_path, f'base = "videoray_refit"\n{HEAD}{by_hand}', responses(TRUTH, YAW))
-    assert tests.vehicle.layout == base.layout
+    assert tests.layout == base.layout
     assert tests.folder.inputs.keys() == {"rov.toml", "videoray_refit", "steady_yaw.csv", "time_constant_yaw.csv"}
     result = identify(tests)
     about = {finding.axis or finding.curve for finding in result.findings}

@@ -95,7 +95,7 @@ def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, insp
         load_tests(tmp_path)
     weigh(tmp_path)
     tests = load_tests(tmp_path)
-    assert tests.vehicle["m_rov"] == 12.0
+    assert tests.base["m_rov"] == 12.0
     assert axes <= {*tests.logged}
     (log,) = tests.folder.logs
     assert measured(log, "depth") == pytest.approx(DEPTH, abs=1e-5)
@@ -128,7 +128,7 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace('["?", "?", "?"]', "[0, 0, 0]").replace('"?"', "9.0")
     text = text.replace("[axes.yaw]", "")  # its column may stay
     (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
-    assert [*load_tests(tmp_path).vehicle.layout.by_name] == ["heave"]
+    assert [*load_tests(tmp_path).layout.by_name] == ["heave"]
 
 
 @pytest.mark.parametrize(

@@ -173,7 +173,7 @@ def test_thrusters_with_a_toe_in_and_a_log_with_sway(axes: str, tmp_path: Path) 
     left, right = np.where(TIME > 2.0, 0.5, 0.0), np.where(TIME > 5.0, 0.3, 0.0)
     table(tmp_path / "dive.csv", titles, TIME, left, right, motion.U, motion.V, motion.HEADING)
     tests = load_tests(tmp_path)
-    assert [*tests.vehicle.layout.by_name] == tests.logged == ["surge", "yaw"]
+    assert [*tests.layout.by_name] == tests.logged == ["surge", "yaw"]
     assert "dive.csv: the motion in sway is left out, because the thrusters drive it only together with" in (
         "\n".join(sentences(tests.folder.findings))
     )

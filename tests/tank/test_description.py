@@ -86,7 +86,7 @@ def test_a_log_stands_instead_of_all_of_its_axis(tmp_path: Path) -> None:
     plan = ((0.0, 2.0), (0.3, 5.0), (0.0, 4.0), (-0.5, 5.0), (0.8, 5.0))
     write_log(folder, "a", run(true, HEAVE, plan, 20.0).noisy(np.random.default_rng(0), noise=0.002))
     tests = load_tests(folder)
-    assert tests.vehicle.layout.by_name["heave"].keys == ("m_a", "a_d", "b_d")
+    assert tests.layout.by_name["heave"].keys == ("m_a", "a_d", "b_d")
     assert not {"F_0_w", "a_d_w", "b_d_w", "beta_w"} & {*tests.known}
     found = identify(tests).vehicle
     for name in ("a_d_w", "b_d_w", "beta_w"):
@@ -104,7 +104,7 @@ def test_thrust_ahead_leaves_reverse_as_it_is(
     curve = base.layout.curves[0]
     rows = "".join(f"{c},{1.1 * base.curve_force(curve, c):.6f}\n" for c in commands)
     tests = read(tmp_path, BLUEROV2, {"thrust_T200.csv": f"{FORCE}\n{rows}"})
-    assert tests.vehicle.layout.curves[0].keys == keys
+    assert tests.layout.curves[0].keys == keys
     if len(commands) == 2:
         found = identify(tests).vehicle
         assert found.curve_force(curve, 0.6) == pytest.approx(1.1 * base.curve_force(curve, 0.6), rel=2e-3)
@@ -122,8 +122,8 @@ def test_a_base_gains_an_axis_by_its_tests(tmp_path: Path) -> None:
     for also, keys in (("", ("a_d", "b_d")), (table, ("m_a", "a_d", "b_d"))):
         limits = LIMITS.format(-1, 1, 0.2, 0.21, 0, 1e4, 1e4)
         tests = read(folder, f'base = "old.toml"\n{HEAD}{also}{limits}', responses(k, SWAY))
-        assert [*tests.vehicle.layout.by_name] == ["surge", "sway", "heave", "yaw"]
-        assert tests.vehicle.layout.by_name["sway"].keys == keys
+        assert [*tests.layout.by_name] == ["surge", "sway", "heave", "yaw"]
+        assert tests.layout.by_name["sway"].keys == keys
     inputs: list[Path] = []
     load_tests(folder, inputs.extend)
     assert folder / "old.toml" in inputs
@@ -137,7 +137,7 @@ def test_the_coupling_of_the_base_can_be_changed(base: str, coupling: bool | Non
     own = "" if coupling is None else f"[body]\ncoupling = {str(coupling).lower()}\n"
     tests = read(tmp_path, f'base = "{base}"\n{HEAD}{own}', responses(vehicle, HEAVE))
     wanted = vehicle.layout.coupled if coupling is None else coupling
-    assert tests.vehicle.layout.coupled == (wanted and base != "videoray")
+    assert tests.layout.coupled == (wanted and base != "videoray")
     assert ("not coupled" in [finding.kind for finding in tests.folder.findings]) == (wanted and base == "videoray")
 
 
@@ -156,7 +156,7 @@ def test_the_base_of_the_command_line_may_lie_anywhere(
     tests = load_tests(folder, inputs.extend, elsewhere)
     assert elsewhere in inputs
     assert [*tests.folder.inputs][:2] == [ROV_FILE, "mine.toml"]
-    assert not tests.vehicle.layout.coupled
+    assert not tests.layout.coupled
     assert load_tests(folder, base=SHIPPED["bluerov2"]).description.base_name == "bluerov2"
     for given, target, message in (
         (elsewhere, elsewhere, "would overwrite"),
@@ -187,7 +187,7 @@ def test_an_axis_whose_thrusters_cancel_each_other_is_a_warning(tmp_path: Path) 
     header = ",".join([*names, "surge distance [m]", "depth [m]"])
     tables = {"dive.csv": "\n".join([header, *rows]) + "\n", "thrust_t200.csv": pulled(30.0, 20.0)}
     tests = read(tmp_path, f"{rov}[axes.heave]\n", tables)
-    assert [*tests.vehicle.layout.by_name] == tests.logged == ["surge"]
+    assert [*tests.layout.by_name] == tests.logged == ["surge"]
     assert Finding("cancelling thrusters", "heave", file="dive.csv") in tests.folder.findings
     assert any(
         "heave: the logs have its motion, but in all of them its thrusters cancel each other" in line
@@ -229,4 +229,4 @@ def test_the_rov_toml_of_the_docs(tmp_path: Path) -> None:
     given = read(tmp_path, text, {"steady_heave.csv": f"{SPEED}\n0.3,0.2\n"})
     assert given.description.tables.vehicle
     assert given.description.tables.vehicle.name == "Our BlueROV2"
-    assert given.vehicle.layout == without_surface(load_vehicle(SHIPPED["bluerov2"])).layout
+    assert given.layout == without_surface(load_vehicle(SHIPPED["bluerov2"])).layout

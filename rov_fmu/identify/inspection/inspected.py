@@ -83,16 +83,11 @@ class Inspected:
         return Output(self.path, completed(self.own, self.text).encode())
 
     @property
-    def dives(self) -> list[Log]:
-        """The logs with commands, each with the channels of the files without commands that belong to it."""
-        return _dives(self.path, self.logs)
-
-    @property
     def undetermined(self) -> list[str]:
         """A sentence for everything that the logs cannot determine, whatever a fit finds."""
         if not self.description:
             return []
-        dives = self.dives
+        dives = _dives(self.path, self.logs)
         if self.description.layout.has_wrench:
             dives = [replace(log, commands=c.relative_to(c.largest)) for log in dives if (c := log.commands)]
         unread = [title for one in self.logs for title in one.unread]
@@ -173,7 +168,10 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
         headers=headers,
         name=name,
     )
-    return inspected if own else replace(inspected, description=_drafted(inspected).description)
+    if own:
+        return inspected
+    drafted = inspected.draft_for(None) if likely.base else Draft(lacks, "")
+    return replace(inspected, description=read_description(path, draft=drafted).description)
 
 
 def _dives(path: Path, inspections: Sequence[Inspection]) -> list[Log]:
@@ -195,7 +193,7 @@ def _guess(found: Moved, description: Description | None, own: Toml) -> Guess:
     mistakes.
     """
     if description and description.has_hardware_tables:
-        found = replace(found, driven=frozenset(form.axis for form in description.logged.axes))
+        found = replace(found, driven=frozenset(description.logged.bare_axes))
     mass: object = own
     for key in ("body", "m_rov", "value"):
         mass = mass.get(key) if isinstance(mass, dict) else None
@@ -206,9 +204,3 @@ def _has_form_of_paper(described: RovFile, likely: LikelyVehicle) -> bool:
     """Return True if a rov.toml that has no vehicle stands for that of the paper, and the logs do not contradict it."""
     layout = described.description.layout if described.description else Layout((), (), ())
     return {*likely.thrusters} <= {thruster.name for thruster in layout.thrusters} | {COMMAND}
-
-
-def _drafted(inspected: Inspected) -> RovFile:
-    """Return what the draft says of the vehicle."""
-    draft = inspected.draft_for(None) if inspected.likely.base else Draft(inspected.text, "")
-    return read_description(inspected.path, draft=draft)

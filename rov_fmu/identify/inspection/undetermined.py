@@ -80,8 +80,7 @@ def undetermined(
                 weak.append(f"{percent(largest)} in {axis.name}")
         if weak:
             yield f"speeds beyond the strongest commands, {listed(weak)}, are extrapolated"
-        of_dives = [log.commands for log in logs if log.commands and not log.follows_axis]
-        values = [dict(zip(one.thrusters, one.at(one.rows).T, strict=True)) for one in of_dives]
+        values = [log.commands.in_rows for log in logs if log.commands and not log.follows_axis]
         for group in thrusters_alike(layout, values):
             if len(group) > 1:
                 yield from sentences([about("", "not told apart", of=listed(group))])
@@ -124,7 +123,7 @@ def _by_commands(axis: Axis, logs: Sequence[Commands], layout: Layout) -> tuple[
     ]
     alone, largest, beside = 0.0, 0.0, dict.fromkeys(others, 0.0)
     for commands in logs:
-        values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
+        values = commands.in_rows
         own = push_along(layout, axis, values)
         pushed = {other: np.abs(push_along(layout, other, values)) for other in others if COMMAND not in values}
         most = np.max([*pushed.values()], axis=0) if pushed else np.zeros(len(own))

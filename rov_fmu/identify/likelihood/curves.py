@@ -317,10 +317,14 @@ class Quadratic:
     """The name of the curve or of the axis."""
     coefficients: Mapping[str, Any]
     """By the names of a_t and b_t, or a_d and b_d."""
-    misfit: Array
-    """Of the forces at the points, relatively: m, or m x n."""
     terms: Array
     """The forces for a coefficient of 1, relative to the curve: m x 2, or n x m x 2."""
+
+    @property
+    def misfit(self) -> Array:
+        """Of the forces at the points, relatively: m, or m x n."""
+        values = np.array([*self.coefficients.values()])
+        return np.asarray((self.terms @ values.T[..., None])[..., 0].T - 1.0)
 
     def covariance(self, variance: float) -> Array:
         """Return the covariance of both with which the relative forces at the commands have a mean variance."""
@@ -346,8 +350,7 @@ def nearest(
         values = np.linalg.pinv(terms).sum(axis=-1).T  # least squares of terms @ values = 1
         values[np.abs(values) < _ROUNDING * np.abs(values).max(axis=0)] = 0.0
         names = [curve.coefficient(f"{key}{end}") for key in ("a_t", "b_t")]
-        misfit = (terms @ values.T[..., None])[..., 0].T - 1.0
-        yield Quadratic(curve.name, dict(zip(names, values, strict=True)), misfit, terms)
+        yield Quadratic(curve.name, dict(zip(names, values, strict=True)), terms)
 
 
 def nearest_drag(axis: str, drag: Mapping[str, Any], power: Any, typical: float, top: float) -> Quadratic:
@@ -365,5 +368,4 @@ def nearest_drag(axis: str, drag: Mapping[str, Any], power: Any, typical: float,
     alone = np.where(both[0] < both[1], [0.0 * first, second], [first, 0.0 * second])
     values = np.where(both.min(axis=0) >= 0.0, both, alone)
     values = np.where(np.equal(power, 0.0), np.broadcast_arrays(a, b), values)
-    misfit = (terms @ values.T[..., None])[..., 0].T - 1.0
-    return Quadratic(axis, dict(zip(drag, values, strict=True)), misfit, terms)
+    return Quadratic(axis, dict(zip(drag, values, strict=True)), terms)

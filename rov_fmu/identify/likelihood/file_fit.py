@@ -62,12 +62,7 @@ def without_weak_effects(
         elif is_exact:
             return FileFit(objective.without(absent), least, posterior)
         else:
-            least, is_exact = _exact(objective, absent, least), True
-
-
-def _exact(objective: Objective, absent: frozenset[int], near: Minimum) -> Minimum:
-    """Return the minimum of J without some effects, with exact derivatives, from a fit near it."""
-    return minimise(objective.without(absent), near.z, most=1, near=near.data)
+            least, is_exact = minimise(objective.without(absent), least.z, most=1, near=least.data), True
 
 
 def _without_evidence(posterior: Posterior) -> frozenset[int]:

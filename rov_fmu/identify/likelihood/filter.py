@@ -51,9 +51,14 @@ class Sensor:
     """False for a velocity through the water."""
 
     @property
+    def is_level(self) -> bool:
+        """True for a velocity or a position ahead or to starboard, or north or east."""
+        return self.axis.place < 2 and not self.axis.is_rotation
+
+    @property
     def is_horizontal(self) -> bool:
-        """True for a velocity or a position over ground, ahead or to starboard, or north or east."""
-        return self.over_ground and self.axis.place < 2 and not self.axis.is_rotation
+        """True for one over ground."""
+        return self.over_ground and self.is_level
 
     @property
     def is_horizontal_velocity(self) -> bool:

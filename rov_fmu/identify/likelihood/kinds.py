@@ -7,6 +7,7 @@ deviation is estimated from one effect.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from math import inf, log, pi
 from typing import Any, Literal
 
@@ -154,17 +155,21 @@ class Kind(Coordinate):
     """True if it differs from log to log, but is about as large in all of them."""
 
 
+_of_noise = partial(Kind, is_log=True, of_motion=False)
+"""Make the kind of a size or a time of noise or of a slow process."""
+_of_structure = partial(Kind, None, is_of_structure=True)
+"""Make the kind of the number of a hypothesis about the structure."""
+
+
 def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: float, **own: Any) -> Kind:
     """Return the kind of the size of a slow process by its usual, its least and its largest size."""
     low, high = log(least), log(largest)
-    return Kind(
+    return _of_noise(
         prior,
         mean=log(usual),
-        is_log=True,
         low=low,
         high=high,
         null=low,
-        of_motion=False,
         is_size=True,
         starts=(1.0, 1.0, 1.0),
         slow=slow,
@@ -459,7 +464,7 @@ KINDS = {
         1e-7,
         0.1,
     ),
-    "short force": Kind(
+    "short force": _of_noise(
         Deviation(
             "short_force",
             1.0,
@@ -468,8 +473,6 @@ KINDS = {
         ),
         is_size=True,
         hides_structure=True,
-        is_log=True,
-        of_motion=False,
         mean=log(0.25),
         low=log(1e-3),
     ),
@@ -513,8 +516,7 @@ KINDS = {
         0.3,
         unit="m/s",
     ),
-    "health": Kind(
-        None,
+    "health": _of_structure(
         "force of the thruster relative to a whole one",
         keys=("health",),
         is_coefficient=True,
@@ -523,10 +525,8 @@ KINDS = {
         low=0.0,
         high=1.0,
         null=1.0,
-        is_of_structure=True,
     ),
-    "command limit": Kind(
-        None,
+    "command limit": _of_structure(
         "command beyond which the thrusters push no more",
         ". The vehicle file does not have it",
         mean=0.8,
@@ -534,10 +534,8 @@ KINDS = {
         low=0.1,
         high=1.0,
         null=1.0,
-        is_of_structure=True,
     ),
-    "slew limit": Kind(
-        None,
+    "slew limit": _of_structure(
         "time that commands take from rest to full command",
         ". The vehicle file does not have it",
         mean=0.5,
@@ -546,10 +544,8 @@ KINDS = {
         high=20.0,
         null=0.0,
         unit="s",
-        is_of_structure=True,
     ),
-    "voltage drop": Kind(
-        None,
+    "voltage drop": _of_structure(
         "share of the thrust that is lost while all thrusters have full command",
         ". The vehicle file does not have it",
         mean=0.15,
@@ -557,10 +553,8 @@ KINDS = {
         low=0.0,
         high=0.8,
         null=0.0,
-        is_of_structure=True,
     ),
-    TURN: Kind(
-        None,
+    TURN: _of_structure(
         "angle of the velocity sensor about the vertical axis",
         _WITHOUT_SENSORS,
         deviation=1.5,
@@ -568,17 +562,14 @@ KINDS = {
         high=pi,
         null=0.0,
         unit="rad",
-        is_of_structure=True,
     ),
-    "white noise": Kind(
+    "white noise": _of_noise(
         Deviation("white_noise", 0.7, "ln of a sensor's white noise", "seen in the differences of its samples"),
-        is_log=True,
-        of_motion=False,
         starts=(4.0, 2.0, 4.0),
     ),
-    "coloured noise": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(0.3), hides_structure=True),
-    "correlation time": Kind(_COLOURED, is_log=True, of_motion=False, mean=log(2.0), unit="s"),
-    "row noise": Kind(is_log=True, of_motion=False, mean=log(0.03), low=log(1e-3)),
+    "coloured noise": _of_noise(_COLOURED, mean=log(0.3), hides_structure=True),
+    "correlation time": _of_noise(_COLOURED, mean=log(2.0), unit="s"),
+    "row noise": _of_noise(mean=log(0.03), low=log(1e-3)),
     "logging offset": Kind(unit="s", time="time of the rows", adapts=True),
     "logging width": Kind(of_motion=False, mean=0.5, deviation=0.5, low=0.0, high=1.0),
 }

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, lru_cache
+from itertools import product
 from math import log
 from operator import attrgetter
 from typing import Any
@@ -11,7 +12,7 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Part, Thruster, VehicleAxis
+from rov_fmu.equation.parts import Curve, Part
 from rov_fmu.identify.likelihood.curves import COUNT, Quadratic, Shapes, nearest_drag
 from rov_fmu.identify.likelihood.filter import AT_ORIGIN, Parameters, Sensor, Slow
 from rov_fmu.identify.likelihood.kinds import (
@@ -49,10 +50,10 @@ HORIZONTAL = "horizontal"
 """What has a slow velocity along no axis of the body."""
 CURRENT = ("to the north", "to the east")
 """The parts of a current."""
-_PLACES = ("forward", "to starboard", "down")
-"""The parts of the place of a sensor."""
 CENTRE = {"forward": "x_B", "to starboard": "y_B", "down": "z_B"}
 """The coordinates of the centre of buoyancy."""
+_PLACES = (*CENTRE,)
+"""The parts of the place of a sensor."""
 _LEAST_POWER = -0.9
 """The least q of quadratic drag. With -1, it would be linear drag once more."""
 _MOTION_STEP = 3e-6
@@ -132,7 +133,6 @@ class Table:
     full: Mapping[str, float]
     """By axis: the thrust or torque at full command, N or N m."""
     parameters: tuple[Parameter, ...]
-    shape_deviation: float = PRIORS["thrust_shape"].deviation
     exact: frozenset[str] = frozenset()
     """The names of the coefficients that no parameter changes."""
     prior: Prior | None = None
@@ -176,25 +176,24 @@ class Table:
         for p, coordinate in zip(self.parameters, z, strict=True):
             for name in p.sets:
                 values[name] = p.number(coordinate)
-        for form in self.layout.axes:
-            self._axis(values, z, form)
+        for axis in self.layout.bare_axes:
+            beta = axis.coefficient("beta")
+            values[beta] = self.base[beta] / self.get(z, INERTIA, axis.name, default=1.0)
         for curve in self.layout.curves:
             self._curve(values, z, curve)
+        self._astern(values, z, "drag astern", ("a_d", "b_d"), self.layout.by_name)
+        self._astern(values, z, "dead band astern", ("c_0",), self.layout.curves_by_name)
         return values | {name: self.base[name] for name in self.exact}
 
-    def _axis(self, values: dict[str, Any], z: Array, form: VehicleAxis) -> None:
-        axis = form.axis
-        for key in ("a_d", "b_d"):
-            name, reverse = axis.coefficient(key), axis.coefficient(f"{key}{REVERSE}")
-            if reverse in self.layout.coefficients:
-                ratio = self._ratio(reverse, name) * np.exp(self.get(z, "drag astern", axis.name))
-                values[reverse] = values[name] * ratio
-        beta = axis.coefficient("beta")
-        values[beta] = self.base[beta] / self.get(z, INERTIA, axis.name, default=1.0)
-
-    def _ratio(self, astern: str, ahead: str) -> float:
-        """Return a coefficient astern of the base relative to that ahead; 1 if that ahead is 0."""
-        return self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
+    def _astern(
+        self, values: dict[str, Any], z: Array, kind: str, keys: Sequence[str], parts: Mapping[str, Part]
+    ) -> None:
+        """Set the coefficients astern of some parts to those ahead, times the ratio of the base and a parameter's."""
+        for key, (of, part) in product(keys, parts.items()):
+            ahead, astern = part.coefficient(key), part.coefficient(f"{key}{REVERSE}")
+            if astern != ahead:
+                ratio = self.base[astern] / self.base[ahead] if self.base[ahead] else 1.0
+                values[astern] = values[ahead] * (ratio * np.exp(self.get(z, kind, of)))
 
     def _curve(self, values: dict[str, Any], z: Array, curve: Curve) -> None:
         scale = self.get(z, "thrust scale", curve.name, default=1.0)
@@ -209,11 +208,6 @@ class Table:
                 a, b = (self.base[name] for name in names)
                 values[names[0]] = scale * ratio * (a - moved * (a + b))
                 values[names[1]] = scale * ratio * (b + moved * (a + b))
-        if "c_0" in curve.keys:
-            band, other = (curve.coefficient(key) for key in ("c_0", f"c_0{REVERSE}"))
-            if other != band:
-                ratio = self._ratio(other, band) * np.exp(self.get(z, "dead band astern", curve.name))
-                values[other] = values[band] * ratio
         if "d" in curve.keys and not curve.tables:
             usual = _lost(curve, self.base)
             lost = self.get(z, "advance", curve.name, default=usual)
@@ -243,12 +237,13 @@ class Table:
     def _shapes(self, z: Array, coefficients: Mapping[str, Any]) -> Shapes:
         deviations, bands = {}, {}
         for curve in self.layout.curves:
-            if (first := self.index("thrust shape", curve.name, "1")) is not None:
-                deviations[curve.name] = self.shape_deviation * z[first : first + COUNT]
+            is_exact = {curve.coefficient("a_t"), curve.coefficient("b_t")} <= self.exact
+            if (first := self.index("thrust shape", curve.name, "1")) is not None and not is_exact:
+                deviations[curve.name] = self.parameters[first].number(z[first : first + COUNT])
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
         reverse = {curve.name for curve in self.layout.curves if curve.coefficient(f"a_t{REVERSE}") in self.exact}
-        powers = {form.axis.name: self.powers(z, form.axis) for form in self.layout.axes}
+        powers = {axis.name: self.powers(z, axis) for axis in self.layout.bare_axes}
         return Shapes(deviations, bands, frozenset(reverse), powers)
 
     def powers(self, z: Array, axis: Axis) -> tuple[Any, Any, float]:
@@ -271,7 +266,7 @@ class Table:
         `top` has the largest tested speed of the axes, m/s or rad/s. Without one, it is V.
         """
         coefficients = self.coefficients(z)
-        for axis in (form.axis for form in self.layout.axes):
+        for axis in self.layout.bare_axes:
             *powers, typical = self.powers(z, axis)
             for end, q in zip(("", REVERSE), powers, strict=True) if any(map(np.any, powers)) else ():
                 names = [axis.coefficient(f"{key}{end}") for key in ("a_d", "b_d")]
@@ -293,7 +288,7 @@ class Table:
             ahead = values.get(names.get((*part, key.removesuffix(REVERSE)), ""))
             if name not in values and tuple(part) in parts and (value := ABSENT.get(key, ahead)) is not None:
                 values[name] = value
-        return replace(self, base={**self.base, **values}, exact=frozenset(values), shape_deviation=0.0)
+        return replace(self, base={**self.base, **values}, exact=frozenset(values))
 
     def of_log(self, z: Array, sampled: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
@@ -312,14 +307,14 @@ class Table:
             assert process
             return Slow(unit * self.get(z, kind, of), process.time_constant)
 
-        along = Slow()
-        if sampled.has_positions or sampled.has_velocities:
+        along, down = Slow(), Slow()
+        if sampled.shows_horizontal:
             along = slow(WANDER if sampled.record.wanders else "slow velocity", HORIZONTAL)
-        down = slow("slow velocity", HEAVE.name) if any(s.axis is HEAVE for s in sampled.record.sensors) else Slow()
+        if layout.has(HEAVE) and any(s.axis is HEAVE for s in sampled.record.sensors):
+            down = slow("slow velocity", HEAVE.name)
         noises = [self.noise(z, m.channel.quantity.name) for m in sampled.measured]
         powers = [self.powers(z, axis) for axis in axes]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
-        is_inside = HEAVE.name in layout.by_name
         return Parameters(
             coefficients=coefficients,
             forces=tuple(slow("slow force", a.name, units[a.name]) for a in axes),
@@ -328,13 +323,16 @@ class Table:
             if sampled.is_momentary
             else (),
             gain=slow("slow gain"),
-            drifts=(along, along, down if is_inside else Slow()),
+            drifts=(along, along, down),
             white=tuple(white for white, _, _ in noises),
             noise=tuple(Slow(coloured, time) for _, coloured, time in noises),
-            lags=tuple(self._lag(z, m.sensor) for m in sampled.measured),
+            lags=tuple(self.get(z, "sensor lag", "", with_same_lag(m.sensor), None) for m in sampled.measured),
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in sampled.measured),
             turn=self.get(z, TURN),
-            scales=tuple(self._scale(z, m.sensor) for m in sampled.measured),
+            scales=tuple(
+                np.exp(self.get(z, SENSOR_SCALE, m.sensor.axis.name)) if m.sensor.is_velocity else 1.0
+                for m in sampled.measured
+            ),
             offsets=tuple(self.get(z, SENSOR_OFFSET, file, m.channel.quantity.name) for m in sampled.measured),
             mean_drifts=tuple(self.get(z, SENSOR_OFFSET, file, _of_estimator(part)) for part in CURRENT),
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
@@ -389,15 +387,6 @@ class Table:
             return _followed(sampled, *numbers[0].tolist())
         return np.array([_followed(sampled, *each) for each in numbers.tolist()])
 
-    def _scale(self, z: Array, sensor: Sensor) -> Any:
-        """Return what a sensor multiplies its quantity by."""
-        return np.exp(self.get(z, SENSOR_SCALE, sensor.axis.name)) if sensor.is_velocity else 1.0
-
-    def _lag(self, z: Array, sensor: Sensor) -> Any:
-        """Return the lag of a sensor; None if it has none."""
-        index = self.index("sensor lag", "", with_same_lag(sensor))
-        return None if index is None else z[index]
-
 
 @lru_cache(64)
 def _followed(sampled: SampledLog, limit: float, rise: float, drop: float) -> Array:
@@ -436,9 +425,8 @@ def _ramped(values: Sequence[float], spans: Sequence[float], rise: float) -> Ite
 
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
-    shape = known.deviations.get("thrust_shape", PRIORS["thrust_shape"].deviation)
     parameters = tuple(p for p in _parameters(known, logs, row_noises) if p.deviation > 0.0)
-    return Table(known.layout, known.coefficients, known.full, parameters, shape, known.exact, known)
+    return Table(known.layout, known.coefficients, known.full, parameters, known.exact, known)
 
 
 Make = Callable[..., Parameter]
@@ -451,11 +439,21 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
         is_exact = key.startswith(("thrust_", "dead_band")) and prior("thrust") == 0.0
         return 0.0 if is_exact else known.deviations.get(key, PRIORS[key].deviation)
 
-    def make(kind: str, of: str = "", part: str = "", deviation: float | None = None, **own: Any) -> Parameter:
-        usual = {one.name: getattr(KINDS[kind], one.name) for one in fields(Coordinate)} | own
+    def make(
+        kind: str,
+        of: str = "",
+        part: str = "",
+        deviation: float | None = None,
+        parts: Iterable[Part] = (),
+        **own: Any,
+    ) -> Parameter:
+        declared = KINDS[kind]
+        usual = {one.name: getattr(declared, one.name) for one in fields(Coordinate)}
         if deviation is None:
-            deviation = prior(declared.key) if (declared := KINDS[kind].prior) else usual["deviation"]
-        return Parameter(kind, of, part, **usual | {"deviation": deviation})
+            deviation = prior(declared.prior.key) if declared.prior else declared.deviation
+        names = (one.coefficient(declared.keys[0]) for one in parts if declared.is_coefficient)
+        usual["sets"] = tuple(name for name in names if name in known.layout.coefficients)
+        return Parameter(kind, of, part, **usual | {"deviation": deviation} | own)
 
     if logs or known.has_times:
         T = max((known.coefficients[c.coefficient("T")] for c in known.curves if "T" in c.keys), default=0.0)
@@ -467,7 +465,7 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
                 yield make("centre of buoyancy", "", part, offset=known.coefficients[key], sets=(key,))
         yield make("dead time")
         if any("n_V" in c.keys for c in known.curves):
-            yield make("voltage", sets=_set(known, "voltage", known.layout.curves))
+            yield make("voltage", parts=known.layout.curves)
         yield from _of_sensors(logs, make)
     yield from _of_curves(known, make, prior("thrust_shape"))
     yield from _advance(known, make)
@@ -491,7 +489,7 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
         has_reverse = f"a_t{REVERSE}" in curve.keys and curve.coefficient(f"a_t{REVERSE}") not in known.exact
         is_told_astern = has_reverse and known.measured_curves.get(name, False)
         if shape:
-            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0) for n in range(COUNT)]
+            shapes = [make("thrust shape", name, str(n + 1), deviation=1.0, factor=shape) for n in range(COUNT)]
             linear = [
                 make(
                     "linear thrust",
@@ -509,11 +507,10 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
             # Forces that were measured astern are data, and not an effect that may be absent.
             null = {"null": None} if is_told_astern else {}
             yield make("reverse thrust", name, deviation=0.5 if is_measured else None, **null)
-        if "c_0" in curve.keys and curve.coefficient("c_0") not in known.exact and shape:
-            band = curve.coefficient("c_0")
-            yield make("dead band", name, mean=known.coefficients[band], sets=_set(known, "dead band", [curve]))
-            astern = curve.coefficient(f"c_0{REVERSE}")
-            if is_told_astern and astern not in known.exact | {curve.coefficient("c_0")}:
+        band, astern = (curve.coefficient(f"c_0{end}") for end in ("", REVERSE))
+        if "c_0" in curve.keys and band not in known.exact and shape:
+            yield make("dead band", name, mean=known.coefficients[band], parts=[curve])
+            if is_told_astern and astern not in known.exact | {band}:
                 yield make("dead band astern", name)
 
 
@@ -561,14 +558,7 @@ def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
         form = known.layout.by_name[axis.name]
         for name, kind in KINDS.items():
             if (own := kind.of_axis(known, form)) is not None:
-                yield make(name, axis.name, sets=_set(known, name, [form]), **own)
-
-
-def _set(known: Prior, kind: str, parts: Iterable[Part | Thruster]) -> tuple[str, ...]:
-    """Return the names of the coefficients of some parts that are the number of a parameter of a kind."""
-    declared = KINDS[kind]
-    names = (part.coefficient(declared.keys[0]) for part in parts if declared.is_coefficient)
-    return tuple(name for name in names if name in known.layout.coefficients)
+                yield make(name, axis.name, parts=[form], **own)
 
 
 def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
@@ -580,9 +570,8 @@ def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parame
     yield make(OFFSET, file, mean=mean, deviation=max(share * half, 0.005), log=number)
     yield make(WIDTH, file, log=number, **width)
     directions = CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]
-    if sampled.has_positions or sampled.has_velocities:
-        for part in directions:
-            yield make("current", file, part, log=number)
+    for part in directions if sampled.shows_horizontal else ():
+        yield make("current", file, part, log=number)
     offsets = {m.channel.quantity.name: m.channel.quantity.unit for m in _with_offset(sampled)}
     if sampled.record.wanders:
         offsets |= dict.fromkeys(map(_of_estimator, directions), "m/s")
@@ -597,8 +586,7 @@ def _with_offset(sampled: SampledLog) -> Iterator[SampledChannel]:
     of a position by a current, too.
     """
     for m in sampled.seen_twice:
-        is_level = m.sensor.axis.place < 2 and not m.sensor.axis.is_rotation
-        if not is_level or (m.sensor.over_ground and not sampled.record.wanders):
+        if not m.sensor.is_level or (m.sensor.over_ground and not sampled.record.wanders):
             yield m
 
 
@@ -621,7 +609,7 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
 
 
 def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
-    moving = {form.axis.name for one in logs for form in one.layout.axes}
+    moving = {name for one in logs for name in one.layout.by_name}
     for axis in known.layout.bare_axes:
         if axis.name in moving and known.full[axis.name]:  # also if no test fits it: its motion may be unstable
             yield make("slow force", axis.name)
@@ -632,7 +620,7 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
         yield make("slow gain")
     if any(s.axis is HEAVE for one in logs for s in one.record.sensors):
         yield make("slow velocity", HEAVE.name)
-    horizontal = {one.record.wanders for one in logs if one.has_positions or one.has_velocities}
+    horizontal = {one.record.wanders for one in logs if one.shows_horizontal}
     if False in horizontal:
         yield make("slow velocity", HORIZONTAL)
     if True in horizontal:

@@ -4,21 +4,25 @@ Nothing is resampled onto a common grid. Samples that come faster than the vehic
 which keeps what they tell and bounds the time of a fit.
 """
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from math import cos, inf, pi, sin
+from itertools import product
+from math import inf, pi
 from typing import Any
 
 import numpy as np
 
+from rov_fmu.equation.attitude import INITIAL, QUATERNION, start_formulas
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
 from rov_fmu.identify.result import least_error
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
-from rov_fmu.tank.clocks import first_in_each, gaps, held
+from rov_fmu.tank.clocks import first_in_each, gaps, held, in_rows
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps_in_words, jumps
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -78,6 +82,11 @@ class SampledChannel:
     noise: float
     """A first guess of the standard deviation of its white noise, SI units."""
 
+    def some_of(self, kept: Flags) -> "SampledChannel":
+        """Return the channel with some of its samples."""
+        time, values = self.channel.time[kept], self.channel.values[kept]
+        return replace(self, channel=replace(self.channel, time=time, values=values))
+
 
 @dataclass(frozen=True, eq=False)
 class SampledLog:
@@ -110,9 +119,13 @@ class SampledLog:
         """True if commands change at times that its rows do not tell exactly."""
         return self.has_means or bool(self.lost)
 
+    def _changed(self, change: Callable[[Record], Record], **own: Any) -> "SampledLog":
+        """Return the log with a change of what the filter reads, of all samples and of fewer."""
+        return replace(self, record=change(self.record), thinned=change(self.thinned), **own)
+
     def _with_rows(self, **columns: Any) -> "SampledLog":
         """Return the log with other columns of its rows."""
-        return replace(self, record=replace(self.record, **columns), thinned=replace(self.thinned, **columns))
+        return self._changed(lambda record: replace(record, **columns))
 
     def with_inputs(self, inputs: Array) -> "SampledLog":
         """Return the log with other commands in its rows. Lines between momentary ones would be those of before."""
@@ -135,27 +148,19 @@ class SampledLog:
         def counts(m: SampledChannel) -> SampledChannel:
             if not m.sensor.is_horizontal:
                 return m
-            later = m.channel.time >= time
-            left = replace(m, channel=replace(m.channel, time=m.channel.time[later], values=m.channel.values[later]))
+            left = m.some_of(m.channel.time >= time)
             return replace(left, noise=_least_noise(left)) if self.lost else left
 
-        def some(record: Record) -> Record:
+        def later(record: Record) -> Record:
             horizontal = np.array([sensor.is_horizontal for sensor in record.sensors])
             kept = (record.time >= time) | ~horizontal[record.sensor]
             some = [] if kept.all() else [s for s in record.sensors if s.is_horizontal]
             velocities = dict.fromkeys((s.axis.velocity for s in some if s.is_velocity), _CALM)
             positions = dict.fromkeys((DRIFTS[s.axis.place] for s in some if not s.is_velocity), _ANYWHERE)
-            return replace(
-                record,
-                time=record.time[kept],
-                value=record.value[kept],
-                sensor=record.sensor[kept],
-                start={**record.start, **dict.fromkeys(velocities, 0.0)},
-                errors={**record.errors, **velocities, **positions},
-            )
+            start = {**record.start, **dict.fromkeys(velocities, 0.0)}
+            return _some_of(record, kept, start=start, errors={**record.errors, **velocities, **positions})
 
-        measured = tuple(counts(m) for m in self.measured)
-        return replace(self, measured=measured, record=some(self.record), thinned=some(self.thinned), settled=time)
+        return self._changed(later, measured=tuple(map(counts, self.measured)), settled=time)
 
     @property
     def spans(self) -> Array:
@@ -203,21 +208,20 @@ class SampledLog:
         these is also between others: then it changed gradually. An angle whose mean may contain a jump by a full turn
         is left out.
         """
-        commands, names = self.log.commands, [*self.layout.inputs]
+        commands = self.log.commands
         assert commands
         span, rows = self.interval, np.union1d(commands.rows, self.record.told)
         inputs = held(self.record.told, self.record.inputs, rows)
-        columns = [
-            _steps(rows, column, span) if name in self.layout.commands else (rows, column)
-            for name, column in zip(names, inputs.T, strict=True)
-        ]
-        told = np.unique(np.concatenate([time for time, _ in columns]))
-        then = [held(time, values, told) for time, values in columns]
-        made: dict[str, Any] = {"told": told, "since": told, "inputs": np.column_stack(then)}
+        columns = {
+            name: _steps(rows, column, span) if name in self.layout.commands else (rows, column)
+            for name, column in zip(self.layout.inputs, inputs.T, strict=True)
+        }
+        told, then = in_rows(columns)
+        made = {"told": told, "since": told, "inputs": np.column_stack([*then.values()])}
 
         measured, start, errors = [self._clear(m) for m in self.measured], self.record.start, self.record.errors
         if any(len(m.channel.time) < len(old.channel.time) for m, old in zip(measured, self.measured, strict=True)):
-            angles = {"psi", *_quaternion(0.0, 0.0, 0.0)} & {*start}
+            angles = {"psi", *QUATERNION} & {*start}
             start = {**start, **{name: _start(measured, self.layout, ())[0][name] for name in angles}}
             errors = {**errors, **dict.fromkeys(angles, _UNKNOWN_ANGLE)}
 
@@ -228,32 +232,22 @@ class SampledLog:
                 before, time = record.time[own[:-1]], record.time[own[1:]]
                 begin[own[1:]] = np.where(time - before > _GAP_OF_ROWS * span, time - span, before)
                 kept[own] = np.isin(record.time[own], m.channel.time)
-            columns: dict[str, Any] = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
             tilt = record.tilt - np.array([[0.5 * span], [0.0], [0.0]])
-            some: dict[str, Any] = {"start": start, "errors": errors, "averaged": begin[kept], "tilt": tilt}
-            return replace(record, **columns, **made, **some)
+            return _some_of(record, kept, **made, start=start, errors=errors, averaged=begin[kept], tilt=tilt)
 
-        full, thin = map(of_means, (self.record, self.thinned))
-        return replace(self, measured=tuple(measured), record=full, thinned=thin, lost={}, has_means=True)
+        return self._changed(of_means, measured=tuple(measured), lost={}, has_means=True)
 
     def _clear(self, m: SampledChannel) -> SampledChannel:
         """Return a channel without the means of an angle that may contain a jump by a full turn."""
         raw = self.log.used(m.channel.quantity.name)
         if raw is None or raw.unwrapped[1] is raw.samples[1]:
             return m
-        seam = 0.0 if raw.samples[1].min() > -_AT_SEAM else pi
-        kept = _clear_of(seam, m.channel.values)
-        return replace(m, channel=replace(m.channel, time=m.channel.time[kept], values=m.channel.values[kept]))
+        return m.some_of(_clear_of(0.0 if raw.samples[1].min() > -_AT_SEAM else pi, m.channel.values))
 
     @property
-    def has_positions(self) -> bool:
-        """True if a horizontal position is measured."""
-        return any(not s.is_velocity and s.axis.place < 2 and not s.axis.is_rotation for s in self.record.sensors)
-
-    @property
-    def has_velocities(self) -> bool:
-        """True if a horizontal velocity over ground is measured."""
-        return any(s.is_horizontal_velocity for s in self.record.sensors)
+    def shows_horizontal(self) -> bool:
+        """True if a horizontal position is measured, or a horizontal velocity over ground."""
+        return any(s.is_level and (s.over_ground or not s.is_velocity) for s in self.record.sensors)
 
     def vehicle(self, coefficients: Mapping[str, float]) -> Vehicle:
         """Return the part of a vehicle that the log concerns."""
@@ -279,6 +273,12 @@ class SampledLog:
         after = np.pad(ends[1:], ((0, 1), (0, 0)))
         beside = np.sqrt(0.5 * (ends**2 + after**2) + _LEAST_BESIDE**2)
         return replace(self._with_rows(beside=beside), is_momentary=True)
+
+
+def _some_of(record: Record, kept: Flags, **columns: Any) -> Record:
+    """Return a record with some of its samples, and with other columns."""
+    samples = {key: getattr(record, key)[kept] for key in ("time", "value", "sensor")}
+    return replace(record, **samples, **columns)
 
 
 def _steps(rows: Array, values: Array, span: float) -> tuple[Array, Array]:
@@ -368,20 +368,18 @@ def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
     slowing: dict[Axis, bool] = {}
     findings = []
     for axis, channel in _channels(log, layout):
-        found = Finding("gaps", axis.name, file=channel.file or log.file, words={"quantity": channel.quantity.name})
+        file, quantity = channel.file or log.file, channel.quantity.name
         if kind := _why_left_out(channel):
             numbers = {"count": channel.count, "least": LEAST_SAMPLES} if kind == "too few samples" else {}
-            findings.append(replace(found, kind=kind, words={**found.words, **numbers}))
+            findings.append(about(file, kind, axis.name, quantity=quantity, **numbers))
             continue
-        measured.setdefault(axis, found.file)
+        measured.setdefault(axis, file)
         slowing[axis] = slowing.get(axis, False) or _slows_down(channel)
-        if some := gaps(channel.time, channel.values):
-            assert log.commands
-            begin = float(log.commands.rows[0])
-            words = {**found.words, "gaps": gaps_in_words(some, begin), "count": len(some)}
-            findings.append(replace(found, words=words))
+        if log.commands and (some := gaps(channel.time, channel.values)):
+            words = gaps_in_words(some, float(log.commands.rows[0]))
+            findings.append(about(file, "gaps", axis.name, quantity=quantity, gaps=words, count=len(some)))
     kinds = {axis: kind for axis in measured if (kind := _without_thrust(log, layout, axis, slowing[axis]))}
-    findings += [Finding(kind, axis.name, file=measured[axis]) for axis, kind in kinds.items()]
+    findings += [about(measured[axis], kind, axis.name) for axis, kind in kinds.items()]
     return [axis for axis in measured if kinds.get(axis) in (None, FREE_DECAY)], findings
 
 
@@ -397,8 +395,8 @@ def lost_between_rows(log: Log, layout: Layout) -> dict[str, float]:
         return {}
     if len({*commands.time.tolist()}) < _MOST_CHANGE * len(commands.rows):
         return {}
-    values = dict(zip(commands.thrusters, commands.at(commands.rows).T, strict=True))
-    pushes = {form.axis.name: push_along(layout, form.axis, values) for form in layout.axes}
+    values = commands.in_rows
+    pushes = {axis.name: push_along(layout, axis, values) for axis in layout.bare_axes}
     lost = {axis: beside_lines(push) for axis, push in pushes.items() if np.ptp(push) > LEAST_COMMAND}
     return {axis: share for axis, share in lost.items() if share > _LEAST_LOST}
 
@@ -481,13 +479,10 @@ def _without_thrust(log: Log, layout: Layout, axis: Axis, slows_down: bool) -> s
     if not drivers:
         return "no thruster"
     strongest = max(abs(t.effect(axis)) for t in drivers)
-    for curve in {t.curve for t in drivers}:
-        own = [(t.effect(axis) / strongest, of[t.name]) for t in drivers if t.curve == curve and t.name in of]
-        for side in (1.0, -1.0):
-            for power in (1, 2):
-                thrust = sum((effect * np.clip(side * c, 0.0, 1.0) ** power for effect, c in own), np.zeros(1))
-                if np.ptp(thrust) > _LEAST_PUSH:
-                    return ""
+    by_curve = grouped((t.curve, (t.effect(axis) / strongest, of[t.name])) for t in drivers if t.name in of)
+    for own, side, power in product(by_curve.values(), (1.0, -1.0), (1, 2)):
+        if np.ptp(sum(effect * np.clip(side * c, 0.0, 1.0) ** power for effect, c in own)) > _LEAST_PUSH:
+            return ""
     moved = any(np.ptp(of[t.name]) > _LEAST_PUSH for t in drivers if t.name in of)
     return "cancelling thrusters" if moved else "constant push"
 
@@ -550,10 +545,8 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
         for n, v in enumerate(value):
             if abs(v - value[kept[-1]]) > _LEAST_CHANGE * abs(value[kept[-1]]):
                 kept.append(n)
-        changes = np.setdiff1d(time[kept], told)
-        told, since = np.concatenate([told, changes]), np.concatenate([since, changes])
-        order = np.argsort(told)
-        told, since = told[order], since[order]
+        rows = np.union1d(told, time[kept])
+        told, since = rows, np.where(np.isin(rows, told), held(told, since, rows), rows)
     inputs = np.zeros((len(told), len(layout.inputs)))
     names = [*layout.inputs]
     values = commands.at(told)
@@ -581,6 +574,9 @@ def _tilt(log: Log, layout: Layout) -> Array:
     return np.array([time, np.interp(time, times, rolls), pitches])
 
 
+_attitude = compiled(start_formulas())
+
+
 def _start(
     measured: Sequence[SampledChannel], layout: Layout, decaying: Collection[str]
 ) -> tuple[dict[str, float], dict[str, float]]:
@@ -596,8 +592,7 @@ def _start(
         m = first.get((axis.name, is_velocity))
         return (float(m.channel.values[0]), 3.0 * m.noise) if m else None
 
-    for form in layout.axes:
-        axis = form.axis
+    for axis in layout.bare_axes:
         if value := of(axis, is_velocity=True):
             start[axis.velocity], errors[axis.velocity] = value[0], value[1] + 0.1 * _CALM
         elif (m := first.get((axis.name, False))) and (axis in (HEAVE, YAW) or len(layout.axes) == 1):
@@ -612,23 +607,12 @@ def _start(
                 errors[position] = _CALM
     angles = [of(axis, is_velocity=False) for axis in (ROLL, PITCH, YAW)]
     if layout.has_attitude:
-        phi, theta, psi = (angle[0] if angle else 0.0 for angle in angles)
-        start |= _quaternion(phi, theta, psi)
-        errors |= dict.fromkeys(_quaternion(0.0, 0.0, 0.0), _LEVEL)
+        attitude = _attitude({name: angle[0] if angle else 0.0 for name, angle in zip(INITIAL, angles, strict=True)})
+        start |= {name: attitude[name] for name in QUATERNION}
+        errors |= dict.fromkeys(QUATERNION, _LEVEL)
     elif "psi" in layout.state:
         start["psi"], errors["psi"] = angles[2] or (0.0, _LEVEL)
     return start, errors
-
-
-def _quaternion(phi: float, theta: float, psi: float) -> dict[str, float]:
-    """Return the quaternion of Euler angles (zyx), rad."""
-    (a, b, c), (d, e, f) = ([g(0.5 * angle) for angle in (phi, theta, psi)] for g in (cos, sin))
-    return {
-        "eta": a * b * c + d * e * f,
-        "epsilon_1": d * b * c - a * e * f,
-        "epsilon_2": a * e * c + d * b * f,
-        "epsilon_3": a * b * f - d * e * c,
-    }
 
 
 def typical(some: Sequence[SampledLog], axis: Axis) -> float:

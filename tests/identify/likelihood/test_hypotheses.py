@@ -788,7 +788,7 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
     for told in found.structures:
         assert told.probability > 0.95
         if fault.value is not None:
-            low, high = told.interval
+            ((low, high),) = (one.interval for one in found.effects if one.kind == told.kind and one.of == told.of)
             assert low - 0.03 <= fault.value <= high + 0.03
     if fault.kind == "health":
         assert found.vehicle[f"health_{fault.of}"] == pytest.approx(fault.health, abs=0.05)

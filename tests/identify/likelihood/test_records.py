@@ -145,7 +145,7 @@ def test_the_filter_reads_averages_of_fast_samples_and_all_slow_ones() -> None:
     assert thin.time == pytest.approx(np.repeat(0.2 * np.arange(100.0), 2))
     assert thin.value[thin.sensor == 0] == pytest.approx(DEPTH[::10])
     assert np.all(np.diff(full.time) >= 0.0)
-    assert (sampled.has_velocities, sampled.has_positions) == (True, False)
+    assert sampled.shows_horizontal
     assert depth.noise == pytest.approx(0.01, rel=0.1)
     assert full.start == VIDEORAY.layout.at_rest | {"z": DEPTH[0]}
     usual = {"w": 0.3, "r": 0.3, "psi": 0.1, "z": 3.0 * depth.noise, "u": 0.03 + 3.0 * sampled.measured[1].noise}

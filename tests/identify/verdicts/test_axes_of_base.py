@@ -137,7 +137,7 @@ def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
     description.write_text(description.read_text(encoding="utf-8").replace("[body]\n", coupling), encoding="utf-8")
     tests = load_tests(tmp_path / "dives")
     known, logs, _ = begin(tests)
-    assert {form.axis.name for form in tests.vehicle.layout.axes} == {*sensors}
+    assert {form.axis.name for form in tests.layout.axes} == {*sensors}
     assert known.unseen == unseen
     assert all({form.axis.name for form in one.layout.axes} == {*sensors, *(a.name for a in unseen)} for one in logs)
 
