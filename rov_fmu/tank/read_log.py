@@ -88,7 +88,8 @@ def _log(
         commanded = forces if forces.series else commanded
     without_thruster = (content.without_thruster if is_first else {}) or commanded.without_thruster
     config = piece.parameters.last("FRAME_CONFIG")
-    source = commanded.sender or Source.of_several([*labels.values()])
+    fields = [*labels.values()]
+    source = commanded.sender or Source(" ... ".join(dict.fromkeys([*fields[:1], *fields[-1:]])))
     series = told or commanded.series
     findings = [
         *content.findings * is_first,
@@ -176,14 +177,13 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
     """
     first = min((time[0] for time, _ in series.values()), default=0.0)
-    for name, (time, _) in series.items():
+    for name, (time, values) in series.items():
+        title = labels.get(name, f"thruster {name}")
         if time[0] > first + LATE:
-            at = f"{time[0] - first:.4g}"
-            yield about(file, "late command", column=labels.get(name, f"thruster {name}"), at=at)
-    for name, (_, values) in series.items():
+            yield about(file, "late command", column=title, at=f"{time[0] - first:.4g}")
         count = int((np.abs(values) > 1.0 + 1e-9).sum())
         if count and name not in EXTERNAL:
-            yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
+            yield about(file, "beyond full thrust", column=title, count=count)
     expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
     missing = {*layout.commands, *layout.curve_of} - series.keys()
     for title, column in columns_of_log(layout, None).items() if series and COMMAND not in series else ():

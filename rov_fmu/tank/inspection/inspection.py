@@ -83,15 +83,14 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
     description, the thrusters of a CSV log have the names of the first layout that fits, or else names that follow from
     the headers. Raises DataFileError.
     """
-    layout = described.description.layout if described.description else None
-    tables = described.tables
+    tables = described.tables  # those with quantities cannot be pickled
     told = RovTables(columns=tables.columns, topics=tables.topics, valid=tables.valid, logs=tables.logs)
-    return _inspected(path, [*layouts], layout, told)
+    return _inspected(path, [*layouts], described.layout, told)
 
 
 @guarded
-def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, tables: RovTables) -> list[Inspection]:
-    axis, layout = axis_in_name(path), described or Layout((), (), ())
+def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tables: RovTables) -> list[Inspection]:
+    axis = axis_in_name(path)
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
@@ -107,15 +106,15 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
             return [_of_table(path, kind, columns, ranges)]
         renamed = time_columns(start, renamed) | renamed
         own = {renamed.get(title, title): numbers[title] for title in titles}
-        guess, columns = guessed([*own], own, axis, [described] if described else layouts)
-        layout = described or guess
+        guess, columns = guessed([*own], own, axis, [layout] if layout else layouts)
+        layout = layout or guess
         known = columns_of_log(layout, axis)
         named = KnownColumns(known)
         name_of = partial(_known_name, named)
         told = {*map(name_of, own), ""}
         columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
         columns |= renamed
-        names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
+        names, _ = names_of(layout, tables.model_copy(update={"columns": columns}))
         flags = {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {
@@ -130,9 +129,9 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         if count < 2 or not has_time:
             return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
-        names, _ = names_of(described, tables)
+        names, _ = names_of(layout, tables)
         axis = None
-    logs = read_logs(path, layout, names, axis, is_part=True)
+    logs = read_logs(path, layout or Layout((), (), ()), names, axis, is_part=True)
     return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
 
 

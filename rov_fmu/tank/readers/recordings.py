@@ -241,8 +241,10 @@ class _Bag:
 
     def record(self, file: IO[bytes], end: int) -> tuple[dict[bytes, bytes], int]:
         """Return the fields of the header of the next record, and the length of its data. Raises _DamagedError."""
-        header = self._sized(file, end)
-        return _fields(header), self._length(file)
+        length = self._length(file)
+        if not 0 < length <= end - file.tell():
+            raise _DamagedError
+        return _fields(file.read(length)), self._length(file)
 
     def read_index(self, file: IO[bytes], end: int) -> list[int]:
         """Return where the chunks begin, by the index from the offset of the file on, and add its connections. Raises
@@ -300,12 +302,6 @@ class _Bag:
         if len(content) < 4:
             raise _DamagedError
         return int.from_bytes(content, "little")
-
-    def _sized(self, file: IO[bytes], end: int) -> bytes:
-        length = self._length(file)
-        if not 0 < length <= end - file.tell():
-            raise _DamagedError
-        return file.read(length)
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:
