@@ -215,15 +215,14 @@ def completed(own: str, lacks: str) -> str:
         head = f"{comment}\n" if comment else ""
         del document["base"]
     for name, item in more.items():
-        if name in document and isinstance(item, AoT):
-            _complete_thrusters(document[name], item)
-        elif not isinstance(item, AbstractTable | AoT):
-            if name in document:
-                _put(document, name, item)
-            else:
-                head += f"{name} = {item.as_string()}\n"
-        elif name not in document or isinstance(item, AoT):
+        if name not in document and isinstance(item, AbstractTable | AoT):
             tables.add(name, item)
+        elif name not in document:
+            head += f"{name} = {item.as_string()}\n"
+        elif isinstance(item, AoT):
+            _complete_thrusters(document[name], item)
+        elif not isinstance(item, AbstractTable):
+            _put(document, name, item)
         else:
             there = document[name]
             for key, value in item.items():

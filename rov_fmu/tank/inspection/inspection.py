@@ -18,7 +18,7 @@ from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.clocks import gaps
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, names_of
+from rov_fmu.tank.columns import TABLES, TIME, columns_of, columns_of_log, has_column, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import axis_in_name, kind_of_table
@@ -164,15 +164,12 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     columns = {**guesses, **renamed}
     is_column = KnownColumns(of_table).has
     unread = {title: what for title, what in ranges.items() if not is_column(columns.get(title, title))}
-    if len(ranges) - len(unread) < len(of_table):
-        return Inspection(path, path.name, (), (), unread, (), columns)
-    rows, _, told = read_rows(path, kind, axis, columns)
-    numbers = zip(*((row.command, row.value) for row in rows), strict=True)
-    no_times = np.full(len(rows), nan)
-    channels = (
-        _signal(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
-        for (name, column), own in zip(of_table.items(), numbers, strict=True)
-    )
+    channels, told = list[Signal](), list[Finding]()
+    if len(ranges) - len(unread) >= len(of_table):
+        rows, _, told = read_rows(path, kind, axis, columns)
+        numbers = np.array([(row.command, row.value) for row in rows]).T
+        units = ("1", next(iter(of_table[TABLES[kind]].units)))
+        channels = [*map(_signal, of_table, units, np.full(numbers.shape, nan), numbers)]
     return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
 
 
@@ -230,7 +227,7 @@ def _numbers(path: Path, titles: Sequence[str], open_stream: OpenStream) -> tupl
     """
     counts = Counter(titles)
     columns_of = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
-    columns = {name: Column({"1": 1.0}, True, True) for name in map(str, range(len(titles)))}
+    columns = dict.fromkeys(columns_of.values(), Column({"1": 1.0}, True, True))
     renamed = {title: f"{name} [1]" for title, name in columns_of.items()}
     table = read_columns(
         path, columns, others=True, loose=True, renamed=renamed, grown=grown_rows, open_stream=open_stream

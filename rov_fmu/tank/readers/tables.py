@@ -465,6 +465,5 @@ def grown_rows(rows: Lines) -> Grown | None:
         by_width[after.width] = indices
     first = sum(index == n for n, index in enumerate(indices))
     last = sum(index == n for n, index in enumerate(indices, start=parts[-1].width - width))
-    counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
-    words = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
-    return Grown(by_width, odd, words) if first + last else None
+    counts = {"line": parts[1].line, "cells": parts[-1].width, "columns": width, "first": first, "last": last}
+    return Grown(by_width, odd, {name: str(n) for name, n in counts.items()}) if first + last else None
