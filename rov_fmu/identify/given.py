@@ -205,7 +205,7 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Vehicle:
 
     axes = [form.axis for form in wide.axes if layout.has(form.axis) or is_unseen(form.axis)]
     turns = any(axis.is_rotation for axis in shown)
-    if wide.coupled or not turns or len(axes) == len(layout.axes):
+    if layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes):
         return vehicle
     layout = with_axes_alone(wide, axes)
     values = {name: base.get(name, UNKNOWN) for name in layout.coefficients}

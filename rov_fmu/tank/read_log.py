@@ -35,7 +35,7 @@ from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.ardusub_frames import frame_of, misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.no_measurement import measured_only
-from rov_fmu.tank.readers.parsers import guarded, open_table, read_content
+from rov_fmu.tank.readers.parsers import guarded, open_table, read_topics
 from rov_fmu.tank.readers.tables import read_table
 
 
@@ -56,7 +56,7 @@ def read_logs(
     if lines := open_table(path):
         content, entries = read_table(path, layout, axis, names, lines, is_part=is_part)
     else:
-        content = read_content(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
+        content = read_topics(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
     content.split_by_clock()
     _move_to_neutral(content, entries)
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]

@@ -98,7 +98,7 @@ def test_every_format_is_read_in_the_guarded_process_alone(
         lambda: read_log(path, BLUEROV2),
         lambda: inspect(path, [BLUEROV2]),
         lambda: header_of(path),
-        lambda: parsers.read_content(path, ()),
+        lambda: parsers.read_topics(path, ()),
         lambda: read_rows(path, "thrust"),
         lambda: read_inputs(path, BLUEROV2),
     ]

@@ -22,7 +22,7 @@ from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
-from rov_fmu.tank.readers.parsers import one_parser, read_content
+from rov_fmu.tank.readers.parsers import one_parser, read_topics
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _MOST_SAMPLES = 20_000
@@ -120,7 +120,7 @@ def _add_identified(
     own = f"/{topic_name(log.file)}/"
     known = [topic_name(signal["quantity"]) for signal in signals]
     known += [f"unknown_force/{form.axis.name}" for form in layout.axes]
-    content = read_content(path, {own + name for name in known})
+    content = read_topics(path, {own + name for name in known})
     topics = {topic.source.topic.removeprefix(own): topic for piece in content.pieces for topic in piece.topics}
     if not topics:
         raise DataFileError(f"{path}: has nothing about {log.file}; `rov-fmu identify --mcap` writes such a file")

@@ -239,7 +239,7 @@ def open_table(path: Path) -> OpenStream | None:
 
 
 @guarded
-def read_content(path: Path, named: Collection[str]) -> Content:
+def read_topics(path: Path, named: Collection[str]) -> Content:
     """Return the content of a log that is no table, with the topics that `named` has. Raises DataFileError.
 
     The process keeps it for the next function that uses it, unless it has kept much already.

@@ -16,7 +16,7 @@ from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.mavlink import Message, read_messages
-from rov_fmu.tank.readers.parsers import read_content
+from rov_fmu.tank.readers.parsers import read_topics
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
@@ -200,7 +200,7 @@ def test_without_pymavlink_the_line_says_how_to_get_it(tmp_path: Path, monkeypat
     path = write_tlog(tmp_path / "a.tlog", [attitude(0.0, 0.0)])
     monkeypatch.setattr(parsers._PARSER, "is_child", True)
     with pytest.raises(DataFileError, match=r"a telemetry log needs pymavlink: pip install 'rov-fmu\[mavlink\]'"):
-        read_content(path, ())
+        read_topics(path, ())
 
 
 # ---- .ulg ------------------------------------------------------------------------------------------------------------

@@ -14,7 +14,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.tank.readers.listing import list_files
-from rov_fmu.tank.readers.parsers import one_parser, read_content
+from rov_fmu.tank.readers.parsers import one_parser, read_topics
 from tests.tank.logs import Read, measured, read_log
 from tests.tank.readers.motion import BLUEROV2, DEPTH, DIVE
 from tests.tank.readers.writers import Ros, bag, messages_of
@@ -128,7 +128,7 @@ def test_the_longer_a_file_is_the_more_is_read(tmp_path: Path) -> None:
         with one_parser():
             for share in (0.3, 0.5, 0.7, 0.9):
                 path.write_bytes(whole[: int(share * len(whole))])
-                pieces = read_content(path, ()).pieces
+                pieces = read_topics(path, ()).pieces
                 counts.append(sum(len(topic.time) for piece in pieces for topic in piece.topics))
         assert counts == sorted(counts)
         assert counts[0] < counts[-1]

@@ -21,14 +21,14 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.content import Content
-from rov_fmu.tank.readers.parsers import budget, format_of, header_of, one_parser, read_content
+from rov_fmu.tank.readers.parsers import budget, format_of, header_of, one_parser, read_topics
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
 from tests.tank.readers.writers import Ros, bag, flash
 
 
 def read(path: Path) -> object:
-    return header_of(path) if format_of(path).open else read_content(path, ())
+    return header_of(path) if format_of(path).open else read_topics(path, ())
 
 
 def _ulog(path: Path, *formats: str, data: bytes = bytes(100)) -> Path:
@@ -104,7 +104,7 @@ def test_a_small_file_that_exhausts_the_machine_is_one_line(
     with pytest.raises(DataFileError, match=limits):
         read(path)
     good = bag(".db3")(tmp_path / "good", DIVE)
-    assert read_content(good, ()).pieces
+    assert read_topics(good, ()).pieces
     assert not [*temporary.iterdir()]
 
 
@@ -140,13 +140,13 @@ def test_a_log_that_several_functions_use_is_parsed_once(
     monkeypatch.setattr(parsers, "_PARSER", parser)
     monkeypatch.setattr(parsers, "_KEPT", kept)
     monkeypatch.setattr(parsers, "_parsed", counted)
-    whole = len(read_content(path, ()).pieces[0].topics)
-    read_content(path, ()).pieces[0].topics.clear()
+    whole = len(read_topics(path, ()).pieces[0].topics)
+    read_topics(path, ()).pieces[0].topics.clear()
     assert whole
-    assert len(read_content(path, ()).pieces[0].topics) == whole
+    assert len(read_topics(path, ()).pieces[0].topics) == whole
     assert len(parsed) == counts[0]
     os.utime(path, (0.0, 0.0))
-    assert read_content(path, ()).pieces
+    assert read_topics(path, ()).pieces
     assert len(parsed) == counts[1]
 
 
@@ -189,7 +189,7 @@ def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
     assert budget(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
     with one_parser():
         path = flash(tmp_path, DIVE)
-        assert len({id(parsers._PARSER._child) for _ in range(2) if read_content(path, ()).pieces}) == 1
+        assert len({id(parsers._PARSER._child) for _ in range(2) if read_topics(path, ()).pieces}) == 1
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux limits memory")
@@ -197,14 +197,14 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = flash(tmp_path, DIVE)
-    assert read_content(path, ()).pieces  # from then on the process has imported the parser
+    assert read_topics(path, ()).pieces  # from then on the process has imported the parser
     os.utime(path, (0.0, 0.0))  # it is another file then, of which the process has no content
     with monkeypatch.context() as patch:
         patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:
             read(path)
     assert str(error.value) == f"{path}: needs more than 0.001 GB of memory to be read"
-    assert read_content(path, ()).pieces
+    assert read_topics(path, ()).pieces
 
 
 def test_messages_without_a_time_or_an_output_are_no_traceback(tmp_path: Path) -> None:
