@@ -17,7 +17,6 @@ from unicodedata import combining, normalize
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
-from rov_fmu.io.columns import Column
 from rov_fmu.tank.arrays import Array, Flags
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}
@@ -61,16 +60,6 @@ class Quantity:
         """The SI unit."""
         return next(iter(self.units))
 
-    @property
-    def column(self) -> Column:
-        """The column of a CSV file."""
-        return Column(self.units, True, True, self.minimum, self.maximum, also=self.also)
-
-
-def _rates(axis: Axis, lengths: Mapping[str, float]) -> dict[str, float]:
-    """Return the units of a velocity along or about an axis."""
-    return {f"{unit}/s": per for unit, per in lengths.items()} | (_TURNS if axis.is_rotation else _SPEEDS)
-
 
 def _quantities() -> Iterator[Quantity]:
     symbols = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
@@ -80,10 +69,10 @@ def _quantities() -> Iterator[Quantity]:
         also = (*([f"{axis.name} {axis.position}"] if axis in (HEAVE, YAW) else []), *symbols.get(axis, ()))
         name = axis.position if short else f"{axis.name} distance"
         yield Quantity(name, lengths, axis, also=also, wraps=axis in (ROLL, YAW))
-        rate = f"{axis.name} {'rate' if axis.is_rotation else 'speed'}"
-        yield Quantity(
-            f"{axis.name} velocity", _rates(axis, lengths), axis, True, (axis.velocity, rate), minimum=-1e3, maximum=1e3
-        )
+        word, others = ("rate", _TURNS) if axis.is_rotation else ("speed", _SPEEDS)
+        rates = {f"{unit}/s": per for unit, per in lengths.items()} | others
+        also = axis.velocity, f"{axis.name} {word}"
+        yield Quantity(f"{axis.name} velocity", rates, axis, True, also, minimum=-1e3, maximum=1e3)
     yield Quantity("distance", LENGTHS)
     yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
     yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0)
@@ -194,12 +183,17 @@ _DVLS = (r"dvl_msgs/.*DVL", r"marine_acoustic_msgs/.*Dvl")
 """The messages of DVLs, whose axes point forward, to starboard and down."""
 _NESTED = ("{0}.{0}.{1}.", "{0}.{1}.", "{1}.")
 """How the messages of ROS nest a part of a pose or a twist: with covariance, with a header, alone."""
+_HUGE_PLACE, _HUGE = 1e5, 1e3
+"""Variances of a position, m2, and of a velocity or an angle, from which on estimators mean that they know nothing."""
 _PARTS = (
-    ("pose", "position", "xyz", POSITION, _POSE),
-    ("pose", "orientation", "wxyz", QUATERNION, _POSE),
-    ("twist", "linear", "xyz", VELOCITY, _TWIST),
-    ("twist", "angular", "xyz", RATES, _TWIST),
+    ("pose", "position", "xyz", POSITION, _POSE, "xyz", 0, _HUGE_PLACE),
+    ("pose", "orientation", "wxyz", QUATERNION, _POSE, "__.", 21, _HUGE),
+    ("twist", "linear", "xyz", VELOCITY, _TWIST, "xyz", 0, _HUGE),
+    ("twist", "angular", "xyz", RATES, _TWIST, "xyz", 21, _HUGE),
 )
+"""Whole, part, components, what they give, the type beside odometry; and the components that variances are about, the
+index of the variance of the first one, and the huge variance. The variances are on the diagonal of a covariance of
+6 x 6. Roll and pitch are not left out without the heading, which stands for a whole orientation."""
 _NUMBER = r"std_msgs/.*(Float|Int)\d+(Stamped)?"
 _ROS = (
     Message(_NUMBER, ("data",), "depth", topic=r"(?i)(?<![a-z])depth(?![a-z])"),
@@ -207,7 +201,7 @@ _ROS = (
     Message(r"mavros_msgs/.*(VFR_HUD|VfrHud)", ("altitude",), "depth", sign=-1.0),
     *(
         Message(kind, _each(nested.format(whole, part) + "{}", letters), gives)
-        for whole, part, letters, gives, alone in _PARTS
+        for whole, part, letters, gives, alone, *_ in _PARTS
         for kind in (_ODOMETRY, alone)
         for nested in _NESTED
     ),
@@ -256,16 +250,6 @@ class Validity:
         return (told < self.least) | (told >= self.below)
 
 
-_HUGE_PLACE, _HUGE = 1e5, 1e3
-"""Variances of a position, m2, and of a velocity or an angle, from which on estimators mean that they know nothing."""
-_COVARIANCES = (
-    (f"{_ODOMETRY}|{_POSE}", "pose", "position", "xyz", 0, _HUGE_PLACE),
-    (f"{_ODOMETRY}|{_POSE}", "pose", "orientation", "__.", 21, _HUGE),
-    (f"{_ODOMETRY}|{_TWIST}", "twist", "linear", "xyz", 0, _HUGE),
-    (f"{_ODOMETRY}|{_TWIST}", "twist", "angular", "xyz", 21, _HUGE),
-)
-"""Type, whole, part, components, and the index of the variance of the first component, which are on the diagonal of a
-covariance of 6 x 6. Roll and pitch are not left out without the heading, which stands for a whole orientation."""
 VALIDITIES = (
     # "set element 0 of the associated covariance matrix to -1" (sensor_msgs/Imu), which others do, too
     *(
@@ -273,13 +257,15 @@ VALIDITIES = (
         for part in ("orientation", "angular_velocity")
     ),
     *(
-        Validity(kind, f"{prefix}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
-        for kind, whole, part, *_ in _COVARIANCES
+        Validity(f"{_ODOMETRY}|{alone}", f"{prefix}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
+        for whole, part, _, _, alone, *_ in _PARTS
         for prefix in (f"{whole}.", "")
     ),
     *(
-        Validity(kind, f"{prefix}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge)
-        for kind, whole, part, letters, first, huge in _COVARIANCES
+        Validity(
+            f"{_ODOMETRY}|{alone}", f"{prefix}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge
+        )
+        for whole, part, _, _, alone, letters, first, huge in _PARTS
         for prefix in (f"{whole}.", "")
         for n, letter in enumerate(letters)
     ),

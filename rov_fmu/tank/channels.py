@@ -20,7 +20,6 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.tank.arrays import Array, Flags, rms, spread
 from rov_fmu.tank.catalogue import (
     ATMOSPHERE,
@@ -35,6 +34,7 @@ from rov_fmu.tank.catalogue import (
     QUANTITIES,
     QUATERNION,
     RATES,
+    VECTORS,
     VELOCITY,
     Message,
     Quantity,
@@ -151,11 +151,8 @@ def channels_of(
     measurements = [replace(one, unused=one.unused or _standstill(one, measurements)) for one in measurements]
     attitude = _attitude(measurements)
     channels = [*named]
-    for measurement in measurements:
-        judged = measurement
-        if measurement.message.gives == VELOCITY and not measurement.unused:
-            judged = replace(measurement, unused=_contradiction(measurement, measurements))
-        channels += _channels(judged, attitude, gravity)
+    for one in measurements:
+        channels += _channels(one, one.unused or _contradiction(one, measurements), attitude, gravity)
     return with_one_source(channels)
 
 
@@ -259,12 +256,12 @@ def _contradiction(velocity: _Measurement, measurements: Iterable[_Measurement])
     down. Noise of the position is no contradiction: the velocity must agree with it in another frame, or after another
     scale, sign or order of its components.
     """
-    from scipy.integrate import cumulative_trapezoid  # imported here because it is slow
-
     same = {m.message.gives: m for m in measurements if m.topic is velocity.topic}
     position, quaternion, time = same.get(POSITION), same.get(QUATERNION), velocity.topic.time
-    if not position or not quaternion or len(time) < LEAST_SAMPLES:
+    if velocity.message.gives != VELOCITY or not position or not quaternion or len(time) < LEAST_SAMPLES:
         return ""
+    from scipy.integrate import cumulative_trapezoid  # imported here because it is slow
+
     known, rotation = quaternion.attitude
     if len(known) < len(time) or not np.isfinite(np.hstack([velocity.values, position.values])).all():
         return ""
@@ -294,18 +291,16 @@ def _at(attitude: Slerp, time: Array) -> Rotation:
 # ---- Channels --------------------------------------------------------------------------------------------------------
 
 
-def _channels(measurement: _Measurement, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
-    """Yield the channels of a measurement."""
+def _channels(measurement: _Measurement, unused: str, attitude: Slerp | None, gravity: Gravity) -> Iterator[Channel]:
+    """Yield the channels of a measurement; `unused` is why it is not used."""
     gives, topic, values = measurement.message.gives, measurement.topic, measurement.values
-    earth, body = frames_of(measurement.message, measurement.topic.source)
-    unused = measurement.unused
+    earth, body = frames_of(measurement.message, topic.source)
+    time, columns = topic.time, dict[str, Array]()
     if gives == POSITION:
-        yield from _of_position(topic, _turned(values, earth), unused)
+        columns = _of_position(_turned(values, earth))
     elif gives in (EULER, QUATERNION):
         time, rotation = measurement.attitude
-        angles = rotation.as_euler("ZYX")[:, ::-1].T if len(time) else ()
-        for axis, column in zip((ROLL, PITCH, YAW), angles, strict=False):
-            yield Channel(QUANTITIES[axis.position], topic.source, time, column, unused=unused)
+        columns = dict(zip(VECTORS[gives], rotation.as_euler("ZYX")[:, ::-1].T, strict=True)) if len(time) else {}
     elif gives in (VELOCITY, RATES):
         if not _is_of_earth(measurement):
             values = _turned(values, body)
@@ -314,11 +309,11 @@ def _channels(measurement: _Measurement, attitude: Slerp | None, gravity: Gravit
         else:
             frame = topic.source.frames[1] or "the earth"
             unused = unused or f"its frame is {frame}, and the log has no attitude to rotate it into that of the body"
-        axes = (SURGE, SWAY, HEAVE) if gives == VELOCITY else (ROLL, PITCH, YAW)
-        for axis, column in zip(axes, values.T, strict=True):
-            yield Channel(QUANTITIES[f"{axis.name} velocity"], topic.source, topic.time, column, unused=unused)
+        columns = dict(zip(VECTORS[gives], values.T, strict=True))
     else:
-        yield from of_scalar(QUANTITIES[gives], topic.source, topic.time, values[:, 0], unused, gravity)
+        yield from of_scalar(QUANTITIES[gives], topic.source, time, values[:, 0], unused, gravity)
+    for name, column in columns.items():
+        yield Channel(QUANTITIES[name], topic.source, time, column, unused=unused)
 
 
 def _turned(values: Array, axes: Array) -> Array:
@@ -327,16 +322,15 @@ def _turned(values: Array, axes: Array) -> Array:
     return np.where(unknown, np.nan, np.nan_to_num(values) @ axes.T)
 
 
-def _of_position(topic: Topic, position: Array, unused: str) -> Iterator[Channel]:
-    """Yield the depth, and how far north and east the vehicle is of the first place, and the distance from there, from
+def _of_position(position: Array) -> dict[str, Array]:
+    """Return the depth, and how far north and east the vehicle is of the first place, and the distance from there, from
     n x 3 positions north, east and down."""
-    yield Channel(QUANTITIES[HEAVE.position], topic.source, topic.time, position[:, 2], unused=unused)
+    columns = {"depth": position[:, 2]}
     there = np.isfinite(position[:, :2]).all(axis=1)
     if there.any():
         north, east = (position - position[there][0])[:, :2].T
-        both = {"surge distance": north, "sway distance": east, "distance": np.hypot(north, east)}
-        for name, values in both.items():
-            yield Channel(QUANTITIES[name], topic.source, topic.time, values, unused=unused)
+        columns |= {"surge distance": north, "sway distance": east, "distance": np.hypot(north, east)}
+    return columns
 
 
 def of_scalar(

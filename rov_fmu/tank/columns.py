@@ -138,9 +138,9 @@ class LogColumn(Column):
     """True for a pulse, µs, whose neutral nobody states."""
 
     @classmethod
-    def of(cls, column: Column, name: str = "", commands: str = "", quantity: Quantity | None = None) -> "LogColumn":
-        """Return a column with its meaning."""
-        return cls(**vars(column), name=name, commands=commands, quantity=quantity)
+    def of(cls, column: Column, name: str = "", commands: str = "") -> "LogColumn":
+        """Return a column of a command, or one without a name."""
+        return cls(**vars(column), name=name, commands=commands)
 
 
 def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, LogColumn]:
@@ -152,7 +152,10 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
     command = logged_command(keys)
     columns = {"time": LogColumn.of(TIME)}
     if layout.has_wrench:  # a vehicle need not have all forces
-        columns |= {one.external: LogColumn.of(_force_column(one), one.external, THRUSTERS) for one in AXES.values()}
+        for one in AXES.values():
+            part = f"{TORQUE if one.is_rotation else FORCE} {'xyz'[one.place]}"
+            force = Column({one.load: 1.0}, optional=True, minimum=-1e6, maximum=1e6, also=(part,))
+            columns[one.external] = LogColumn.of(force, one.external, THRUSTERS)
     else:
         columns |= {COMMAND: LogColumn.of(command, COMMAND, AXIS)} if axis else {}
         for name in (thruster.name for thruster in layout.thrusters):
@@ -166,15 +169,9 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
             short = "velocity" if quantity.is_velocity else axis.position
         also = (name,) if short != name else ()
         # `read_log` checks the bounds after the marks of no measurement are left out.
-        column = replace(quantity.column, also=(*quantity.also, *also), minimum=None, maximum=None)
-        columns.setdefault(short, LogColumn.of(column, name, "", quantity))  # the distance along the axis comes first
+        column = LogColumn(quantity.units, True, True, also=(*quantity.also, *also), name=name, quantity=quantity)
+        columns.setdefault(short, column)  # the distance along the axis comes first
     return {**columns, "date": LogColumn.of(DATE)}
-
-
-def _force_column(axis: Axis) -> Column:
-    """Return the column of the force of a wrench along an axis, or of the moment about it."""
-    part = f"{TORQUE if axis.is_rotation else FORCE} {'xyz'[axis.place]}"
-    return Column({axis.load: 1.0}, optional=True, minimum=-1e6, maximum=1e6, also=(part,))
 
 
 # ---- Names of rov.toml -----------------------------------------------------------------------------------------------

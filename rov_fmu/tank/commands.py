@@ -26,6 +26,7 @@ from pydantic import Field
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, SPAN
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import AS_TUPLE, Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
@@ -255,12 +256,12 @@ def _activity(series: Mapping[Any, Series]) -> float:
 def _alike(vehicle: str, topics: Sequence[Topic]) -> set[str]:
     """Return the other vehicles whose depth or position has a topic of the same name and type as that of a vehicle."""
     gives_position = [message for message in MESSAGES if message.gives in (POSITION, "depth")]
-    vehicles_of: dict[tuple[str, str], set[str]] = {}
-    for source in (topic.source for topic in topics if vehicle):
-        if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_position):
-            name = source.topic.removeprefix(f"/{source.vehicle}/")
-            vehicles_of.setdefault((source.kind, name), set()).add(source.vehicle)
-    return {other for vehicles in vehicles_of.values() if vehicle in vehicles for other in vehicles} - {vehicle}
+    alike = grouped(
+        ((source.kind, source.topic.removeprefix(f"/{source.vehicle}/")), source.vehicle)
+        for source in (topic.source for topic in topics if vehicle)
+        if any(re.fullmatch(one.kind, source.kind) and re.search(one.topic, source.topic) for one in gives_position)
+    )
+    return {other for vehicles in alike.values() if vehicle in vehicles for other in vehicles} - {vehicle}
 
 
 def _choice(path: Path, best: _Outputs, own: Sequence[_Outputs], vehicles: Sequence[str]) -> Iterator[Finding]:
@@ -528,22 +529,22 @@ def at_rest(
     levels = {name: level for name, values in known.items() if (level := _usual_level(values)) is not None}
     told = {name: level for name, level in levels.items() if abs(level - (trims.get(name) or 0.0)) < _AT_REST}
     if told and any(abs(level - NEUTRAL) >= _AT_REST for level in told.values()):
-        return told, [about(file, "at rest", **_in_words(told))]
+        return told, _tell_rest(file, "at rest", told)
     stays = {name: np.mean(np.abs(values - NEUTRAL) < _AT_REST) for name, values in known.items() if len(values)}
     if 2 * len(levels) <= len(pulses):
         return {}, []
     if max(stays.values()) >= _SELDOM:
         usual = {name: np.mean(known[name] == level) for name, level in levels.items()}
         is_brief = all(share < max(_SELDOM, _BRIEF * usual.get(name, 0.0)) for name, share in stays.items())
-        return {}, [about(file, "perhaps at rest", **_in_words(levels))] if is_brief else []
+        return {}, _tell_rest(file, "perhaps at rest", levels) if is_brief else []
     sides = ((known[name].min() - level, known[name].max() - level) for name, level in levels.items())
     is_two_sided = any(low < -_CLEAR and high > _CLEAR for low, high in sides)
     own = [np.abs(pulses[name] - level) < _AT_REST for name, level in levels.items()]
     is_together = len(own) > 2 and len({*map(len, own)}) == 1 and np.mean(np.all(own, axis=0)) >= _SHARE
     if not (is_two_sided or is_together):
-        return {}, [about(file, "perhaps at rest", **_in_words(levels))]
+        return {}, _tell_rest(file, "perhaps at rest", levels)
     others = dict.fromkeys(pulses, next(iter(levels.values()))) if len({*levels.values()}) == 1 else {}
-    return {**others, **levels}, [about(file, "at rest", **_in_words(levels))]
+    return {**others, **levels}, _tell_rest(file, "at rest", levels)
 
 
 def _usual_level(pulses: Array) -> float | None:
@@ -558,7 +559,7 @@ def _usual_level(pulses: Array) -> float | None:
     return float(levels[counts.argmax()])
 
 
-def _in_words(levels: Mapping[str, float]) -> dict[str, str]:
-    """Return the pulses of no thrust for a sentence, and one of them for a key of rov.toml."""
+def _tell_rest(file: str, kind: str, levels: Mapping[str, float]) -> list[Finding]:
+    """Return a finding with the pulses of no thrust, and one of them for a key of rov.toml."""
     texts = [f"{level:g}" for level in sorted({*levels.values()})]
-    return {"rest": listed(texts), "key": texts[0]}
+    return [about(file, kind, rest=listed(texts), key=texts[0])]

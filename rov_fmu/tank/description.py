@@ -25,7 +25,6 @@ from rov_fmu.equation.catalogue import (
     SURGE,
     SWAY,
     YAW,
-    Declaration,
 )
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Part, VehicleAxis
@@ -232,6 +231,12 @@ class RovTables(Tables):
     limits: TankLimits = TankLimits()
     """The most that a proposed test may take."""
 
+    @property
+    def has_wrench(self) -> bool:
+        """True where the commands of the logs are a wrench: the file says so, or has [body] and no thrusters."""
+        has_thrusters = self.base or self.arm or self.thruster or self.curves or self.inputs or self.fin
+        return bool(self.logs.wrench or (self.body and not has_thrusters))
+
 
 # ---- The description -------------------------------------------------------------------------------------------------
 
@@ -285,6 +290,16 @@ class Description:
         return not self.base_name and bool(self.tables.thruster)
 
     @cached_property
+    def widest(self) -> Layout:
+        """The layout with every coefficient that a vehicle with these axes and curves could have."""
+        return self.layout.with_keys(lambda *_: True)
+
+    @cached_property
+    def unknown(self) -> list[str]:
+        """The names of the coefficients in the file that no such vehicle has."""
+        return [name for name in self.named if name not in self.widest.coefficients]
+
+    @cached_property
     def logged(self) -> Layout:
         """The layout with the axes of which a log of several axes may have recordings.
 
@@ -309,6 +324,11 @@ class RovFile:
     explains_files: bool
     """False if a mistake in one of these tables leaves the content of the files unknown."""
 
+    @property
+    def layout(self) -> Layout | None:
+        """The largest layout that the vehicle can have; None where it is unknown."""
+        return self.description.layout if self.description else None
+
 
 NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 """What there is without a rov.toml."""
@@ -321,15 +341,18 @@ def read_description(path: Path, base: Path | None = None, draft: Draft | None =
     context = {"folder": path.parent}
     data |= {"base": base} if base else {}
     file, problems, lost = read_tables(data, RovTables, context, ("vehicle",), ("fin",))
-    vehicle, base_mistakes = _load_base(file)
+    vehicle, base_mistakes = None, list[str]()
+    try:
+        vehicle = load_vehicle(file.base) if file.base else None
+    except VehicleFileError as error:
+        base_mistakes = str(error).splitlines()
     mistakes = [*_hardware_mistakes(file, lost, data)]
     description, of_hardware = None, {"base", "axes", *_HARDWARE_TABLES}
     if not (base_mistakes or mistakes or lost & of_hardware or _misspelt(lost, _HARDWARE_TABLES)):
         description = _describe(path, file, data, vehicle)
         description = replace(description, assumed=draft.reason if draft else "")
-        possible = _possible_coefficients(description.layout)
         # _mistakes reports an unknown name in [known]; problems with its value would only repeat that.
-        unknown = {("known", name) for name in description.named if name not in possible}
+        unknown = {("known", name) for name in description.unknown}
         problems = [problem for problem in problems if problem["loc"][:2] not in unknown]
         mistakes = [*_mistakes(file, lost, description)]
     lines = lines_on(path, (*problem_lines(problems, data, RovTables), *mistakes))
@@ -340,14 +363,6 @@ def read_description(path: Path, base: Path | None = None, draft: Draft | None =
 def _misspelt(lost: Iterable[str], tables: Collection[str]) -> bool:
     """Return True if the name of an unknown table is similar to one of these, such as [boddy] to [body]."""
     return any(similar(name, tables) for name in lost if name not in RovTables.model_fields)
-
-
-def _load_base(file: RovTables) -> tuple[Vehicle | None, list[str]]:
-    """Load the vehicle that `base` names, and return it with a line for every mistake in its file."""
-    try:
-        return load_vehicle(file.base) if file.base else None, []
-    except VehicleFileError as error:
-        return None, str(error).splitlines()
 
 
 def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[str]:
@@ -376,21 +391,10 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
     if {"curves", "thruster"} <= data.keys():
         yield from check_names_and_keys(file, lost, data)
         if file.logs.wrench and not lost & {"curves", "arm"}:
-            yield from _thrust_not_given(file)
-
-
-def _thrust_not_given(file: RovTables) -> Iterator[str]:
-    """Yield a line for each number of the thrusters that is missing: forces on the body tell none of them."""
-    yield from check_tables_of_thrust(file)
-    for name, quantity in file.quantities(file.layout).items():
-        if quantity is None and name in ARM:
-            yield key_line(f"arm.{name}", "this key is missing, and a thruster has the key arm")
-
-
-def has_wrench(file: RovTables) -> bool:
-    """Return True where the commands of the logs are a wrench: rov.toml says so, or has [body] and no thrusters."""
-    has_thrusters = file.base or file.arm or file.thruster or file.curves or file.inputs or file.fin
-    return bool(file.logs.wrench or (file.body and not has_thrusters))
+            yield from check_tables_of_thrust(file)  # forces on the body tell no number of the thrusters
+            for name, quantity in file.quantities(file.layout).items():
+                if quantity is None and name in ARM:
+                    yield key_line(f"arm.{name}", "this key is missing, and a thruster has the key arm")
 
 
 def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> Description:
@@ -425,12 +429,12 @@ def _describe(path: Path, file: RovTables, data: Toml, base: Vehicle | None) -> 
 
 def _start(file: RovTables) -> Layout:
     """Return the layout to begin with, of a file without a base."""
-    if has_wrench(file):
-        forms = file.layout.axes or tuple(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
-        own = file.layout
+    own = file.layout
+    if file.has_wrench:
+        forms = own.axes or tuple(map(VehicleAxis, (SURGE, SWAY, HEAVE, YAW)))
         return replace(Layout.of_wrench(forms), coupled=own.coupled, restoring=own.restoring, cross=own.cross)
     if file.thruster:
-        return file.layout
+        return own
     paper = load_vehicle(VIDEORAY).layout
     thrusters = [replace(one, direction=one.direction._replace(source=_FORM)) for one in paper.thrusters]
     return replace(paper, thrusters=tuple(thrusters))
@@ -469,7 +473,7 @@ def _largest_layout(layout: Layout, axis_keys: Mapping[str, tuple[str, ...]]) ->
 def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iterator[str]:
     """Yield a line for every unknown name, impossible number, and missing half of a pair."""
     layout = description.layout
-    yield from check_distinct_names(layout.with_keys(lambda *_: True))  # effects come and go during the identification
+    yield from check_distinct_names(description.widest)  # effects come and go during the identification
     yield from _unknown_effects(layout, description.base_name)
     if thrusters := description.thrusters:  # one table is used as it is
         untold = tuple(replace(curve, tables=curve.tables[1:]) for curve in thrusters.curves)
@@ -478,15 +482,18 @@ def _mistakes(file: RovTables, lost: set[str], description: Description) -> Iter
     if "known" not in lost:
         yield from _missing_halves(file, description)
     yield from _doubled_thrust(file, description)
-    yield from _unknown_reversed(file, layout)
+    names = [thruster.name for thruster in layout.thrusters]
+    for name in file.logs.reversed:
+        if name not in names:
+            yield key_line("logs.reversed", f"there is no such thruster{only(name, names)}", name)
     windows = [*(f"thrust_{curve.name}" for curve in layout.curves), *layout.by_name]
     for name in file.windows:
         if name not in windows:
             yield key_line(f"windows.{name}", f"there is no such key{only(name, windows, join_names(windows))}")
     curves, requests = layout.curves_by_name, description.requests
     asked = {"lag": ("T", requests.lag), "voltage": ("n_V", tuple(curves) if requests.voltage else ())}
-    for key, (coefficient, names) in asked.items():
-        for name in names:
+    for key, (coefficient, requested) in asked.items():
+        for name in requested:
             if name not in curves:
                 yield key_line(f"fit.{key}", f"there is no such curve{only(name, curves, join_names(curves))}", name)
             elif (given := curves[name].name_of(coefficient)) in description.named:
@@ -526,8 +533,7 @@ def _unknown_effects(layout: Layout, base: str) -> Iterator[str]:
 
 
 def _mistakes_in_known(file: RovTables, description: Description) -> Iterator[str]:
-    possible = _possible_coefficients(description.layout)
-    unknown = [name for name in description.named if name not in possible]
+    possible, unknown = description.widest.coefficients, description.unknown
     for name in unknown[:MOST]:
         yield key_line(f"known.{name}", f"there is no such coefficient of this vehicle{did_you_mean(name, possible)}")
     for _ in unknown[MOST:]:
@@ -546,21 +552,6 @@ def _doubled_thrust(file: RovTables, description: Description) -> Iterator[str]:
             given = [a for a in map(own.coefficient, ("a_t", "b_t")) if a in description.named]
             if given:
                 yield key_line(f"curves.{name}.thrust", f"leave it out, because {join_names(given)} is given")
-
-
-def _unknown_reversed(file: RovTables, layout: Layout) -> Iterator[str]:
-    """Yield a line for each name in [logs] reversed that no thruster has."""
-    names = [thruster.name for thruster in layout.thrusters]
-    for name in file.logs.reversed:
-        if layout.has_wrench:
-            yield key_line("logs.reversed", "the logs have forces on the body, which no thruster reverses", name)
-        elif name not in names:
-            yield key_line("logs.reversed", f"there is no such thruster{only(name, names)}", name)
-
-
-def _possible_coefficients(layout: Layout) -> dict[str, Declaration]:
-    """Return every coefficient that a vehicle with these axes and curves could have."""
-    return layout.with_keys(lambda *_: True).coefficients
 
 
 def _missing_halves(file: RovTables, description: Description) -> Iterator[str]:

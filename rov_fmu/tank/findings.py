@@ -5,8 +5,7 @@ files, and that of rov_fmu/identify/findings.py for the others.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 from rov_fmu.io.messages import listed
@@ -195,11 +194,6 @@ def sentences(findings: Iterable[Finding], forms: Mapping[str, str] = SENTENCES)
         axes = tuple(dict.fromkeys(finding.axis for finding in found))
         groups.setdefault((kind, curve, bool(file), axes, *rest), []).extend(found)
     return tuple(_sentence(group, forms) for group in groups.values())
-
-
-def refusal(finding: Finding, folder: Path) -> str:
-    """Return the sentence of a finding, with the whole path of its file."""
-    return _sentence([replace(finding, file=str(folder / finding.file))], SENTENCES)
 
 
 def _sentence(group: Sequence[Finding], forms: Mapping[str, str]) -> str:

@@ -37,7 +37,6 @@ from rov_fmu.tank.description import (
     Draft,
     Requests,
     RovFile,
-    RovTables,
     read_description,
 )
 from rov_fmu.tank.findings import Finding, about, sentences
@@ -93,7 +92,7 @@ class Folder:
     @property
     def layout(self) -> Layout | None:
         """The largest layout that the vehicle can have; None where it is unknown."""
-        return self.rov_file.description.layout if self.rov_file.description else None
+        return self.rov_file.layout
 
     @property
     def logged(self) -> Layout | None:
@@ -141,7 +140,7 @@ class Folder:
             elif layout := self.layout if axis else self.logged:
                 self._add(read_logs(path, layout, self.names, axis))
         except FileError as error:
-            is_table = parts_of_name(path.stem.lower(), None)[0] in TABLES
+            is_table = parts_of_name(path)[0] in TABLES
             if isinstance(error, UnreadableFileError) and not is_table:
                 self.unreadable += str(error).splitlines()
                 self.findings.append(unreadable(path, error))
@@ -166,22 +165,15 @@ class Folder:
         """Make the forces of a wrench fractions of the largest ones in all logs, which become the vehicle's thrust."""
         description = self.rov_file.description
         assert description
-        for name in (name for (kind, _), names in self.files.items() if kind != "log" for name in names):
-            instead = f"{ROV_FILE} has none: write [curves.<name>] and [[thruster]]"
-            if description.thrusters:
-                instead = "those of the logs are forces on the body, by `wrench` in [logs]: move it to another folder"
-            reason = f"its commands are of thrusters, and {instead}"
-            self.mistakes.append(f"{self.path / name}: {reason}")
         largest = dict.fromkeys(description.layout.curves_by_name, 0.0)
         for name, most in (pair for log in self.logs if log.commands for pair in log.commands.largest.items()):
-            largest[name] = max(most, largest.get(name, 0.0))
-        full = {name: largest[name] or 1.0 for name in description.layout.curves_by_name}
-        self.logs = [replace(log, commands=log.commands and log.commands.relative_to(full)) for log in self.logs]
+            largest[name] = max(most, largest[name])
+        self.logs = [replace(log, commands=log.commands and log.commands.relative_to(largest)) for log in self.logs]
         source = "The largest force in the logs"
         known = {
             curve.coefficient(key): Quantity(value=value, unit="N", source=source)
             for curve in description.layout.curves
-            for key, value in (("a_t", 0.0), ("b_t", full[curve.name]))
+            for key, value in (("a_t", 0.0), ("b_t", largest[curve.name] or 1.0))
         }
         self.rov_file = replace(self.rov_file, description=replace(description, known={**description.known, **known}))
         if self.logs:
@@ -224,12 +216,11 @@ class Folder:
 
     def unknown_names(self) -> Iterator[str]:
         """Yield a line for each entry of [columns], [topics] and [valid] that no file has."""
-        tables = self.rov_file.tables
-        for table, names in (("columns", tables.columns), ("topics", tables.topics), ("valid", tables.valid)):
+        for table, what in _LACKING.items():
+            names: Mapping[str, object] = getattr(self.rov_file.tables, table)
             free = sorted(self.known - names.keys())
             for name, value in names.items():
                 if name not in self.known:
-                    what = _LACKING[table]
                     yield key_line(f"{table}.{name}", f"{what}{only(name, free) if free else ''}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:
@@ -246,30 +237,25 @@ class Folder:
         """Return the kind of test and its curve or axis. The axis is empty for a log of several axes. Raises
         DataFileError."""
         curves = [curve.name for curve in self.layout.curves] if self.layout else None
-        kind, subject = parts_of_name(path.stem.lower(), curves)
+        kind, subject = parts_of_name(path, curves)
         if kind != "log" and path.name.isprintable() and has_log(path, kind, self.names.columns):
             kind, subject = "log", subject if subject in AXES else ""
         axes = self.layout.by_name if self.layout else AXES
         known = [*((curves or []) if kind == "thrust" else axes)]
         if not (kind and path.name.isprintable() and (subject or known)):
-            raise self._unknown_kind(path)
-        self._check_subject(path, kind, subject, known)
-        return kind, subject
-
-    def _unknown_kind(self, path: Path) -> DataFileError:
-        """Return the error about a file that is neither a log nor a table."""
-        curves = [curve.name for curve in self.layout.curves] if self.layout else []
-        subjects = [*curves, *(self.logged.by_name if self.logged else AXES)]
-        hint = did_you_mean(path.stem.lower().partition("_")[0], KINDS, also={"time": "time_constant"})
-        # A text of another suffix may be no test at all, and its owner is only warned.
-        failure = DataFileError if has_usual_suffix(path) else UnreadableFileError
-        return failure(
-            f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
-            f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {listed(subjects, 'or')}{hint}"
-        )
-
-    def _check_subject(self, path: Path, kind: str, subject: str, known: Sequence[str]) -> None:
-        """Check the curve or the axis in the name of a file. Raises DataFileError."""
+            subjects = [*(curves or []), *(self.logged.by_name if self.logged else AXES)]
+            hint = did_you_mean(path.stem.lower().partition("_")[0], KINDS, also={"time": "time_constant"})
+            # A text of another suffix may be no test at all, and its owner is only warned.
+            failure = DataFileError if has_usual_suffix(path) else UnreadableFileError
+            raise failure(
+                f"{path}: neither a log, which has a column 'time [s]', nor a table, whose name begins with "
+                f"thrust_<curve>, steady_<axis> or time_constant_<axis>, of {listed(subjects, 'or')}{hint}"
+            )
+        if kind != "log" and self.layout and self.layout.has_wrench:
+            instead = f"{ROV_FILE} has none: write [curves.<name>] and [[thruster]]"
+            if self.rov_file.tables.thruster:
+                instead = "those of the logs are forces on the body, by `wrench` in [logs]: move it to another folder"
+            raise DataFileError(f"{path}: its commands are of thrusters, and {instead}")
         if not subject and kind != "log":
             word = path.stem.lower().removeprefix(f"{kind}_").partition("_")[0]
             what = "a thrust curve" if kind == "thrust" else "an axis"
@@ -280,6 +266,7 @@ class Folder:
             )
         if self.layout and subject in AXES and kind != "thrust" and not self.layout.signs(AXES[subject]):
             raise DataFileError(f"{path}: no thruster of the vehicle drives {subject}")
+        return kind, subject
 
 
 def folder_and_files(paths: Sequence[Path]) -> tuple[Path, list[Path]]:
@@ -317,7 +304,9 @@ def read_folder(
     """
     rov_file = _read_description(folder, base, draft)
     if files:
-        rov_file = replace(rov_file, tables=_tables_of(rov_file.tables, {file.name for file in files}))
+        named = {file.name for file in files}
+        used = {name: dive for name, dive in rov_file.tables.dives.items() if not named.isdisjoint(dive.files)}
+        rov_file = replace(rov_file, tables=rov_file.tables.model_copy(update={"dives": used}))
     found = Folder(folder, rov_file, rov_file_mistakes=[*rov_file.mistakes])
     mistakes, tables, dives = found.rov_file_mistakes, rov_file.tables, rov_file.tables.dives
     own = [] if draft else [folder / ROV_FILE]
@@ -346,12 +335,6 @@ def unreadable(path: Path, error: FileError) -> Finding:
     """Return the finding about a file that cannot be read, with the first reason."""
     first, *_ = str(error).splitlines()
     return about(path.name, "unreadable file", reason=first.removeprefix(str(path)).lstrip(":, "))
-
-
-def _tables_of(tables: RovTables, names: Collection[str]) -> RovTables:
-    """Return the tables of rov.toml with only the dives that some files belong to."""
-    dives = {name: dive for name, dive in tables.dives.items() if not {*dive.files}.isdisjoint(names)}
-    return tables.model_copy(update={"dives": dives})
 
 
 def _read_description(folder: Path, base: Path | None, draft: Draft | None) -> RovFile:
@@ -429,13 +412,8 @@ def together(path: Path, logs: Sequence[Log], other_clock: Collection[str] = ())
     commands = commanding[0].commands
     assert commands
     parts = [log if log.commands else _on_clock(log, commands, is_other=log.file in other_clock) for log in logs]
-    return _joined(commanding[0], parts)
-
-
-def _joined(first: Log, parts: Sequence[Log]) -> Log:
-    """Return the log that has the commands, with the channels of all parts."""
     return replace(
-        first,
+        commanding[0],
         channels=tuple(replace(channel, file=log.file) for log in parts for channel in log.channels),
         findings=tuple(finding for log in parts for finding in log.findings),
         names=frozenset().union(*(log.names for log in parts)),
@@ -463,7 +441,7 @@ def _on_clock(log: Log, commands: Commands, *, is_other: bool) -> Log:
 
 def kind_of_table(path: Path, columns: Mapping[str, str]) -> str:
     """Return the kind of the table of tank tests in a file, or an empty text for a log."""
-    kind, _ = parts_of_name(path.stem.lower(), None)
+    kind, _ = parts_of_name(path)
     return kind if kind in TABLES and not has_log(path, kind, columns) else ""
 
 
@@ -486,11 +464,12 @@ def has_log(path: Path, kind: str, columns: Mapping[str, str]) -> bool:
     return has_column(header, {"time": TIME}) and not has_column(header, measured)
 
 
-def parts_of_name(stem: str, curves: Iterable[str] | None) -> tuple[str, str]:
+def parts_of_name(path: Path, curves: Iterable[str] | None = None) -> tuple[str, str]:
     """Split the name of a file into the kind of test and the longest curve or axis name that follows, if any.
 
     Without curves, any name may be that of a curve.
     """
+    stem = path.stem.lower()
     for kind in KINDS:
         if (rest := stem.removeprefix(f"{kind}_")) != stem:
             names = AXES if kind != "thrust" else [rest] if curves is None else curves

@@ -35,7 +35,7 @@ class Source:
     """Who sent messages or a channel, and in which frames."""
 
     topic: str
-    """The topic, the message or the header of the column; empty for a whole table."""
+    """The topic, the message, or the header of the column, or of the first and the last one; empty for a table."""
     kind: str = ""
     """The type of the messages."""
     vehicle: str = ""
@@ -47,11 +47,6 @@ class Source:
 
     def __str__(self) -> str:
         return f"{self.topic} ({self.part})" if self.part else self.topic
-
-    @classmethod
-    def of_several(cls, topics: Sequence[str]) -> "Source":
-        """Return the source of what comes from several fields or columns."""
-        return cls(" ... ".join(dict.fromkeys([*topics[:1], *topics[-1:]])))
 
 
 @dataclass(frozen=True, eq=False)

@@ -59,11 +59,11 @@ def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
     used = {channel.quantity.name for channel in channels if not channel.unused}
     groups: dict[tuple[str, str, str], list[Channel]] = {}
     for channel in channels:
-        others = "" if channel.unused else _others(channel, channels)
-        if not channel.unused and (channel.source.kind or others):
-            groups.setdefault(("source", str(channel.source), others), []).append(channel)
-        elif channel.quantity.name not in used:
-            groups.setdefault(("channel left out", str(channel.source), channel.unused), []).append(channel)
+        kind = "channel left out" if channel.unused else "source"
+        words = channel.unused or _others(channel, channels)
+        is_told = channel.quantity.name not in used if channel.unused else channel.source.kind or words
+        if is_told:
+            groups.setdefault((kind, str(channel.source), words), []).append(channel)
     for (kind, source, words), own in sorted(groups.items(), key=lambda group: group[0][0]):
         quantities = listed(dict.fromkeys(channel.quantity.name for channel in own))
         yield about(file, kind, quantities=quantities, source=source, words=words, rate=rate(own[0].samples[0]))
@@ -90,13 +90,12 @@ def _others(channel: Channel, channels: Sequence[Channel]) -> str:
 
 
 def uninterrupted(log: Log) -> list[Log]:
-    """Return the pieces of a log between the gaps in which it tells neither a command nor a measurement.
+    """Return the pieces of a log with commands between the gaps in which it tells neither these nor a measurement.
 
     What was commanded in a gap is unknown. If the last command held there, the motion after it would contradict it.
     """
     commands = log.commands
-    if not commands:
-        return [log]
+    assert commands  # a folder keeps no other log
     told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
     silent = gaps(told, told)
     interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))

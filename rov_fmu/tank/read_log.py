@@ -35,7 +35,7 @@ from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.ardusub_frames import frame_of, misfits
 from rov_fmu.tank.readers.content import Content, Piece, described
 from rov_fmu.tank.readers.no_measurement import measured_only
-from rov_fmu.tank.readers.parsers import guarded, open_table, read_content
+from rov_fmu.tank.readers.parsers import guarded, open_table, read_topics
 from rov_fmu.tank.readers.tables import read_table
 
 
@@ -56,7 +56,7 @@ def read_logs(
     if lines := open_table(path):
         content, entries = read_table(path, layout, axis, names, lines, is_part=is_part)
     else:
-        content = read_content(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
+        content = read_topics(path, {name.partition(".")[0] for name in (*entries, *names.valid)})
     content.split_by_clock()
     _move_to_neutral(content, entries)
     content.findings += [about(path.name, "clock restarts", at=f"{piece.since:.4g}") for piece in content.pieces[1:]]
@@ -88,7 +88,8 @@ def _log(
         commanded = forces if forces.series else commanded
     without_thruster = (content.without_thruster if is_first else {}) or commanded.without_thruster
     config = piece.parameters.last("FRAME_CONFIG")
-    source = commanded.sender or Source.of_several([*labels.values()])
+    fields = [*labels.values()]
+    source = commanded.sender or Source(" ... ".join(dict.fromkeys([*fields[:1], *fields[-1:]])))
     series = told or commanded.series
     findings = [
         *content.findings * is_first,
@@ -176,14 +177,13 @@ def _findings(file: str, layout: Layout, series: Mapping[str, Series], labels: M
     `labels` has the column or field of each input, thruster or axis that rov.toml or a table names.
     """
     first = min((time[0] for time, _ in series.values()), default=0.0)
-    for name, (time, _) in series.items():
+    for name, (time, values) in series.items():
+        title = labels.get(name, f"thruster {name}")
         if time[0] > first + LATE:
-            at = f"{time[0] - first:.4g}"
-            yield about(file, "late command", column=labels.get(name, f"thruster {name}"), at=at)
-    for name, (_, values) in series.items():
+            yield about(file, "late command", column=title, at=f"{time[0] - first:.4g}")
         count = int((np.abs(values) > 1.0 + 1e-9).sum())
         if count and name not in EXTERNAL:
-            yield about(file, "beyond full thrust", column=labels.get(name, f"thruster {name}"), count=count)
+            yield about(file, "beyond full thrust", column=title, count=count)
     expected = INPUTS if is_of_inputs(layout, series) else THRUSTERS
     missing = {*layout.commands, *layout.curve_of} - series.keys()
     for title, column in columns_of_log(layout, None).items() if series and COMMAND not in series else ():

@@ -131,6 +131,15 @@ def test_a_force_along_an_axis_is_no_thruster_that_may_be_ill(tmp_path: Path) ->
     assert len([*HYPOTHESES["reversed commands"].suspects(known, logs)]) == 2, "but its sign may be wrong"
 
 
+def test_a_force_whose_sign_is_wrong_may_be_reversed(tmp_path: Path) -> None:
+    write_dives(tmp_path, f'{ROV}[logs]\nreversed = ["Z_ext"]\n', 1)
+    (log,) = load_tests(tmp_path).folder.logs
+    assert log.commands
+    commands, d = log.commands.at(log.commands.rows), dive(1)
+    for name, force in {"X_ext": d.X, "Z_ext": -d.Z}.items():
+        assert commands[:, log.commands.thrusters.index(name)] == pytest.approx(force / abs(force).max(), abs=1e-12)
+
+
 def of_topics(folder: Path, d: Dive) -> None:
     """Write topics as `rostopic echo -p` does, whose z points up, as does the heading."""
     none, stamp = np.zeros(len(d.time)), 1.7e18 + 1e9 * d.time

@@ -21,7 +21,7 @@ from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.tables import rules_of_page
 from tests.vehicles import VIDEORAY
 
-COLUMNS = {name: quantity.column for name, quantity in QUANTITIES.items()} | {"time": TIME} | columns_of("thrust")
+COLUMNS = {name: Column(one.units) for name, one in QUANTITIES.items()} | {"time": TIME} | columns_of("thrust")
 EQUAL: Mapping[str, Mapping[str, float]] = {
     "depth": {"m": 3.048, "cm": 304.8, "mm": 3048, "ft": 10},
     "surge velocity": {"m/s": 0.9144, "cm/s": 91.44, "mm/s": 914.4, "ft/s": 3, "kn": 1.7774514038876894},

@@ -16,7 +16,7 @@ from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import Toml
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, has_wrench, read_description
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, read_description
 from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
 from rov_fmu.tank.inspection.draft import (
@@ -120,7 +120,7 @@ def inspect_logs(paths: Sequence[Path]) -> Inspected:
     folder, files = folder_and_files(paths)
     path = folder / ROV_FILE
     described = read_description(path) if path.exists() else NO_ROV_FILE
-    is_described = bool(described.tables.base or described.tables.thruster or has_wrench(described.tables))
+    is_described = bool(described.tables.base or described.tables.thruster or described.tables.has_wrench)
     layouts = [load_vehicle(file).layout for file in SHIPPED.values()]
     listing = Listing(folder, files) if files else list_files(folder)
     inspections: list[Inspection] = []

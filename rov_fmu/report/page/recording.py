@@ -20,7 +20,6 @@ from rov_fmu.io.reading import open_file
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.description import has_wrench
 from rov_fmu.tank.folder import description_beside, one_log
 from rov_fmu.tank.log import Commands, Log
 from rov_fmu.tank.readers.parsers import one_parser, read_topics
@@ -43,7 +42,7 @@ def recording_of(path: Path, vehicle: Vehicle, identified: Path | None = None) -
     forces are added. Warns of what is left out. Raises FileError if the log cannot be flown by this vehicle.
     """
     rov_file, layout = description_beside(path), vehicle.layout
-    if has_wrench(rov_file.tables):
+    if rov_file.tables.has_wrench:
         layout = Layout.of_wrench(layout.axes)
     log = one_log(path, layout, rov_file)
     if not log.commands:

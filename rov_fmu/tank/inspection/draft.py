@@ -138,22 +138,22 @@ def lacking(own: str, draft: str, *, has_vehicle: bool) -> str:
     files = [name for names in dives if isinstance(names, list) for name in names]
     told = tomlkit.document()
     for name, table in more.items():
+        there, is_described = document.get(name, {}), has_vehicle and name in _HARDWARE
         if isinstance(table, AoT) and name in document:
-            if thrusters := _lacking_thrusters(document[name], table):
+            if thrusters := _lacking_thrusters(there, table):
                 told.add(name, thrusters)
+        elif not isinstance(table, AbstractTable) and (
+            _is_told(there, table) if name in document else not is_described
+        ):
+            told.add(name, table)
+        if not isinstance(table, AbstractTable) or not isinstance(there, dict):
             continue
-        if not isinstance(table, AbstractTable) or not isinstance(document.get(name, {}), dict):
-            is_missing = name not in document and not (has_vehicle and name in _HARDWARE)
-            if is_missing or (not isinstance(table, AbstractTable) and _is_told(document.get(name), table)):
-                told.add(name, table)
-            continue
-        there = tables.get(name, {})
         keys = {
             key: value
             for key, value in table.items()
             if key not in there or (not isinstance(value, Table) and _is_told(there[key], value))
         }
-        if has_vehicle and name in _HARDWARE:
+        if is_described:
             added = {"body": body, "axes": table if "thruster" in document else ()}.get(name, ())
             keys = {key: value for key, value in keys.items() if key in there or key in added}
         if name == "dives":  # a dive of the same files may have any name
@@ -215,15 +215,14 @@ def completed(own: str, lacks: str) -> str:
         head = f"{comment}\n" if comment else ""
         del document["base"]
     for name, item in more.items():
-        if name in document and isinstance(item, AoT):
-            _complete_thrusters(document[name], item)
-        elif not isinstance(item, AbstractTable | AoT):
-            if name in document:
-                _put(document, name, item)
-            else:
-                head += f"{name} = {item.as_string()}\n"
-        elif name not in document or isinstance(item, AoT):
+        if name not in document and isinstance(item, AbstractTable | AoT):
             tables.add(name, item)
+        elif name not in document:
+            head += f"{name} = {item.as_string()}\n"
+        elif isinstance(item, AoT):
+            _complete_thrusters(document[name], item)
+        elif not isinstance(item, AbstractTable):
+            _put(document, name, item)
         else:
             there = document[name]
             for key, value in item.items():
@@ -259,14 +258,7 @@ def _complete_thrusters(own: Any, more: AoT) -> None:
         elif isinstance(own, AoT):
             own.append(thruster)
         else:
-            own.append(_inline(thruster.unwrap()))
-
-
-def _inline(values: Mapping[str, Any]) -> InlineTable:
-    """Return an inline table."""
-    table = tomlkit.inline_table()
-    table.update(values)
-    return table
+            own.append(thruster.unwrap())  # becomes an inline table
 
 
 def _vector(vector: SourcedVector | None) -> str:

@@ -186,8 +186,9 @@ def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts:
     chosen = [title for title in possible if title in sure]
     best = min(map(_grade, chosen), default=0)
     chosen = [title for title in chosen if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
-    ends = {name: _ends(numbers[title]) for name, title in zip(_names(chosen), chosen, strict=True)}
-    is_pulse = any(map(_are_pulses, (numbers[title] for title in chosen)))
+    outputs = {name: numbers[title] for name, title in zip(_names(chosen), chosen, strict=True)}
+    ends = {name: (float(own.min()), float(own.max())) for name, own in outputs.items()}
+    is_pulse = any(map(_are_pulses, outputs.values()))
     kept = likely_thrusters(ends, layouts, *((NEUTRAL, _IDLE_PULSE) if is_pulse else (0.0, 0.0)))
     return [title for name, title in zip(ends, chosen, strict=True) if name in kept] or [
         title for title in meant if _force(title) and len(numbers[title])
@@ -208,10 +209,6 @@ def likely_thrusters(
     last = max(n for n, name in enumerate(names, start=1) if ends[name][0] < ends[name][1])
     known = [*layouts]
     return next((names[:n] for n in range(last, len(names) + 1) if fitting(names[:n], known)), names[:last])
-
-
-def _ends(numbers: Array) -> tuple[float, float]:
-    return float(numbers.min()), float(numbers.max())
 
 
 def _grade(title: str) -> int:
@@ -414,7 +411,7 @@ def headers_of_tables(folder: Path) -> TableHeaders:
     for path in list_files(folder).tests:
         if kind := kind_of_table(path, {}):
             if kind == "thrust":
-                _, curve = parts_of_name(path.stem.lower(), None)
+                _, curve = parts_of_name(path)
                 tested.add(curve)
             with suppress(DataFileError):
                 for title, meant in guessed_of_table(kind, axis_in_name(path), header_of(path) or []).items():

@@ -18,7 +18,7 @@ from rov_fmu.io.csv_table import DataFileError, OpenStream
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.clocks import gaps
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, columns_of, columns_of_log, has_column, names_of
+from rov_fmu.tank.columns import TABLES, TIME, columns_of, columns_of_log, has_column, names_of
 from rov_fmu.tank.description import NO_ROV_FILE, RovFile, RovTables
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import axis_in_name, kind_of_table
@@ -83,15 +83,14 @@ def inspect(path: Path, layouts: Iterable[Layout], described: RovFile = NO_ROV_F
     description, the thrusters of a CSV log have the names of the first layout that fits, or else names that follow from
     the headers. Raises DataFileError.
     """
-    layout = described.description.layout if described.description else None
-    tables = described.tables
+    tables = described.tables  # those with quantities cannot be pickled
     told = RovTables(columns=tables.columns, topics=tables.topics, valid=tables.valid, logs=tables.logs)
-    return _inspected(path, [*layouts], layout, told)
+    return _inspected(path, [*layouts], described.layout, told)
 
 
 @guarded
-def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, tables: RovTables) -> list[Inspection]:
-    axis, layout = axis_in_name(path), described or Layout((), (), ())
+def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tables: RovTables) -> list[Inspection]:
+    axis = axis_in_name(path)
     columns: Mapping[str, str] = {}
     unread: dict[str, str] = {}
     if open_stream := open_table(path):
@@ -107,15 +106,15 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
             return [_of_table(path, kind, columns, ranges)]
         renamed = time_columns(start, renamed) | renamed
         own = {renamed.get(title, title): numbers[title] for title in titles}
-        guess, columns = guessed([*own], own, axis, [described] if described else layouts)
-        layout = described or guess
+        guess, columns = guessed([*own], own, axis, [layout] if layout else layouts)
+        layout = layout or guess
         known = columns_of_log(layout, axis)
         named = KnownColumns(known)
         name_of = partial(_known_name, named)
         told = {*map(name_of, own), ""}
         columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
         columns |= renamed
-        names, _ = names_of(layout, RovTables(columns=columns, valid=tables.valid, logs=tables.logs))
+        names, _ = names_of(layout, tables.model_copy(update={"columns": columns}))
         flags = {*flag_columns(titles, known, names).values()}
         meant = {title: names.columns.get(title, title) for title in titles}
         unread = {
@@ -130,9 +129,9 @@ def _inspected(path: Path, layouts: Sequence[Layout], described: Layout | None, 
         if count < 2 or not has_time:
             return [Inspection(path, path.name, (), (), unread, (), columns)]
     else:
-        names, _ = names_of(described, tables)
+        names, _ = names_of(layout, tables)
         axis = None
-    logs = read_logs(path, layout, names, axis, is_part=True)
+    logs = read_logs(path, layout or Layout((), (), ()), names, axis, is_part=True)
     return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
 
 
@@ -165,15 +164,12 @@ def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping
     columns = {**guesses, **renamed}
     is_column = KnownColumns(of_table).has
     unread = {title: what for title, what in ranges.items() if not is_column(columns.get(title, title))}
-    if len(ranges) - len(unread) < len(of_table):
-        return Inspection(path, path.name, (), (), unread, (), columns)
-    rows, _, told = read_rows(path, kind, axis, columns)
-    numbers = zip(*((row.command, row.value) for row in rows), strict=True)
-    no_times = np.full(len(rows), nan)
-    channels = (
-        _signal(name, "1" if name == COMMAND else next(iter(column.units)), no_times, np.array(own))
-        for (name, column), own in zip(of_table.items(), numbers, strict=True)
-    )
+    channels, told = list[Signal](), list[Finding]()
+    if len(ranges) - len(unread) >= len(of_table):
+        rows, _, told = read_rows(path, kind, axis, columns)
+        numbers = np.array([(row.command, row.value) for row in rows]).T
+        units = ("1", next(iter(of_table[TABLES[kind]].units)))
+        channels = [*map(_signal, of_table, units, np.full(numbers.shape, nan), numbers)]
     return Inspection(path, path.name, (), tuple(channels), unread, tuple(told), columns)
 
 
@@ -231,7 +227,7 @@ def _numbers(path: Path, titles: Sequence[str], open_stream: OpenStream) -> tupl
     """
     counts = Counter(titles)
     columns_of = {title: str(n) for n, title in enumerate(titles) if counts[title] == 1}
-    columns = {name: Column({"1": 1.0}, True, True) for name in map(str, range(len(titles)))}
+    columns = dict.fromkeys(columns_of.values(), Column({"1": 1.0}, True, True))
     renamed = {title: f"{name} [1]" for title, name in columns_of.items()}
     table = read_columns(
         path, columns, others=True, loose=True, renamed=renamed, grown=grown_rows, open_stream=open_stream

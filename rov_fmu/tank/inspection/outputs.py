@@ -102,7 +102,7 @@ def moved(logs: Sequence[Log]) -> Moved:
         fits = [fit for span in _SPANS for fit in _fits(logs, axis, [*effects], span)]
         if fits:
             shown.append(axis)
-            for name, by in max(fits, key=lambda fit: fit.clearest).clear(effects):
+            for name, by in max(fits, key=lambda fit: fit.clearness.max(initial=0.0)).clear(effects):
                 effects[name][axis] = by
     return Moved(frozenset(shown), effects)
 
@@ -158,10 +158,6 @@ class _Fit:
 
     effects: Array
     clearness: Array
-
-    @property
-    def clearest(self) -> float:
-        return float(np.max(self.clearness, initial=0.0))
 
     @classmethod
     def of(cls, left: Array, right: Array, outputs: int, independent: float) -> "_Fit":

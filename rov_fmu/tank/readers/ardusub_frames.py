@@ -127,9 +127,8 @@ def misfits(
     frames = [f"the log has {config_of(frame)}"] if frame else []
     frames += [f"{config_of(own)} fits the vehicle" for own in fits if own != frame]
     words = f": {', and '.join(frames)}" if frames else ""
-    silent = [t for t in layout.thrusters if t.name in without_pulse]
     factors = [motors[n - 1] if n <= len(motors) else "+" * len(DEMANDS) for n in extra.values()]
-    pushed = {axis for t in silent for axis in DEMANDS if abs(t.effect(axis)) > FAINT}
+    pushed = {axis for axis in DEMANDS for t in layout.thrusters_along(axis) if t.name in without_pulse}
     pulled = {axis for motor in factors for axis, factor in zip(DEMANDS, motor, strict=True) if factor != "."}
     for kind, concerned, whose in (
         ("thrusters without pulse", pushed, listed(without_pulse)),

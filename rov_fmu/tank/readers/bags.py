@@ -11,6 +11,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from math import nan
 from pathlib import Path
 from shutil import copyfileobj
@@ -53,22 +54,8 @@ Decode = Callable[[bytes], Any]
 """Returns a message as an object or a mapping of its fields. Raises any exception for one that is damaged."""
 
 
-def read_bag(path: Path, named: Collection[str]) -> Content:
-    """Read the messages of a bag of ROS 1 that the catalogue knows, and those of the topics in `named`."""
-    return _read(path, named, bag_messages)
-
-
-def read_database(path: Path, named: Collection[str]) -> Content:
-    """Read the same messages in the database of a bag of ROS 2."""
-    return _read(path, named, database_messages)
-
-
-def read_mcap(path: Path, named: Collection[str]) -> Content:
-    """Read the same messages in an MCAP file, written by ROS or by others."""
-    return _read(path, named, mcap_messages)
-
-
-def _read(path: Path, named: Collection[str], messages: Callable[[Path, Damage], Iterator[Raw]]) -> Content:
+def _read(messages: Callable[[Path, Damage], Iterator[Raw]], path: Path, named: Collection[str]) -> Content:
+    """Read those messages of a recorder's file that the catalogue knows, and those of the topics in `named`."""
     damage, unknown = Damage(), _Unknown()
     content = read_messages(path, _decoded(messages(path, damage), named, unknown), named)
     content.unread |= unknown.described()
@@ -78,6 +65,12 @@ def _read(path: Path, named: Collection[str], messages: Callable[[Path, Damage],
     if damage.is_cut:
         content.add_cut()
     return content
+
+
+read_bag, read_database, read_mcap = (
+    partial(_read, messages) for messages in (bag_messages, database_messages, mcap_messages)
+)
+"""Read a bag of ROS 1, the database of a bag of ROS 2, or an MCAP file, written by ROS or by others."""
 
 
 def unpack(path: Path, to: Path) -> None:

@@ -92,8 +92,7 @@ class Content:
 def content_of(
     file: str,
     messages: Messages,
-    parameters: Mapping[str, Sequence[tuple[float, float]]] = MappingProxyType({}),
-    damaged: int = 0,
+    parameters: Mapping[str, Sequence[tuple[float, float]]],
 ) -> Content:
     """Return the content of a log whose messages have times of their own and of their arrival.
 
@@ -119,7 +118,6 @@ def content_of(
         topics = [topic for topic in topics if len(topic.time)]
         content.pieces.append(Piece(topics, Parameters.of_pairs(parameters, delay), first - begin))
     content.count("time of arrival", late.total(), topics=", ".join(+late))
-    content.count("damaged pieces", damaged)
     return content
 
 

@@ -93,7 +93,8 @@ def read_messages(path: Path, messages: Iterable[Message | None], named: Collect
             source, numbers = _of_port(source, numbers)
             rows.setdefault(source, []).append((stamp, arrival, numbers))
     rows = dict(sorted(rows.items(), key=lambda row: row[0].part))  # the first instance is the main
-    content = content_of(path.name, rows, parameters, damaged)
+    content = content_of(path.name, rows, parameters)
+    content.count("damaged pieces", damaged)
     content.unread = {topic: f"{count} messages" for topic, count in others.items()}
     for piece in content.pieces:
         piece.topics = _of_primary_core([*_with_known_velocities(piece.topics, content)])
@@ -117,14 +118,11 @@ def _numbers(message: Any) -> Mapping[str, float]:
 
 def read_dataflash(path: Path, named: Collection[str]) -> Content:
     """Read the messages in a log of the vehicle that the catalogue knows, and those that `named` has."""
-    from pymavlink import DFReader
+    from pymavlink.DFReader import DFReader_binary
 
-    class Reader(DFReader.DFReader_binary):  # type: ignore[misc]
-        def init_clock(self) -> None:
-            """Use the time since boot, without a search through the whole log for the time of a GPS."""
-            self.init_clock_usec()
-
-        init_arrays_fast = DFReader.DFReader_binary.init_arrays  # the output of the compiled one cannot be redirected
+    class Reader(DFReader_binary):  # type: ignore[misc]
+        init_clock = DFReader_binary.init_clock_usec  # since boot, without a search for the time of a GPS
+        init_arrays_fast = DFReader_binary.init_arrays  # the output of the compiled one cannot be redirected
 
     with closing(Reader(str(path))) as reader:
         counts = {name: reader.counts[kind] for kind, name in reader.id_to_name.items() if reader.counts[kind]}
@@ -133,12 +131,10 @@ def read_dataflash(path: Path, named: Collection[str]) -> Content:
 
 def read_dataflash_text(path: Path, named: Collection[str]) -> Content:
     """Read the same messages in a log that was converted to text."""
-    from pymavlink import DFReader
+    from pymavlink.DFReader import DFReader_text
 
-    class Reader(DFReader.DFReader_text):  # type: ignore[misc]
-        def init_clock(self) -> None:
-            """Use the time since boot, as in the log of the vehicle."""
-            self.init_clock_usec()
+    class Reader(DFReader_text):  # type: ignore[misc]
+        init_clock = DFReader_text.init_clock_usec  # since boot, as in the log of the vehicle
 
     reader = Reader(str(path))
     with closing(reader.filehandle):

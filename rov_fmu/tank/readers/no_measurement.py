@@ -155,8 +155,7 @@ def measured_only(
             least = f"{factor * quantity.least:g} {unit}"
             fields[field] = without(fields[field], in_si < quantity.least, "below any", least, column)
             in_si = np.where(in_si < quantity.least, np.nan, in_si)
-            found = dict.fromkeys(marks(topic.time, in_si, quantity), "mark")
-            for mark, kind in (found or dict.fromkeys(only_mark(in_si, quantity), "only mark")).items():
+            for mark, kind in marks(topic.time, in_si, quantity).items():
                 fields[field] = without(fields[field], in_si == mark, kind, f"{factor * mark:.6g} {unit}", column)
         kept.append(replace(topic, fields=fields))
     findings = [
@@ -209,28 +208,22 @@ def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Itera
 # ---- Marks -----------------------------------------------------------------------------------------------------------
 
 
-def marks(time: Array, values: Array, quantity: Quantity) -> list[float]:
-    """Return the numbers that mark that nothing was measured, of values in SI units."""
+def marks(time: Array, values: Array, quantity: Quantity) -> dict[float, str]:
+    """Return the numbers that mark that nothing was measured, of values in SI units, with the kind of the finding."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
     levels, counts = np.unique(values, return_counts=True)
+    if len(levels) == 1 and counts[0] > 1:
+        level = float(levels[0])
+        is_beyond = not quantity.minimum <= level <= quantity.maximum
+        integers = level * 10.0 ** np.arange(_DECIMALS)
+        is_extreme = quantity.axis is None and np.isclose(integers[:, None], _EXTREMES, rtol=1e-9, atol=0.0).any()
+        return {level: "only mark"} if is_beyond or is_extreme else {}
     found: list[float] = []
     while marked := next((own for own in _far(levels, counts, quantity) if _jumps(time, values, levels[own])), None):
         found += levels[marked].tolist()
         levels, counts = np.delete(levels, marked), np.delete(counts, marked)
-    return found
-
-
-def only_mark(values: Array, quantity: Quantity) -> list[float]:
-    """Return the number of values in SI units that are all the same, if it marks that nothing was measured."""
-    levels, counts = np.unique(values[np.isfinite(values)], return_counts=True)
-    if len(levels) != 1 or counts[0] < 2:
-        return []
-    level = float(levels[0])
-    is_beyond = not quantity.minimum <= level <= quantity.maximum
-    integers = level * 10.0 ** np.arange(_DECIMALS)
-    is_extreme = quantity.axis is None and bool(np.isclose(integers[:, None], _EXTREMES, rtol=1e-9, atol=0.0).any())
-    return [level] if is_beyond or is_extreme else []
+    return dict.fromkeys(found, "mark")
 
 
 def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:

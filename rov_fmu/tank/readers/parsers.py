@@ -173,9 +173,9 @@ class _Parser:
         with self.lock:
             key = _key(file)
             left = replace(limits, time=limits.time and limits.time - self.spent.get(key, 0.0))
-            if left.time is not None and left.time <= 0.0:
-                raise _exceeding(path, LimitError("time", limits))
             try:
+                if left.time is not None and left.time <= 0.0:
+                    raise LimitError("time", limits)
                 self._child = self._child or ChildProcess(Functions, limits=limits)
                 begin = monotonic()
                 try:
@@ -186,7 +186,7 @@ class _Parser:
             except ChildError as error:
                 self.close()
                 if isinstance(error, LimitError):
-                    raise _exceeding(path, LimitError(error.limit, limits)) from error
+                    raise UnreadableFileError(f"{path}: {LimitError(error.limit, limits)} to be read") from error
                 raise UnreadableFileError(f"{path}: its parser {error}") from error
             finally:
                 if limits.memory != budget(0).memory:
@@ -200,10 +200,6 @@ class _Parser:
 
 
 _PARSER = _Parser()
-
-
-def _exceeding(path: Path, error: LimitError) -> UnreadableFileError:
-    return UnreadableFileError(f"{path}: {error} to be read")
 
 
 def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
@@ -242,12 +238,12 @@ def open_table(path: Path) -> OpenStream | None:
     return opens(path) if opens else None
 
 
-def read_content(path: Path, named: Collection[str]) -> Content:
-    """Return the content of a log that is no table. Raises DataFileError.
+@guarded
+def read_topics(path: Path, named: Collection[str]) -> Content:
+    """Return the content of a log that is no table, with the topics that `named` has. Raises DataFileError.
 
     The process keeps it for the next function that uses it, unless it has kept much already.
     """
-    assert _PARSER.is_child, "only a guarded function may read a file"
     contents, key = _PARSER.contents, (_key(path.stat()), path, frozenset(named))
     content = contents.get(key) or _parsed(path, named)
     if sum(size for (*_, size), *_ in {*contents, key}) > _KEPT:
@@ -265,7 +261,10 @@ def _parsed(path: Path, named: Collection[str]) -> Content:
             if kind.unpack:
                 file, shown = Path(folder) / "unpacked", f"{path}, unpacked"
                 kind.unpack(path, file)
-                kind = _format_of_unpacked(file, shown)
+                try:
+                    kind = format_of(file)
+                except DataFileError as error:
+                    raise UnreadableFileError(str(error).replace(str(file), shown)) from error
             if not kind.read:
                 raise UnreadableFileError(f"{shown}: is {kind.name}, and not a log with messages")
             content = kind.read(file, named)
@@ -277,22 +276,8 @@ def _parsed(path: Path, named: Collection[str]) -> Content:
     return replace(content, file=path.name, findings=findings)
 
 
-def _format_of_unpacked(file: Path, shown: str) -> Format:
-    """Return the format of a file that was packed in another one, which the error names. Raises DataFileError."""
-    try:
-        return format_of(file)
-    except DataFileError as error:
-        raise UnreadableFileError(str(error).replace(str(file), shown)) from error
-
-
 @guarded
 def header_of(path: Path) -> list[str] | None:
     """Return the headers of a table; None for another log. Raises DataFileError."""
     lines = open_table(path)
     return read_start(path, lines, 1)[0] if lines else None
-
-
-@guarded
-def read_topics(path: Path, named: Collection[str]) -> Content:
-    """Return the topics with some names in a log that is no table. Raises DataFileError."""
-    return read_content(path, named)

@@ -29,6 +29,8 @@ _SLICE = 1 << 16
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END, _PRIVATE = 3, 4, 5, 6, 15, 128
 """Opcodes of MCAP. Those from the last one on are for the records of others; 0 is none."""
+_CHUNK_HEAD = struct.Struct("<QQQII")
+"""The head of a chunk: first and last time, size and checksum of its records, length of the compression's name."""
 _BAG_BEGIN = len("#ROSBAG V2.0\n")
 _BAG_MESSAGE, _BAG_CHUNK, _BAG_CHUNK_INFO, _BAG_CONNECTION = 2, 5, 6, 7
 """Kinds of records in a bag of ROS 1."""
@@ -171,9 +173,9 @@ class _Mcap:
             if not (0 < opcode < _DATA_END or opcode >= _PRIVATE):
                 raise _DamagedError
             left = end - file.tell()
-            if opcode not in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK):
-                file.seek(min(length, left), 1)
+            after = file.tell() + min(length, left)
             content = file.read(min(length, left)) if opcode in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK) else b""
+            file.seek(after)
             if opcode == _CHUNK and not is_chunk:
                 yield from self._of_chunk(content, is_whole=length <= left)
             if length > left:
@@ -194,18 +196,15 @@ class _Mcap:
 
     def _of_chunk(self, content: bytes, *, is_whole: bool) -> Iterator[Raw]:
         """Yield the messages of a chunk, of which the end may be missing."""
-        head = "<QQQII"
-        if len(content) < struct.calcsize(head):
+        if len(content) < _CHUNK_HEAD.size:
             return
-        _, _, size, checksum, length = struct.unpack_from(head, content)
-        name, begin = content[struct.calcsize(head) :][:length], struct.calcsize(head) + length + 8
+        _, _, size, checksum, length = _CHUNK_HEAD.unpack_from(content)
+        name, packed = content[_CHUNK_HEAD.size :][:length], content[_CHUNK_HEAD.size + length + 8 :]
         try:
-            records = _decompressed(content[begin:], name.decode(errors="replace"))
+            records = _decompressed(packed, name.decode(errors="replace"))
             is_sound = len(records) == size and checksum in (0, crc32(records))
-            own = self.messages(
-                BytesIO(records), len(records), is_chunk=True, is_trusted=is_sound or not (is_whole and checksum)
-            )
-            yield from own
+            is_trusted = is_sound or not (is_whole and checksum)
+            yield from self.messages(BytesIO(records), len(records), is_chunk=True, is_trusted=is_trusted)
             self.damage.pieces += is_whole and not is_sound
         except _DamagedError:
             self.damage.pieces += is_whole
@@ -241,8 +240,10 @@ class _Bag:
 
     def record(self, file: IO[bytes], end: int) -> tuple[dict[bytes, bytes], int]:
         """Return the fields of the header of the next record, and the length of its data. Raises _DamagedError."""
-        header = self._sized(file, end)
-        return _fields(header), self._length(file)
+        length = self._length(file)
+        if not 0 < length <= end - file.tell():
+            raise _DamagedError
+        return _fields(file.read(length)), self._length(file)
 
     def read_index(self, file: IO[bytes], end: int) -> list[int]:
         """Return where the chunks begin, by the index from the offset of the file on, and add its connections. Raises
@@ -300,12 +301,6 @@ class _Bag:
         if len(content) < 4:
             raise _DamagedError
         return int.from_bytes(content, "little")
-
-    def _sized(self, file: IO[bytes], end: int) -> bytes:
-        length = self._length(file)
-        if not 0 < length <= end - file.tell():
-            raise _DamagedError
-        return file.read(length)
 
 
 def _fields(header: bytes) -> dict[bytes, bytes]:

@@ -53,7 +53,7 @@ from rov_fmu.tank.columns import (
     columns_of_log,
     refuse_slips,
 )
-from rov_fmu.tank.findings import Finding, about, refusal
+from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
@@ -150,7 +150,7 @@ def read_table(
     values |= {name: pulses[name] for name in unstated}
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
-        raise DataFileError(refusal(unlikely, path.parent))
+        raise DataFileError(*sentences([replace(unlikely, file=f"{path}")]))
     content = Content(path.name, [], names=frozenset(table.header), without_thruster=_without_thruster(table))
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, pulses, names.keys.neutral)
@@ -186,24 +186,19 @@ def _wrong_columns(
     renaming = RENAMING if unread else ""
     command = next((title for name, title in unread.items() if name.casefold() == COMMAND), None)
     if not found and command and not axis:
-        yield f"column {command} is the command of one axis, but {_no_axis_in_name(path, layout)}"
+        names, word = [*layout.by_name], path.stem.lower().partition("_")[2].partition("_")[0]
+        allowed = " or ".join(f"log_{name}*{path.suffix}" for name in names)
+        reason = f"is not an axis of this vehicle: the name of the file must be {allowed}{did_you_mean(word, names)}"
+        yield f"column {command} is the command of one axis, but {word or repr('')} {reason}"
         return
     wrong = [] if found else [_no_commands(known, unread, others, renaming)]
-    wrong += _no_motion(headers, layout, axis, known, renaming)
-    elsewhere = _ELSEWHERE if len(wrong) == 1 and not axis else ""
-    yield from (f"{line}{elsewhere}" for line in wrong)
-
-
-def _no_motion(
-    headers: Mapping[str, str], layout: Layout, axis: Axis | None, known: Mapping[str, LogColumn], renaming: str
-) -> Iterator[str]:
-    """Yield the line about a log without a column of the motion along an axis, nor one of the pressure."""
     axes = [axis] if axis else layout.bare_axes
-    quantities = {name: one.quantity for name, one in known.items() if one.quantity}
-    wanted = {name: quantity.unit for name, quantity in quantities.items() if quantity.axis in axes}
+    wanted = {name: of.unit for name, one in known.items() if (of := one.quantity) and of.axis in axes}
     if not headers.keys() & {*wanted, "pressure"}:
         titles = " or ".join(f"'{name} [{unit}]'" for name, unit in wanted.items())
-        yield f"column {titles} is missing{renaming}"
+        wrong.append(f"column {titles} is missing{renaming}")
+    elsewhere = _ELSEWHERE if len(wrong) == 1 and not axis else ""
+    yield from (f"{line}{elsewhere}" for line in wrong)
 
 
 def _no_commands(
@@ -221,14 +216,6 @@ def _no_commands(
         hint = f"; {listed(loads)} are forces on the body, if wrench = true stands in [logs] of rov.toml"
     every = "each in [%], [1] or [us]" if "[%]" in units else f"in {listed(units, 'or')}"
     return f"there is no column of commands. Possible columns: {wanted}, {every}{hint or renaming}"
-
-
-def _no_axis_in_name(path: Path, layout: Layout) -> str:
-    """Explain that the name of a file does not contain an axis of the vehicle."""
-    axes, word = [*layout.by_name], path.stem.lower().partition("_")[2].partition("_")[0]
-    names = " or ".join(f"log_{name}*{path.suffix}" for name in axes)
-    hint = did_you_mean(word, axes)
-    return f"{word or repr('')} is not an axis of this vehicle: the name of the file must be {names}{hint}"
 
 
 # ---- Rows ------------------------------------------------------------------------------------------------------------
@@ -478,6 +465,5 @@ def grown_rows(rows: Lines) -> Grown | None:
         by_width[after.width] = indices
     first = sum(index == n for n, index in enumerate(indices))
     last = sum(index == n for n, index in enumerate(indices, start=parts[-1].width - width))
-    counts = {"cells": parts[-1].width, "columns": width, "first": first, "last": last}
-    words = {"line": str(parts[1].line), **{name: str(n) for name, n in counts.items()}}
-    return Grown(by_width, odd, words) if first + last else None
+    counts = {"line": parts[1].line, "cells": parts[-1].width, "columns": width, "first": first, "last": last}
+    return Grown(by_width, odd, {name: str(n) for name, n in counts.items()}) if first + last else None

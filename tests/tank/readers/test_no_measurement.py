@@ -103,7 +103,7 @@ def test_marks_are_found(name: str) -> None:
 def test_measurements_are_no_marks(name: str) -> None:
     quantity, values = HONEST[name]
     time = TIME + 100.0 * (TIME >= 20.0) if "gap" in name else TIME
-    assert marks(time, values, QUANTITIES[quantity]) == []
+    assert marks(time, values, QUANTITIES[quantity]) == {}
 
 
 _AXES = ("surge velocity", "sway velocity", "heave velocity")
