@@ -190,7 +190,7 @@ def with_unseen_axes(tests: Tests, shown: Collection[Axis]) -> Layout:
 
     axes = [axis for axis in wide.bare_axes if layout.has(axis) or is_unseen(axis)]
     turns = any(axis.is_rotation for axis in shown)
-    is_whole = layout.has_wrench or wide.coupled or not turns or len(axes) == len(layout.axes)
+    is_whole = wide.coupled or not turns or len(axes) == len(layout.axes)
     return layout if is_whole else with_axes_alone(wide, axes)
 
 
