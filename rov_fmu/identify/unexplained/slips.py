@@ -50,8 +50,8 @@ and the water inside change from dive to dive."""
 _CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
 """The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
 which difference of J quick fits go on to their end: the evidence of a slip is hundreds."""
-_LEFT = 10.0
-"""A fit goes on while J may still fall by so many times what it just fell by: each step by 0.9 of the step before."""
+_LEFT = 3.0
+"""A fit goes on while J may still fall by so many times what it just fell by: each step by 3/4 of the step before."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
