@@ -3,13 +3,13 @@
 A scaling says that the values of some channels in the files are k times the true ones, such as 100 for centimetres
 in a column of metres, or -1 for a depth that is positive upwards. Its evidence against the files as they stand is
 
-    2 ln of the Bayes factor = J(files as they stand) - [ J(values / k) + 2 n ln |k| ]
+    2 ln of the Bayes factor = evidence(values / k) - 2 n ln |k| - evidence(files as they stand)
 
 for n such values: the density of the values in a file is 1/|k| times that of the true ones. Two vehicles explain a
 common scale of all data of an axis equally well, and only the priors of drag, inertia and thrust tell them apart.
 
 Added mass is never negative, so an inertia below the vehicle's own is as unlikely as its distance from it says. That
-distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s. So is
+distance, squared in standard errors, is subtracted here: it shows knots, which are 1.94 times as many as m/s. So is
 the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
 A frame forward, to starboard, down that is read as one forward, to port, up changes the signs of several channels of a
@@ -38,8 +38,17 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.search import structure, worst
-from rov_fmu.identify.likelihood.solve import ENOUGH, MOST_STEPS, QUICK, Minimum, minimise, start_of
-from rov_fmu.identify.result import Slip
+from rov_fmu.identify.likelihood.solve import (
+    ENOUGH,
+    MOST_STEPS,
+    QUICK,
+    Minimum,
+    best_explanations,
+    evidence,
+    minimise,
+    start_of,
+)
+from rov_fmu.identify.result import KEPT, Slip
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
@@ -47,9 +56,8 @@ from rov_fmu.tank.log import Channel
 _CERTAIN, _WEIGHED = 2.0, 0.05
 """An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
 and the water inside change from dive to dive."""
-_CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
-"""The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
-which difference of J quick fits go on to their end: the evidence of a slip is hundreds."""
+_CLOSE = KEPT + 2.0 * QUICK
+"""Up to which difference of evidence quick fits go on to their end, each of which may be QUICK from it."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -122,8 +130,8 @@ def slips(
         return (), inf
     fits = dict[Scaling, tuple[Objective, Minimum]]()
 
-    def least(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
-        """Return J of an explanation by a quick fit, or by one to its end if a quick fit of it was made before."""
+    def fit(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
+        """Return the evidence of a quick fit, or of one to its end if a quick fit was made before."""
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
         try:
             if is_exact := scaling in fits:
@@ -133,26 +141,26 @@ def slips(
                 start = start_of(quick) if start is None else start
             end = minimise(quick, start, most=most, enough=ENOUGH if is_exact else QUICK, last=False)
         except DivergedError:
-            return inf
+            return -inf
         fits[scaling] = quick, end
-        return end.value + sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling) + unlikely
+        return evidence(quick, end) - sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling) - unlikely
 
-    as_it_is, J = least(frozenset(), best, 1), dict[Scaling, float]()
+    as_it_is, found = fit(frozenset(), best, 1), dict[Scaling, float]()
     while untried:  # The best explanation may need fewer channels than it has.
-        J |= {one: least(one) for one in untried}
-        J |= {one: least(one) for one in untried if J[one] < min(J.values()) + _CLOSE}
-        first = min(J, key=lambda one: J[one])
+        found |= {one: fit(one) for one in untried}
+        found |= {one: fit(one) for one in untried if found[one] > max(found.values()) - _CLOSE}
+        first = max(found, key=lambda one: found[one])
         fewer = set[Scaling]() if first in frames else {first - {member} for member in first}
-        untried = fewer - J.keys() - {frozenset()}
-    if as_it_is < min(J.values()) + _CLOSE:
-        as_it_is = least(frozenset())
-    most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
-    for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
+        untried = fewer - found.keys() - {frozenset()}
+    if as_it_is > max(found.values()) - _CLOSE:
+        as_it_is = fit(frozenset())
+    gains, told = {one: value - as_it_is for one, value in found.items()}, dict[tuple[str, str], dict[str, float]]()
+    for scaling in best_explanations(gains):
         for match, scale in scaling:
             name, question = match.channel.quantity.name, _words(match.channel, scale)
             if scaling in frames:
                 name, question = _frame_in_words(scaling)
-            told.setdefault((match.file, name), {}).setdefault(question, as_it_is - J[scaling])
+            told.setdefault((match.file, name), {}).setdefault(question, gains[scaling])
     mistakes = (
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
