@@ -14,12 +14,12 @@ from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_l
 from rov_fmu.identify.likelihood.posterior import hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
-from rov_fmu.identify.result import Effect, Estimate, Logging, SensorNoise, Structure
+from rov_fmu.identify.result import CONSTANTS, Effect, Estimate, Logging, SensorNoise, Structure
 from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
 """A sample is an outlier if it is so many standard deviations beside its prediction."""
-_SHARED = 0.1
+_SHARED = CONSTANTS["shared"].value
 """A time is not told from another one whose knowledge would take away this share of its variance."""
 
 

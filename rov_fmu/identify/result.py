@@ -35,13 +35,13 @@ class Constant:
     """What was seen."""
 
 
-_FLIGHTS = "flights of a simulated ArduSub alone"
+_FLIGHTS = "flights of ArduSub's simulator"
 CONSTANTS = {
     "alike": Constant(
         2.0,
         "samples in turn in which a wrong structure lacks the same",
-        "of 50 drawn axes with a wrong structure, 96 % of the intervals contain the truth; with 6, 96 % of those 1.7 "
-        "times as wide; with 1, 93.5 %, some far off",
+        "96 % of the intervals of 50 drawn axes with a wrong structure contain the truth; with 6, as many, 1.7 times "
+        "as wide; with 1, 93.5 %",
     ),
     "lack": Constant(
         1.5,
@@ -51,7 +51,17 @@ CONSTANTS = {
     "contrast": Constant(
         0.2,
         "standard error of the health of a thruster by the data alone, up to which a hypothesis is about it",
-        "0.003 to 0.12 where logs tell thrusters apart, and 0.45 to 4 where they always get about the same commands",
+        "0.003 to 0.12 where logs tell thrusters apart, and 0.45 to 4 where their commands are alike",
+    ),
+    "shared": Constant(
+        0.1,
+        "share of a lag's variance from which another time is named",
+        "0.28 and 0.58 for lags of sensors, at most 0.02 for others",
+    ),
+    "far": Constant(
+        100.0,
+        "fall of J by which a hypothesis waits behind one that won",
+        "590 and 690 behind swapped and reversed thrusters, else at most 33",
     ),
     "rocking": Constant(
         0.03, "least half-width of V_ss without logged roll and pitch", "drag that waves raise by 3 to 7 %"
@@ -62,14 +72,16 @@ CONSTANTS = {
     "finest": Constant(
         KINDS[SENSOR_SCALE].finest,
         "least scale (ln) and offset (m/s) of a velocity sensor that are told",
-        "a position that lags by 0.5 s gave 0.010 and 3 mm/s that are not there",
+        "a position with a lag of 0.5 s gave 0.010 and 3 mm/s",
     ),
     "least noise": Constant(0.01, "least noise of a sensor, relative to its motion", _FLIGHTS),
 }
 """Chosen after results were seen. [priors] and the rules of the verdict have their own tables, with their reasons."""
 
-KEPT = 6.0
-"""The evidence, 2 ln of the Bayes factor, from which an optional effect is reported (Kass and Raftery 1995: strong)."""
+POSITIVE, KEPT, VERY_STRONG = 2.0, 6.0, 10.0
+"""The evidence, 2 ln of the Bayes factor or of the posterior odds, that is positive, strong and very strong (Kass and
+Raftery 1995). What is strong is told: an effect, a slow process, a cause, a slip, or a hypothesis about the structure.
+"""
 _NOTHING = 0.001
 """The share of the thrust or of the velocity below which a slow process without strong evidence is none."""
 

@@ -13,8 +13,7 @@ from rov_fmu.identify.findings import acting
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import objective, records, search
 from rov_fmu.identify.likelihood.kinds import EFFECTS, KINDS, SLOW
-from rov_fmu.identify.result import MOST_UNKNOWN
-from rov_fmu.identify.unexplained import causes, slips
+from rov_fmu.identify.result import KEPT, MOST_UNKNOWN
 from rov_fmu.identify.verdict import RULES
 from tests.commands import ROOT
 from tests.folders import FORCE, RATE, SPEED, TAU, read
@@ -100,10 +99,8 @@ def test_the_numbers_of_the_method_are_those_of_the_code() -> None:
         f"the current of an unseen log, which is about as large as in the others, but not below {least:g} m/s" in page
     )
     assert f"It is a fact below {100.0 * MOST_UNKNOWN:g} % of the thrust" in page
-    assert (
-        f"Bayes factor exceeds {causes.ENOUGH:g}, and that of the next cause by {causes.AHEAD:g} (`causes.py`)" in page
-    )
-    assert f"raises the evidence by more than {slips._CLEAR:g} (`slips.py`)" in page
+    assert f"2 ln of its Bayes factor exceeds {KEPT:g} (strong evidence" in page
+    assert f"told if 2 ln of its odds exceeds {KEPT:g} and is within {KEPT:g} of the best" in page
     assert f"reads {records.THINNED:g} samples per second" in page
     assert len(EFFECTS) == len(
         page.partition("## Effects ")[2].partition(" are effects")[0].replace(" and ", ", ").split(", ")

@@ -16,7 +16,7 @@ from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import file_fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.search import StructureSearch
-from rov_fmu.identify.result import ALARM
+from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.identify.unexplained import slips as module
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.io.csv_table import DataFileError
@@ -153,7 +153,7 @@ def asked_of(folder: Path, *, may_be_thrusters: bool = False) -> dict[tuple[str,
     known, recorded, rows = begin(tests)
     objective = Objective.of_known(known, recorded, rows)
     found, left = slips(tests, objective, objective.mean, np.full(len(objective.mean), np.inf))
-    assert all(one.evidence > 9.0 for one in found)
+    assert all(one.evidence > KEPT for one in found)
     assert (left == np.inf if may_be_thrusters else left < ALARM) or not found, "the mended logs agree"
     return {(one.file, one.quantity): one.words for one in found}
 

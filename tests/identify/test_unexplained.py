@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
+from scipy.stats import norm
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
@@ -15,9 +17,9 @@ from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.solve import Minimum
+from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total
 from rov_fmu.identify.result import KEPT
-from rov_fmu.identify.unexplained.causes import cause_of, independent
+from rov_fmu.identify.unexplained.causes import _evidence, _Piece, cause_of, independent
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed
 from rov_fmu.tank.arrays import Array
 from tests.folders import HEAD, folder_of
@@ -96,6 +98,40 @@ def test_a_change_of_all_thrust_follows_the_largest_command_and_the_voltage_itse
     assert cause(objective, VOLTAGE, None) == "the voltage"
 
 
+def test_a_cause_is_weighed_by_the_integrals_over_its_size_and_over_that_of_the_rest() -> None:
+    """The size has a normal prior as wide as the process; the rest is as probable at each logarithm of its size."""
+    rng, n = np.random.default_rng(4), 200
+    cause, time = rng.normal(size=n), np.array([1e3 * k for k in range(n)])
+    values = 0.3 * (cause - cause.mean()) + rng.normal(size=n)
+    piece = _Piece(time, values, {"the depth": cause})
+    k, s = np.linspace(-1.0, 1.5, 401)[:, None], np.exp(np.linspace(-0.7, 0.7, 401))
+    off = values[:, None, None] - k * (cause - cause.mean())[:, None, None]
+    likelihood = -n * np.log(s) - 0.5 * np.sum(off**2, axis=0) / s**2
+    of_size = norm.logpdf(k, 0.0, np.sqrt(np.sum(values**2) / np.sum((cause - cause.mean()) ** 2)))
+    none = logsumexp(likelihood[np.argmin(np.abs(k))])
+    ratio = logsumexp(likelihood + of_size) + np.log(k[1, 0] - k[0, 0]) - none
+    assert _evidence([piece], "the depth", 1.0, n) == pytest.approx(2.0 * ratio, abs=0.2)
+
+
+@pytest.mark.parametrize(
+    ("evidence", "names"),
+    [
+        ({}, ""),
+        ({"a": 5.9}, ""),
+        ({"a": 6.1}, "a"),
+        ({"a": 6.1, "b": -3.0}, ""),
+        ({"a": 9.0, "b": 2.9}, "a"),
+        ({"a": 20.0, "b": 25.0, "c": 5.0}, "ba"),
+        ({"a": 12.0, "b": 2.0, "c": 5.0}, "a"),
+    ],
+)
+def test_an_explanation_is_much_better_than_none_and_others_are_nearly_as_good(
+    evidence: Mapping[str, float], names: str
+) -> None:
+    """Something else is as probable before as all that is on the list, however long the list is."""
+    assert "".join(best_explanations(evidence)) == names
+
+
 def test_independent_values_are_those_of_the_whole_correlation() -> None:
     """At any times, by linear algebra with the correlation of all pairs; a gap of years costs nothing."""
     rng = np.random.default_rng(3)
@@ -133,8 +169,9 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
     speeds = {0: 0.8 + 0.0 * TIME, 1: 0.3 + 0.0 * TIME, 2: 2.0 + 0.0 * TIME}  # of surge, heave and yaw
     moving = {filter_of.drift + 1: 1.2 * since, **speeds}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
-    posterior = Posterior(objective.table, z, np.diag(0.3 * objective.deviation) ** 2)
-    best = Minimum(z, objective.value(z, runs), runs, [], np.eye(len(z)))
+    data = objective.data(z, runs, exact=False)
+    best = Minimum(z, objective.value(z, runs), runs, data, total(objective, z, data)[1])
+    posterior = Posterior.of(objective.table, z, best.information)
     found = {(str(one.kind), one.axis): one for one in disturbances(objective, best, posterior, [run])}
     thrust = np.array([VIDEORAY.force(SURGE, c) for c in COMMAND])
     share = np.mean(since)
@@ -155,7 +192,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
         explained = [
             objective.value(other, objective.runs(other, runs)) - objective.prior(other) for other in (gone, z)
         ]
-        before = explained[0] - explained[1] - 2.0 * np.log(1.0 / 0.3)
+        before = explained[0] - explained[1] + 2.0 * np.log(posterior.errors[index] / objective.deviation[index])
         assert process.evidence <= before + 1e-6, "the other parameters are fitted again"
         if before <= KEPT:
             assert process.evidence == pytest.approx(before), key

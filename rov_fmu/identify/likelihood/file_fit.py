@@ -11,11 +11,10 @@ from dataclasses import dataclass
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import Posterior
 from rov_fmu.identify.likelihood.solve import Minimum, minimise, refits
+from rov_fmu.identify.result import POSITIVE
 
 MOST_RISE = 2.0
 """The largest rise of J, twice a log likelihood, by all effects that are left out."""
-_POSITIVE = 2.0
-"""2 ln of the Bayes factor from which evidence is positive (Kass and Raftery 1995)."""
 _EXPECTED = 1.5
 """Effects are tried while J is expected to rise by at most so many times MOST_RISE: it is only nearly quadratic."""
 
@@ -70,7 +69,7 @@ def _without_evidence(posterior: Posterior) -> frozenset[int]:
     parameters = posterior.table.parameters
     while rest := [n for n, p in enumerate(parameters) if p.of_kind.needs_evidence and n not in posterior.absent]:
         least = min(rest, key=posterior.evidence)
-        if posterior.evidence(least) >= _POSITIVE:
+        if posterior.evidence(least) >= POSITIVE:
             break
         posterior = posterior.without(least)
     return posterior.absent

@@ -32,7 +32,6 @@ from rov_fmu.identify.likelihood.solve import (
     QUICK,
     Minimum,
     evidence,
-    evidence_at,
     least_from,
     minimise,
     scaled,
@@ -140,7 +139,7 @@ def fit_all(
     most = _UNREFINED if is_wrong else MOST_STEPS
     near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
     work.fits(full, near)
-    plain = StructureFit({}, full, near, evidence_at(full, near), evidence_at(quick, ends[0]))
+    plain = StructureFit({}, full, near, evidence(full, near), evidence(quick, ends[0]))
     first = dict[Suspect, float]()
     if not is_wrong:
         plain, first = settled(plain)
@@ -154,14 +153,14 @@ def fit_all(
         work.fits(full, near)
     measured = full.table.known.measured_curves
     for curve in () if is_wrong else measured:
-        other, needed = _bending(full, full.table.known.bent | {curve}), evidence_at(full, near) + KEPT
+        other, needed = _bending(full, full.table.known.bent | {curve}), evidence(full, near) + KEPT
 
-        def bends(value: float, information: Array, _: float, other: Objective = other, needed: float = needed) -> bool:
-            return evidence(other, value, information) > needed
+        def bends(end: Minimum, _: float = 0.0, other: Objective = other, needed: float = needed) -> bool:
+            return evidence(other, end) > needed
 
         show = work.steps("shape of the thrust", f"the shape of the thrust of {curve}")
         found = minimise(other, near.z, show, enough=QUICK, last=False, promises=bends)
-        if bends(found.value, found.information, 0.0):
+        if bends(found):
             full, near = other, minimise(other, found.z, last=False)
     best = near
     if not is_wrong:

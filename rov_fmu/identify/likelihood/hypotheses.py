@@ -15,7 +15,7 @@ import numpy as np
 from rov_fmu.equation.catalogue import SURGE, SWAY
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, PRIORS, TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
@@ -330,7 +330,7 @@ HYPOTHESES = {
             "the velocity sensor is turned by {value} about the vertical axis, positive to starboard{odds}. The fit "
             "turns its values back. Correct the angle of mounting where the log is made"
         ),
-        least=0.05,
+        least=0.05,  # sensors are mounted to about three degrees
     ),
     "reversed commands": Hypothesis(
         0.03,
@@ -382,7 +382,7 @@ HYPOTHESES = {
         starts=(0.0, 0.5, 0.75),
         sentence="thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
         in_words=_of_twins,
-        least=0.21,
+        least=PRIORS["thrust"].deviation,  # two thrusters of one type differ so
         is_contrast=True,
     ),
     "command limit": Hypothesis(
@@ -409,7 +409,7 @@ HYPOTHESES = {
         (3.0, 1.0, 0.3),
         "all thrusters: commands act as ramps, which take {value} from rest to full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
-        least=0.2,  # a shorter ramp is rather a delay or a lag
+        least=KINDS[LAG].mean + PRIORS[LAG].deviation,  # a shorter ramp is rather a usual lag
     ),
 }
 """All hypotheses about the structure, by the kind of their parameter, in the order in which they change a model: first

@@ -34,7 +34,7 @@ from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table,
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.io.groups import grouped
-from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUICK_STEPS = {"changing": 0.025, "share": 1.0}
@@ -233,7 +233,6 @@ class Objective:
         filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
         self.filters = [filters[one.layout] for one in logs]
         self.mean, self.deviation, self.low, self.high = map(table.each, ("mean", "deviation", "low", "high"))
-        self.free = ~table.each("is_fixed")
         self.whole = Part(range(len(logs)), range(len(rows)))
 
     @classmethod
@@ -254,7 +253,7 @@ class Objective:
         return found
 
     def without(self, absent: Iterable[int]) -> "Objective":
-        """Return J where some effects are absent, by their indices: their bounds are where they are absent."""
+        """Return J where some effects are absent, by their indices: they are fixed there, and have no prior."""
         found = copy(self)
         found.low, found.high = self.low.copy(), self.high.copy()
         for n in absent:
@@ -331,6 +330,11 @@ class Objective:
         off = (measured - modelled(rows, *self.table.model(z), self.table.least_lag).T).T
         noise = np.array([self.table.row_noise(z, row.noise) * row.scale for row in rows])
         return off, noise**2
+
+    @property
+    def free(self) -> Flags:
+        """True for each parameter that a fit may change."""
+        return self.low < self.high
 
     def prior(self, z: Array) -> float:
         """Return the part of J that the priors contribute."""

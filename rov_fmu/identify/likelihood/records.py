@@ -17,6 +17,7 @@ from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axi
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DRIFTS, MOST_SENSORS, Record, Sensor
+from rov_fmu.identify.likelihood.kinds import LAG, PRIORS
 from rov_fmu.identify.result import least_error
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
@@ -53,10 +54,8 @@ LEAST_COMMAND = 0.05
 _CLOSE_ROWS, _MOST_CHANGE, _LEAST_LOST = 0.04, 0.5, 0.005
 """Commands are momentary values if rows are farther apart than the first number, s, if more than the second share of
 them has another command, and if more than the third share of a command is lost between them."""
-_FAR_ROWS, _SAME_ROWS = 0.3, 0.9
-"""Means are told from values of a moment if rows are farther apart than the first number, s: a mean over h differs from
-the value in its middle by h²/24 of the acceleration. A log is a table if more than the second share of its measurements
-has the times of its commands."""
+_SAME_ROWS = 0.9
+"""A log is a table if more than this share of its measurements has the times of its commands."""
 _PARTS = 4
 """Of so many parts are the intervals in which a command changes gradually."""
 _GAP_OF_ROWS = 1.5
@@ -193,11 +192,11 @@ class SampledLog:
 
     @property
     def is_slow_table(self) -> bool:
-        """True if its measurements have the times of its commands, and these are so far apart that means differ from
-        values of a moment."""
+        """True if its measurements have the times of its commands, and these are so far apart that J tells means from
+        values of a moment: a mean is late by half the time between rows, and a usual lag of the thrusters by less."""
         commands = self.log.commands
         assert commands
-        return self.interval > _FAR_ROWS and all(
+        return 0.5 * self.interval > PRIORS[LAG].deviation and all(
             np.mean(np.isin(m.channel.time, commands.rows)) > _SAME_ROWS for m in self.measured
         )
 

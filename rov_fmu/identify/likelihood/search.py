@@ -35,12 +35,12 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence_at, minimise, scaled, start_of, total
-from rov_fmu.identify.result import ALARM, CONSTANTS, USUAL, least_error, moves
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total
+from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
-WINS, CLOSE = 6.0, 10.0
+WINS, CLOSE = KEPT, VERY_STRONG
 """The 2 ln of the odds from which a hypothesis wins, and up to which one that does not is within the intervals."""
 SETTLING = 5.0
 """Predictions begin with what the filter knows after this time, s."""
@@ -48,9 +48,7 @@ _MOST, _ROUNDS = 3, 6
 """The most hypotheses that may hold at once, and the most times that one is added or takes the place of another."""
 _FITTED = 2
 """The most hypotheses that change the thrust that are fitted in a round, for each point at which J compares them."""
-_LEFT = 0.3
-"""A hypothesis about the thrust explains the errors over 10 s if at most this share of R² - 1 is left."""
-_FAR = 100.0
+_FAR = CONSTANTS["far"].value
 """Where one has won, others are not fitted whose J is so much above its own."""
 _FORCE, _LOUD = 0.03, 1.0
 """The size of the slow forces, relative to full thrust, and how many deviations of the prior the white noise is above
@@ -357,7 +355,7 @@ def _fit_of(starts: Starts, objective: Objective, end: Minimum, prior: float, qu
     """Return the fit with some hypotheses, whose rows are where it ends."""
     rows = {suspect: row_of(objective, suspect) for suspect in starts}
     ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
-    return StructureFit(ends, objective, end, evidence_at(objective, end) + prior, quick)
+    return StructureFit(ends, objective, end, evidence(objective, end) + prior, quick)
 
 
 def fitted(
@@ -373,7 +371,7 @@ def fitted(
     for z in (np.where(thinned.mean == near.objective.mean, near.minimum.z, thinned.mean), start_of(thinned)):
         with suppress(DivergedError):
             end = minimise(thinned, begun(thinned, z, starts), enough=QUICK, last=False)
-            quick = evidence_at(thinned, end)
+            quick = evidence(thinned, end)
             if not quick > enough:
                 return None
             return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
@@ -473,7 +471,11 @@ class StructureSearch:
         return max(fits, key=lambda one: one.score)
 
     def _explains(self, suspect: Suspect) -> bool:
-        """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger."""
+        """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger.
+
+        The loss by errors is ln R. As with the score of predictions, it falls by half, from the model without it to the
+        noise, where R is 1.
+        """
         (kind, of), layout = suspect, self.now.objective.table.layout
         if not HYPOTHESES[kind].changes_thrust or HYPOTHESES[kind].has_times:
             return True
@@ -487,8 +489,8 @@ class StructureSearch:
             return others
         if before[worst_of].ratio <= min(USUAL, HYPOTHESES[kind].alarm):
             return False
-        left = (after[worst_of].ratio ** 2 - 1.0) / (before[worst_of].ratio ** 2 - 1.0)
-        return others and left <= _LEFT and all(after[axis].ratio <= ALARM for axis in on)
+        explains = after[worst_of].ratio ** 2 <= before[worst_of].ratio
+        return others and explains and all(after[axis].ratio <= ALARM for axis in on)
 
     def _gain(self, other: StructureFit) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""

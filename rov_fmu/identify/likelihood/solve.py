@@ -1,8 +1,10 @@
 """Minimise the objective by Fisher scoring, damped in units of the prior (Levenberg-Marquardt)."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from math import log
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +12,11 @@ from scipy.optimize import brentq
 
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples, with_samples
+from rov_fmu.identify.result import KEPT
 from rov_fmu.tank.arrays import Array
 
 Chosen = NDArray[np.bool_]
+_Key = TypeVar("_Key")
 
 MOST_STEPS = 30
 ENOUGH = 0.3
@@ -58,17 +62,16 @@ def minimise(
     most: int = MOST_STEPS,
     enough: float = ENOUGH,
     last: bool = True,
-    promises: Callable[[float, Array, float], bool] | None = None,
+    promises: Callable[[Minimum, float], bool] | None = None,
 ) -> Minimum:
     """Minimise J from a start. Raises DivergedError at the start.
 
     All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The first
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
-    less than `enough`, the second time exact ones. It ends early where nothing promises more, by J within reach, the
-    information, and the reduction of J by the derivatives before, which is infinite at first. Data and information of a
-    `last` fit have exact derivatives: those of the step before if J hardly fell, and otherwise others, after one more
-    step with them, unless motions beside the minimum diverge. Those of a fit that is not the last are of the step
-    before.
+    less than `enough`, the second time exact ones. It ends early where the minimum within reach, and the reduction of J
+    by the derivatives before, which is infinite at first, promise nothing. Data and information of a `last` fit have
+    exact derivatives: those of the step before if J hardly fell, and otherwise others, after one more step with them,
+    unless motions beside the minimum diverge. Those of a fit that is not the last are of the step before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
@@ -87,7 +90,7 @@ def minimise(
                 raise
             break
         before = now = replace(now, data=data, information=information)
-        if promises and not promises(*_within_reach(objective, now), gain):
+        if promises and not promises(_within_reach(objective, now), gain):
             break
         now = _descended(objective, now)
         gain = before.value - now.value
@@ -151,11 +154,12 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
     return now
 
 
-def _within_reach(objective: Objective, minimum: Minimum) -> tuple[float, Array]:
-    """Return the J that is left if a step reduces it by twice what is expected, and the information."""
+def _within_reach(objective: Objective, minimum: Minimum) -> Minimum:
+    """Return the minimum if a step reduces J by twice what is expected."""
     gradient, information = total(objective, minimum.z, minimum.data)
     change = _step(objective, minimum.z, gradient, information, np.ones(len(minimum.z), bool), 0.0) - minimum.z
-    return minimum.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change), information
+    value = minimum.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change)
+    return replace(minimum, z=minimum.z + change, value=value)
 
 
 def refits(
@@ -284,19 +288,29 @@ def _step(objective: Objective, z: Array, gradient: Array, information: Array, f
     return z + change
 
 
-def evidence(objective: Objective, value: float, information: Array) -> float:
-    """Return 2 ln of the probability of all data by a model, but for a constant (the Laplace approximation).
+def evidence(objective: Objective, minimum: Minimum) -> float:
+    """Return 2 ln of the probability of all data by a model, but for a constant, from the minimum of its J."""
+    free, widths = objective.free, objective.deviation
+    return laplace(minimum.value, (0.5 * widths[:, None] * minimum.information * widths)[np.ix_(free, free)])
 
-    A parameter about which the data tell nothing does not change it.
+
+def laplace(J: float, information: Array) -> float:
+    """Return 2 ln of the probability of data by the Laplace approximation, but for a constant.
+
+    `information` has the second derivatives of J/2 at its minimum, p x p, in units of the deviations of the priors. A
+    parameter about which the data tell nothing does not change the result.
     """
-    free = objective.free
-    widths = np.diag(objective.deviation[free])
-    return -value - float(np.linalg.slogdet(0.5 * widths @ information[np.ix_(free, free)] @ widths).logabsdet)
+    return -J - float(np.linalg.slogdet(information).logabsdet)
 
 
-def evidence_at(objective: Objective, minimum: Minimum) -> float:
-    """Return the evidence of a model by the minimum of its J."""
-    return evidence(objective, minimum.value, minimum.information)
+def best_explanations(evidence: Mapping[_Key, float]) -> list[_Key]:
+    """Return which explanations of a list are told, the best first: those near the best, if they are better than none.
+
+    `evidence` has 2 ln of the Bayes factor of each against none. Something else is as probable before as the whole
+    list, and each on the list as another.
+    """
+    least = max(KEPT + 2.0 * log(len(evidence) or 1), max(evidence.values(), default=0.0) - KEPT)
+    return [key for key in sorted(evidence, key=evidence.__getitem__, reverse=True) if evidence[key] > least]
 
 
 def scaled(objective: Objective, z: Array) -> Array:

@@ -1,8 +1,7 @@
 """What a slow force or a slow change of thrust follows: the voltage, the depth, the distance, or nothing that is known.
 
 A slow process f has the covariance q² exp(-|Δt| / τ). A cause c(t) explains it if f = k c + rest, with a much smaller
-rest. Both models are compared by the likelihood of f over all logs, where k is whatever fits best and costs one
-parameter (the Bayesian information criterion, an approximation of 2 ln of the Bayes factor).
+rest. Both models are compared by the likelihood of f over all logs, with a prior of k: k c is about as large as f.
 """
 
 from collections.abc import Mapping, Sequence
@@ -15,11 +14,10 @@ from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.identify.likelihood.filter import Run
 from rov_fmu.identify.likelihood.kinds import Process
 from rov_fmu.identify.likelihood.objective import Objective
+from rov_fmu.identify.likelihood.solve import best_explanations, laplace
 from rov_fmu.tank.arrays import Array, spread
 from rov_fmu.tank.clocks import first_in_each, held
 
-ENOUGH, AHEAD = 10.0, 6.0
-"""A cause is named if 2 ln of its Bayes factor exceeds that of no cause by so much, and that of the next one."""
 _CHANNELS = {"voltage": "the voltage", "roll angle": "the roll", "pitch angle": "the pitch", "depth": "the depth"}
 """The channels that may be causes, and their names."""
 _STEP = 1.0
@@ -58,12 +56,8 @@ def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process,
     common = set.intersection(*(set(piece.causes) for piece in pieces))
     effective = sum(piece.constants(time_constant) for piece in pieces)
     evidence = {name: _evidence(pieces, name, time_constant, effective) for name in sorted(common)}
-    if not evidence:
-        return ""
-    best = max(evidence, key=lambda name: evidence[name])
-    others = [value for name, value in evidence.items() if name != best]
-    is_clear = evidence[best] > ENOUGH and evidence[best] > max(others, default=0.0) + AHEAD
-    return best if is_clear else ""
+    names = best_explanations(evidence)
+    return names[0] if len(names) == 1 else ""
 
 
 def _piece(objective: Objective, z: Array, number: int, run: Run, index: int, axis: Axis | None) -> _Piece:
@@ -119,9 +113,11 @@ def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Ax
 
 
 def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effective: float) -> float:
-    """Return 2 ln of the Bayes factor of a cause against none. `effective` is the number of independent values.
+    """Return 2 ln of the Bayes factor of a cause against none. `effective` is the number N of independent values.
 
-    Neighbouring values of a filter's estimate say nearly the same, so that only one in each time constant counts.
+    Neighbouring values of a filter's estimate say nearly the same, so that only one in each time constant counts. J is
+    N ln r + k², with the share r of the power of f that is left by k c. The prior of k has the deviation 1 if c has the
+    power of f. The variance of the rest, which is estimated in both models, costs the same in both.
     """
     slow: list[Array] = []
     cause: list[Array] = []
@@ -129,11 +125,11 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
         for values, into in ((piece.slow, slow), (piece.causes[name] - piece.causes[name].mean(), cause)):
             into.append(independent(piece.time, values, time_constant))
     f, c = np.concatenate(slow), np.concatenate(cause)
-    power = float(c @ c)
+    power = float(c @ c) * float(f @ f)
     if power <= 0.0:
         return 0.0
-    rest = f - c * float(c @ f) / power
-    return effective * log(float(f @ f) / max(float(rest @ rest), 1e-300)) - log(effective)
+    left = max(1.0 - float(c @ f) ** 2 / power, 1e-12)
+    return laplace(effective * log(left) + 1.0 - left, np.array([[effective / left + 1.0]]))
 
 
 def independent(time: Array, values: Array, time_constant: float) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from math import inf, log
+from math import inf
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter
 from rov_fmu.identify.likelihood.posterior import Posterior, around
-from rov_fmu.identify.likelihood.solve import Minimum, minimise
+from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
 from rov_fmu.tank.arrays import Array, rms
@@ -34,8 +34,8 @@ def disturbances(
     """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
     for index, p in enumerate(objective.table.parameters):
         if p.kind in SLOW:
-            evidence, error = _evidence(objective, best, posterior, index), float(posterior.errors[index])
-            in_logs = [_disturbance(objective, n, best.z, p, runs, evidence, error) for n in range(len(runs))]
+            gain, error = _evidence(objective, best, index), float(posterior.errors[index])
+            in_logs = [_disturbance(objective, n, best.z, p, runs, gain, error) for n in range(len(runs))]
             present = [one for one in in_logs if one]
             if present:
                 largest, slow = max(present, key=lambda one: one.share), SLOW[p.kind]
@@ -52,26 +52,25 @@ def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[Unknow
             yield UnknownForce(form.axis, sampled.log.file, time, run.states[:, index], run.deviations[:, index])
 
 
-def _evidence(objective: Objective, best: Minimum, posterior: Posterior, index: int) -> float:
+def _evidence(objective: Objective, best: Minimum, index: int) -> float:
     """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it.
 
-    The price of its size is how much the data narrow its prior (the Laplace approximation). The fit ends early where
-    strong evidence is certain: J within reach, with what the others can explain, is not small enough.
+    The fit ends early where strong evidence is certain: the minimum within reach is not low enough. What the data tell
+    of the other parameters is taken as the same without it: that of small sizes is rough.
     """
-    p, without = objective.table.parameters[index], objective.without([index])
-    assert p.null is not None
-    price = ((p.null - p.mean) / p.deviation) ** 2 + 2.0 * log(max(p.deviation / posterior.errors[index], 1.0))
+    without, with_it = objective.without([index]), evidence(objective, best)
 
-    def evidence(J: float) -> float:
-        return J - best.value - price
+    def gain(end: Minimum) -> float:
+        return with_it - evidence(without, replace(end, information=best.information))
 
     z = np.clip(best.z, without.low, without.high)
     try:
-        first = evidence(objective.value(z, objective.runs(z, best.runs)))
-        if first <= KEPT:
-            return first
-        end = minimise(without, z, near=best.data, most=_STEPS, last=False, promises=lambda J, *_: evidence(J) <= KEPT)
-        return evidence(end.value)
+        end = replace(best, z=z, value=without.value(z, objective.runs(z, best.runs)))
+        if gain(end) > KEPT:
+            end = minimise(
+                without, z, near=best.data, most=_STEPS, last=False, promises=lambda one, _: gain(one) <= KEPT
+            )
+        return gain(end)
     except DivergedError:
         return inf
 

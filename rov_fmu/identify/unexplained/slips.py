@@ -3,13 +3,13 @@
 A scaling says that the values of some channels in the files are k times the true ones, such as 100 for centimetres
 in a column of metres, or -1 for a depth that is positive upwards. Its evidence against the files as they stand is
 
-    2 ln of the Bayes factor = J(files as they stand) - [ J(values / k) + 2 n ln |k| ]
+    2 ln of the Bayes factor = evidence(values / k) - 2 n ln |k| - evidence(files as they stand)
 
 for n such values: the density of the values in a file is 1/|k| times that of the true ones. Two vehicles explain a
 common scale of all data of an axis equally well, and only the priors of drag, inertia and thrust tell them apart.
 
 Added mass is never negative, so an inertia below the vehicle's own is as unlikely as its distance from it says. That
-distance, squared in standard errors, is a part of J here: it shows knots, which are 1.94 times as many as m/s. So is
+distance, squared in standard errors, is subtracted here: it shows knots, which are 1.94 times as many as m/s. So is
 the distance of the drag from that of a body of the vehicle's mass, where the data alone give the prior of the drag.
 
 A frame forward, to starboard, down that is read as one forward, to port, up changes the signs of several channels of a
@@ -38,8 +38,17 @@ from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, changes
 from rov_fmu.identify.likelihood.search import structure, worst
-from rov_fmu.identify.likelihood.solve import ENOUGH, MOST_STEPS, QUICK, Minimum, minimise, start_of
-from rov_fmu.identify.result import Slip
+from rov_fmu.identify.likelihood.solve import (
+    ENOUGH,
+    MOST_STEPS,
+    QUICK,
+    Minimum,
+    best_explanations,
+    evidence,
+    minimise,
+    start_of,
+)
+from rov_fmu.identify.result import KEPT, Slip
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
@@ -47,9 +56,8 @@ from rov_fmu.tank.log import Channel
 _CERTAIN, _WEIGHED = 2.0, 0.05
 """An inertia is too small if it is so many standard errors below the vehicle's own, which is known within 5 %: weights
 and the water inside change from dive to dive."""
-_CLEAR, _NEXT, _CLOSE = 9.0, 6.0, 50.0
-"""The evidence from which a slip is told, how much better it must be for other explanations not to be told, and up to
-which difference of J quick fits go on to their end: the evidence of a slip is hundreds."""
+_CLOSE = KEPT + 2.0 * QUICK
+"""Up to which difference of evidence quick fits go on to their end, each of which may be QUICK from it."""
 _LEFT = 3.0
 """A fit goes on while J may still fall by so many times what it just fell by: each step by 3/4 of the step before."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
@@ -124,13 +132,13 @@ def slips(
         return (), inf
     fits = dict[Scaling, tuple[Objective, Minimum]]()
 
-    def least(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
-        """Return J of an explanation by a quick fit, or by one to its end if a quick fit of it was made before."""
+    def fit(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
+        """Return the evidence of a quick fit, or of one to its end if a quick fit was made before."""
         unlikely = sum(_lightness(scaling, *one) for one in inertias) + _drag(scaling, compared, known.guessed)
         unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
-        def promises(value: float, _: Array, gain: float) -> bool:
-            return not scaling or is_close(value - _LEFT * gain + unlikely)
+        def promises(end: Minimum, gain: float) -> bool:
+            return not scaling or is_close(evidence(quick, end) + _LEFT * gain - unlikely)
 
         try:
             if is_exact := scaling in fits:
@@ -141,31 +149,31 @@ def slips(
             enough = ENOUGH if is_exact else QUICK
             end = minimise(quick, start, most=most, enough=enough, last=False, promises=promises)
         except DivergedError:
-            return inf
+            return -inf
         fits[scaling] = quick, end
-        return end.value + unlikely
+        return evidence(quick, end) - unlikely
 
-    J = dict[Scaling, float]()
-    as_it_is = least(frozenset(), best, 1)
+    found = dict[Scaling, float]()
+    as_it_is = fit(frozenset(), best, 1)
 
     def is_close(value: float) -> bool:
-        return value < min((as_it_is, *J.values())) + _CLOSE
+        return value > max((as_it_is, *found.values())) - _CLOSE
 
     while untried:  # The best explanation may need fewer channels than it has.
-        J |= {one: least(one) for one in untried}
-        J |= {one: least(one) for one in untried if is_close(J[one])}
-        first = min(J, key=lambda one: J[one])
-        fewer = set[Scaling]() if first in frames or not is_close(J[first]) else {first - {member} for member in first}
-        untried = fewer - J.keys() - {frozenset()}
-    if is_close(J[first]) and is_close(as_it_is):
-        as_it_is = least(frozenset())
-    most, told = min(min(J.values()) + _NEXT, as_it_is - _CLEAR), dict[tuple[str, str], dict[str, float]]()
-    for scaling in sorted((one for one in J if J[one] < most), key=lambda one: J[one]):
+        found |= {one: fit(one) for one in untried}
+        found |= {one: fit(one) for one in untried if is_close(found[one])}
+        first = max(found, key=lambda one: found[one])
+        fewer = {first - {member} for member in first} if first not in frames and is_close(found[first]) else set()
+        untried = fewer - found.keys() - {frozenset()}
+    if is_close(found[first]) and is_close(as_it_is):
+        as_it_is = fit(frozenset())
+    gains, told = {one: value - as_it_is for one, value in found.items()}, dict[tuple[str, str], dict[str, float]]()
+    for scaling in best_explanations(gains):
         for match, scale in scaling:
             name, question = match.channel.quantity.name, _words(match.channel, scale)
             if scaling in frames:
                 name, question = _frame_in_words(scaling)
-            told.setdefault((match.file, name), {}).setdefault(question, as_it_is - J[scaling])
+            told.setdefault((match.file, name), {}).setdefault(question, gains[scaling])
     mistakes = (
         Slip(file, quantity, ", or ".join(words), max(words.values()))
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])

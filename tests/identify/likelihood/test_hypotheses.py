@@ -664,6 +664,8 @@ def test_the_data_tell_the_health_of_a_thruster_that_turns_the_vehicle_and_not_o
         ({SURGE: 9.0, YAW: 9.0, HEAVE: 1.0}, {SURGE: 1.2, YAW: 1.5, HEAVE: 4.0}, []),
         ({SURGE: 9.0, YAW: 9.0, HEAVE: 1.0}, {SURGE: 1.2, YAW: 6.0, HEAVE: 1.0}, []),
         ({SURGE: 3.2, YAW: 1.0, HEAVE: 1.0}, {SURGE: 2.4, YAW: 1.0, HEAVE: 1.0}, []),
+        ({SURGE: 2.0, YAW: 1.0, HEAVE: 1.0}, {SURGE: 1.4, YAW: 1.0, HEAVE: 1.0}, [DEAD]),
+        ({SURGE: 2.0, YAW: 1.0, HEAVE: 1.0}, {SURGE: 1.45, YAW: 1.0, HEAVE: 1.0}, []),
         ({SURGE: 1.0, YAW: 1.0, HEAVE: 6.0}, {SURGE: 1.0, YAW: 1.0, HEAVE: 6.0}, []),
     ],
 )
@@ -767,7 +769,7 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch
     )
     quick = applied(reversed_model, {}, thinned=True)
     near = minimise(quick, start_of(quick), enough=8.0, last=False)
-    start = evidence(quick, near.value, near.information)
+    start = evidence(quick, near)
     search = StructureSearch(StructureFit({}, quick, near, start, start))
     dead = fitted(search.now, reversed_model, {DEAD: 0.0}, 0.0)
     assert dead

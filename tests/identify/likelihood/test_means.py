@@ -19,7 +19,7 @@ from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, applied
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import StructureFit, settled
-from rov_fmu.identify.likelihood.solve import evidence_at, least_from, start_of
+from rov_fmu.identify.likelihood.solve import evidence, least_from, start_of
 
 Array = NDArray[np.float64]
 RAW, SECONDS = 20, 40.0
@@ -154,7 +154,7 @@ def test_rows_are_told(kind: str, rate: float, tmp_path: Path) -> None:
     (tmp_path / "rov.toml").write_text(ROV.replace("[axes.yaw]", ""), encoding="utf-8")
     plain = Objective.of_known(*begin(load_tests(tmp_path)))
     end = least_from(plain, start_of(plain))
-    score = evidence_at(plain, end)
+    score = evidence(plain, end)
     fit, odds = settled(StructureFit({}, plain, end, score, score))
     assert [*odds] == [(KIND, ("log_dive.csv",))] * (kind == "means")
     if odds:
