@@ -161,35 +161,6 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
     assert plain["alpha_w"] == 1.0
 
 
-def test_effects_are_told_in_their_units(fit: Fit) -> None:
-    """A dead band is not known to better than 1 % of a command, and a ratio has the interval of its logarithm."""
-    full = fit.known.full["heave"]
-    expected = {
-        ("time constant of the thrusters", ""): (0.2, 0.2 - HALF, 0.2 + HALF, "s"),
-        ("dead time of the commands", ""): (0.1, 0.1 - HALF, 0.1 + HALF, "s"),
-        ("dead band", "top"): (0.05, 0.04, 0.06, "1"),
-        ("loss of thrust with the speed of advance, relative to full thrust", "top"): (
-            0.1,
-            0.1 - HALF,
-            0.1 + HALF,
-            "s/m",
-        ),
-        ("drag astern relative to drag ahead", "heave"): (1.3, 1.3 * np.exp(-HALF), 1.3 * np.exp(HALF), "1"),
-        ("constant load", "heave"): (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full, "N"),
-    }
-    told = {(one.name, one.of): one for one in effects_of(found(fit))}
-    for key, (value, low, high, unit) in expected.items():
-        effect = told[key]
-        assert (effect.value, *effect.interval) == pytest.approx((value, low, high)), key
-        assert (effect.unit, effect.kept) == (unit, True)
-    assert told["constant load", "yaw"].unit == "N.m"
-    assert told["dead band", "top"].beyond == pytest.approx(0.4), "a deviation of 0.05, of 2.5"
-    assert not told["time constant of the thrusters", ""].is_unusual
-    (late,) = (one for one in effects_of(found(fit, dead_time=0.13)) if one.kind == "dead time")
-    assert late.is_unusual
-    assert late.beyond == pytest.approx(2.6 / 2.5)
-
-
 def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
     """However clear: a lag of 0.0159 s has a corner frequency of 10 Hz, at which the sensor is sampled."""
     for lag, is_told in ((0.0155, False), (0.0163, True)):

@@ -202,6 +202,7 @@ for name, direction in {
 MIX += "[axes.surge]\n"
 
 
+@pytest.mark.long
 def test_thrusters_give_the_forces_of_a_wrench(tmp_path: Path) -> None:
     """The motion under commands is that of the simulation under the sum of the thrusters, written by hand.
 
