@@ -167,7 +167,10 @@ SOME = ["the vehicle of the tables", "the points", "rov.toml", "a tank test"]
 
 @pytest.mark.parametrize(
     ("cases", "modes"),
-    [(SOME, [0o600]), pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.weekly)],
+    [
+        pytest.param(SOME, [0o600], marks=pytest.mark.long),
+        pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.weekly),
+    ],
     ids=["some", "all"],
 )
 def test_what_may_not_be_read_is_one_line_that_names_it(

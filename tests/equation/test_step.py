@@ -82,6 +82,7 @@ def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Vehicle) -> Non
         assert worst(rov, inputs, state, h) <= 1e-13, h
 
 
+@pytest.mark.long
 def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
     """The lagging thrust reverses while the vehicle slows down, so that its velocity has a minimum near zero."""
     rov, inputs, state = case(LAGGING, {"u_l": 0.6, "u_r": 0.6}, {"F_l": -25.0, "F_r": -25.0})

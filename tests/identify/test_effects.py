@@ -317,6 +317,7 @@ def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float,
     assert any(effect.is_unusual for effect in kept.values()) == (abs(log(scale)) > 0.2)
 
 
+@pytest.mark.long
 def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
     """The drag is 38 |u| u |2 u|^(-1/2) + 4 u. The file has the nearest linear and quadratic drag."""
 
@@ -361,7 +362,9 @@ def of_depth(
     return identified(folder, f"{HEAD}[known]\n{mass}{thrust}", every, "log_heave.csv")
 
 
-@pytest.mark.parametrize(("lag", "noise", "is_short"), [(0.11, 0.02, False), (0.0, 0.0003, True)])
+@pytest.mark.parametrize(
+    ("lag", "noise", "is_short"), [pytest.param(0.11, 0.02, False, marks=pytest.mark.long), (0.0, 0.0003, True)]
+)
 def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
     lag: float, noise: float, is_short: bool, tmp_path: Path
 ) -> None:
@@ -376,6 +379,7 @@ def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
 
 
 @pytest.mark.parametrize("lag", [0.6, pytest.param(0.0, marks=pytest.mark.long)])
+@pytest.mark.long
 def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
     result = of_depth(tmp_path, HELD, 0.005, sensor=lag)
     (heave,) = result.axes

@@ -46,6 +46,7 @@ def least_without_evidence(fit: Fit) -> float:
     return minimise(fit.objective.without(indices), fit.best.z).value if indices else fit.best.value
 
 
+@pytest.mark.long
 def test_the_file_is_a_minimum_without_the_weakest_effects(tmp_path: Path) -> None:
     """J rises by 2 at most, to a tenth. `vehicle_of_file` compares J of the numbers of the file with that of the fit,
     and a fit from elsewhere is not better."""

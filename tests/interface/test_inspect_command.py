@@ -292,7 +292,7 @@ INCOMPLETE: dict[str, tuple[str, set[str]]] = {
 """What a rov.toml has, and what `--draft` adds."""
 
 
-@pytest.mark.parametrize("name", INCOMPLETE)
+@pytest.mark.parametrize("name", spread(INCOMPLETE, [*INCOMPLETE][::2], INCOMPLETE))
 def test_a_draft_completes_what_is_there_and_keeps_it(name: str, tmp_path: Path, inspect: Inspect) -> None:
     own, added = INCOMPLETE[name]
     (tmp_path / "rov.toml").write_text(own, encoding="utf-8")
@@ -318,7 +318,7 @@ REFUSED = {
 """What is misspelt in a folder: the file, the word, and what stands there in its place."""
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("name", spread(REFUSED, ("a column", "nothing"), REFUSED))
 def test_what_identify_refuses_is_not_recommended(name: str, tmp_path: Path, capsys: Capsys) -> None:
     (tmp_path / "rov.toml").write_text(VECTORED, encoding="utf-8")
     for n in (1, 2):
@@ -349,7 +349,7 @@ UNREADABLE: dict[str, bytes] = {
 }
 
 
-@pytest.mark.parametrize("name", UNREADABLE)
+@pytest.mark.parametrize("name", spread(UNREADABLE, ("cut.mcap", "image.bin"), UNREADABLE))
 def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     name: str, tmp_path: Path, capsys: Capsys
 ) -> None:

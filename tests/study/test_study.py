@@ -172,8 +172,8 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
 @pytest.mark.parametrize(
     ("mode", "reason"),
     [
-        (2, "ended its process: SIGABRT"),
-        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.long, posix]),
+        pytest.param(2, "ended its process: SIGABRT", marks=pytest.mark.long),
+        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.weekly, posix]),
         pytest.param(4, "did not return within time_limit = 2 s", marks=[pytest.mark.long, posix]),
     ],
 )
@@ -195,6 +195,7 @@ def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_t
     assert np.isnan(runs[1].figures).tolist() == [True, True]
 
 
+@pytest.mark.long
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     foreign: Foreign, tmp_path: Path, whole: Results, do: Callable[..., Results], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -407,6 +408,7 @@ def test_what_goes_wrong_on_the_workers_is_a_line(
     assert found.value.args == told.args
 
 
+@pytest.mark.long
 def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
     foreign: Foreign, tmp_path: Path, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
 ) -> None:

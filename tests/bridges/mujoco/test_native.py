@@ -324,6 +324,7 @@ def test_without_the_library_of_mujoco_the_step_is_in_python(monkeypatch: pytest
     assert type(connector(package.equation, library)(model)).__name__ == "Rov"
 
 
+@pytest.mark.long
 def test_the_folder_has_the_c_and_its_libraries_for_all_systems() -> None:
     bare = rov_fmu.load(BARE)
     files = mujoco_files(bare, "rov", {}, {})
