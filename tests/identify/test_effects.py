@@ -299,6 +299,7 @@ def moved(drag: Callable[[float], float]) -> tuple[Columns, np.ndarray, np.ndarr
         pytest.param(0.8, -0.2, marks=pytest.mark.long),
     ],
 )
+@pytest.mark.long
 def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float, offset: float, tmp_path: Path) -> None:
     """They move no answer: V_ss are those of 78 c |c| = 38 |V| V + 9 V. Without them, nothing is told."""
     columns, position, velocity = moved(lambda v: 38.0 * abs(v) * v + 9.0 * v)

@@ -187,6 +187,7 @@ def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytes
 # ---- Any FMU ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_strangers_fmu_that_ends_its_process_fails_the_claims_that_apply_and_gets_a_page(
     tmp_path: Path, capsys: Capsys
 ) -> None:
