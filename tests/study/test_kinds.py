@@ -112,7 +112,7 @@ def test_a_vehicle_in_lanes_and_its_fmu_give_the_same_rows_and_the_lanes_load_ne
     _close(study(plan, tmp_path / "results", scheduler=scheduler), native)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
     assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
     _close(study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
