@@ -48,11 +48,11 @@ def pytest_xdist_auto_num_workers() -> int:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Let Hypothesis try fresh examples in the weekly tests, and the same ones in every run of the other tests.
+    """Let Hypothesis try fresh examples in the weekly tests, and the same few ones in every run of the other tests.
 
     A change can then only fail for a reason of its own.
     """
-    settings.register_profile("same", derandomize=True, database=None, deadline=None)
+    settings.register_profile("same", derandomize=True, database=None, deadline=None, max_examples=40)
     settings.register_profile("fresh", derandomize=False, database=None, deadline=None, print_blob=True)
     settings.load_profile("fresh" if config.option.markexpr == "weekly" else "same")
 

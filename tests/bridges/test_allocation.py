@@ -128,6 +128,7 @@ def test_what_the_files_lack_is_told_from_what_they_have() -> None:
     assert "drag" not in text, "the hull has its drag whatever the thrusters do"
 
 
+@pytest.mark.long
 def test_the_table_has_the_rows_of_the_yaml_and_both_rise(tmp_path: Path) -> None:
     vehicle, content, rows = exported(VEHICLES["thrust_effects"], tmp_path)
     assert content["vehicle"] == vehicle.identifier

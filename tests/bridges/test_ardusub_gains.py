@@ -25,6 +25,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import ArduSub
 from tests.bridges.test_sitl import served, setup_of
+from tests.often import spread
 from tests.vehicles import FINNED, with_intervals
 from verification.references.autopilot.ardusub import VECTORED, VECTORED_6DOF, Hold
 
@@ -176,7 +177,7 @@ def test_a_vehicle_that_no_frame_of_ardusub_drives_is_one_line(changed: dict[str
         tuned(replace(SIX, layout=replace(SIX.layout, **changed)))
 
 
-@pytest.mark.parametrize("axes", [(HEAVE,), (YAW,), (SURGE, HEAVE)])
+@pytest.mark.parametrize("axes", spread([(HEAVE,), (YAW,), (SURGE, HEAVE)], [(SURGE, HEAVE)]))
 def test_a_vehicle_has_the_gains_and_the_legs_of_its_axes(
     axes: tuple[Axis, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -212,6 +213,7 @@ def test_gains_that_are_too_high_chatter_ahead_and_hardly_in_a_turn_as_with_the_
 
 
 @pytest.mark.usefixtures("ahead")
+@pytest.mark.long
 def test_gains_are_lowered_until_nothing_chatters_for_all_that_the_estimates_allow(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -269,7 +271,7 @@ def by_the_stand_in(vehicle: Vehicle, gains: Mapping[str, float], legs: tuple[Le
     return errors
 
 
-@pytest.mark.parametrize("name", ["bluerov2_heavy", "identified"])
+@pytest.mark.parametrize("name", spread(["bluerov2_heavy", "identified"], ["identified"], ["bluerov2_heavy"]))
 def test_the_stand_in_flies_the_gains_as_the_loop_does_and_better_than_the_firmwares(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -32,6 +32,7 @@ from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.commands import BARE, ROOT
+from tests.often import spread
 from tests.vehicles import VEHICLES, frictionless, passed, tied
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
@@ -444,14 +445,6 @@ def test_the_energy_of_a_vehicle_without_thrust_does_not_grow(name: str) -> None
         assert least < energies[-1] / energies[0] < most
 
 
-def test_a_still_vehicle_stays_still() -> None:
-    vehicle, package = loaded("bluerov2_heavy")
-    rov = package.load(B=vehicle["W"])
-    for _ in range(500):
-        rov.step()
-    assert rov.data.qvel == pytest.approx(0.0, abs=1e-12)
-
-
 def tumble(name: str, steps: int) -> tuple[float, int]:
     """Let a vehicle tumble between walls under random commands. Return its largest velocity, and the contacts."""
     vehicle, package = loaded(name)
@@ -476,13 +469,6 @@ def tumble(name: str, steps: int) -> tuple[float, int]:
     assert not any(warning.number for warning in rov.data.warning)
     assert np.abs(rov.data.qpos[:3] - [0.0, 0.0, -2.0]).max() < 1.0, "it is still between the walls"
     return fastest, contacts
-
-
-@pytest.mark.parametrize("name", ["bluerov2_heavy", "videoray"])
-def test_contacts_under_random_commands_stay_finite(name: str) -> None:
-    fastest, contacts = tumble(name, 1500)
-    assert fastest < 10.0
-    assert contacts
 
 
 @pytest.mark.parametrize(
@@ -580,7 +566,7 @@ def test_a_simulation_that_becomes_unstable_begins_anew() -> None:
     assert rov.data.qpos == pytest.approx(start, abs=1e-3)
 
 
-@pytest.mark.parametrize("name", [*VEHICLES, "bare"])
+@pytest.mark.parametrize("name", spread([*VEHICLES, "bare"], ["Heavy", "yaw only", "surge without drag", "bare"]))
 def test_every_kind_of_vehicle_moves_or_is_refused_in_one_line(name: str) -> None:
     bare = rov_fmu.load(BARE)
     vehicle = bare.with_(VEHICLES[name].layout, **VEHICLES[name].coefficients) if name != "bare" else bare

@@ -28,6 +28,7 @@ from rov_fmu.io.output import sealed
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from tests.commands import BARE, ROOT
+from tests.often import spread
 from tests.vehicles import VEHICLES, extended, pulsed
 from verification.references.rigid_body import coriolis, quaternion_of, rigid_body_mass, rotation, skew
 
@@ -362,7 +363,7 @@ EXPLICIT = {
 }
 
 
-@pytest.mark.parametrize("case", EXPLICIT)
+@pytest.mark.parametrize("case", spread(EXPLICIT, ("just less", "just more"), EXPLICIT))
 def test_the_warning_is_there_where_the_plugin_diverges(case: str) -> None:
     vehicle, where = EXPLICIT[case]
     warnings = gazebo_model(vehicle, explicit=True).warnings

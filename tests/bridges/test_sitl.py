@@ -472,6 +472,7 @@ def test_the_distance_to_the_bottom_is_that_of_a_sensor_with_a_range_of_100_m(
     assert found["attitude"][2] == pytest.approx(remainder(start.get("psi_0", 0.0), 2.0 * pi), abs=1e-3)
 
 
+@pytest.mark.long
 def test_holds_its_place_in_a_current() -> None:
     """ArduSub's position hold, which lies across the current: depth to 5 cm, heading to 2 degrees."""
     heading = atan2(-0.1, -0.2) + 1.05

@@ -55,6 +55,7 @@ def test_the_module_of_a_page_is_taken_for_its_sources_alone(folder: Path) -> No
         content.web_module(other)
 
 
+@pytest.mark.long
 def test_binaries_are_taken_for_their_guid_alone(folder: Path, tmp_path: Path) -> None:
     rov = load_vehicle(BARE)
     with without_page():

@@ -20,7 +20,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.c.stepper import LaneStepper, Stepper
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.often import often
+from tests.often import often, spread
 from tests.vehicles import (
     EVERYTHING,
     FINNED,
@@ -69,6 +69,8 @@ KNOWN |= {
     "slow rotors": with_rotors(SIX).with_(T_t200=2.5),
 }
 LONG = {"attitude, lag, dead time, current passes": late(passed(SIX)), "dead time alone": late(KNOWN["attitude"])}
+USUAL = ("VideoRay", "everything", "dead time, lag, tables", "tied, surface, current passes", "slow rotors")
+"""Those of the default tests, which have every part."""
 SUBSETS = ["".join(axes) for n in range(1, 7) for axes in combinations("uvwpqr", n)]
 
 
@@ -147,7 +149,7 @@ def check(rng: random.Random, rov: Vehicle) -> None:
         np.testing.assert_array_equal(np.array(rows).T, alone[: len(run.moving), vehicle, 1:])
 
 
-@pytest.mark.parametrize("name", [*KNOWN, *(pytest.param(name, marks=pytest.mark.long) for name in LONG)])
+@pytest.mark.parametrize("name", spread(KNOWN | LONG, USUAL, ("attitude", "fins", "rotors", *LONG)))
 def test_a_run_is_the_same_in_pieces_and_in_lanes(name: str) -> None:
     check(random.Random(name), (KNOWN | LONG)[name])
 
@@ -186,8 +188,8 @@ def test_a_vehicle_that_cannot_be_computed_affects_no_other_and_the_next_one_tak
     np.testing.assert_allclose(found.values[:, others], good[:, others], rtol=1e-12, atol=1e-14)
 
 
-@often("cases", 10, 30, 1000)
-@pytest.mark.parametrize("name", KNOWN)
+@often("cases", 4, 20, 1000)
+@pytest.mark.parametrize("name", spread(KNOWN, USUAL, KNOWN))
 def test_a_step_in_python_may_be_cut_and_is_that_of_the_engine(name: str, cases: int) -> None:
     """Commands act at once, unless others are given that act after the dead time."""
     rng, rov = random.Random(name), KNOWN[name]

@@ -18,6 +18,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
+from tests.often import spread
 from tests.vehicles import EVERYTHING, HEAVY, SIX, VIDEORAY, random_inputs, random_state
 
 Array = NDArray[np.float64]
@@ -51,7 +52,7 @@ def fmu_states(folder: Path, rov: Vehicle, times: Array, inputs: dict[str, Array
 
 
 @pytest.mark.parametrize(
-    "name", ["videoray", "everything", *(pytest.param(name, marks=pytest.mark.long) for name in ("heavy", "six"))]
+    "name", spread(["videoray", "everything", "heavy", "six"], ["videoray"], ["everything", "six"])
 )
 def test_it_computes_the_bits_of_the_fmu(name: str, request: pytest.FixtureRequest) -> None:
     rov = {"videoray": VIDEORAY, "heavy": HEAVY, "everything": load_vehicle(EVERYTHING), "six": SIX}[name]

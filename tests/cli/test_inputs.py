@@ -125,13 +125,22 @@ def _gone_as_it_is_read(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 _SLOW = {"the icon", "the report", "a drawing of the FMU in Python"}
 """The cases that read their file in the middle of a build, except one that runs by default."""
 _CASES = [
-    *((case, _folder) for case in READING if case not in PICTURES),
-    # a folder of tests is read without them, and they are named (tests/tank/test_listing.py)
-    *((case, what) for what in (_pipe, _device) for case in READING if case not in {*PICTURES, "a tank test"}),
-    # without rov.toml, a folder of tests is inspected and a draft is offered
-    *((case, _gone) for case in READING if case not in {*PICTURES, "a tank test", "rov.toml", "the signature"}),
+    # of each case one kind by default, and all of them once a week
     *(
-        pytest.param(case, _gone_as_it_is_read, marks=pytest.mark.long if case in _SLOW else ())
+        pytest.param(case, what, marks=() if n % 3 == m else pytest.mark.weekly)
+        for n, case in enumerate(READING)
+        for m, what in enumerate((_folder, _pipe, _device))
+        # a folder of tests is read without them, and they are named (tests/tank/test_listing.py)
+        if case not in {*PICTURES, *["a tank test"] * (what is not _folder)}
+    ),
+    # without rov.toml, a folder of tests is inspected and a draft is offered
+    *(
+        pytest.param(case, _gone, marks=() if n % 2 else pytest.mark.weekly)
+        for n, case in enumerate(READING)
+        if case not in {*PICTURES, "a tank test", "rov.toml", "the signature"}
+    ),
+    *(
+        pytest.param(case, _gone_as_it_is_read, marks=pytest.mark.weekly if case in _SLOW else ())
         for case in READING
         if case != "a tank test"  # which another process reads
     ),
@@ -158,7 +167,10 @@ SOME = ["the vehicle of the tables", "the points", "rov.toml", "a tank test"]
 
 @pytest.mark.parametrize(
     ("cases", "modes"),
-    [(SOME, [0o600]), pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.weekly)],
+    [
+        pytest.param(SOME, [0o600], marks=pytest.mark.long),
+        pytest.param([*READING], [0o600, 0o000, 0o300], marks=pytest.mark.weekly),
+    ],
     ids=["some", "all"],
 )
 def test_what_may_not_be_read_is_one_line_that_names_it(

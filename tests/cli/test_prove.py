@@ -136,7 +136,6 @@ def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> 
     ("name", "text", "line"),
     [
         ("my tests/y.csv", "time,y\n0,0\n1,2.00001\n", "step 5.0e-06 1.0e-06 FAIL y"),
-        ("my tests/y.csv", "time,y\n0,0\n3,2\n", "step inf 1.0e-06 FAIL y"),
         ("my tests/y.csv", "time,y\n0,0.001\n", "step 1.0e-01 1.0e-06 FAIL y"),  # relative to 1 % of the nominal value
         ("k.ssv", _FOREIGN[f"{FOLDER}/k.ssv"].replace('"2"', '"2.1"'), "step 5.0e-02 1.0e-06 FAIL y"),  # type: ignore[union-attr]
         ("my tests/u.csv", "time,u\n0,10\n", "step inf 1.0e-06 FAIL fmi2DoStep failed with status"),
@@ -231,6 +230,7 @@ _HANGS = """
 """
 
 
+@pytest.mark.long
 @pytest.mark.skipif(sys.platform != "linux", reason="signals and mutexes are POSIX")
 def test_an_fmu_that_hangs_is_ended_by_ctrl_c(foreign: Path, tmp_path: Path) -> None:
     """It hangs in compiled code, which Python cannot interrupt."""

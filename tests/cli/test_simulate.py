@@ -19,6 +19,7 @@ from rov_fmu.io.messages import FileError, InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE
+from tests.often import spread
 from tests.vehicles import EVERYTHING, THRUST_EFFECTS, VIDEORAY
 
 Capsys = pytest.CaptureFixture[str]
@@ -33,7 +34,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-@pytest.mark.parametrize("name", SHIPPED)
+@pytest.mark.parametrize("name", spread(SHIPPED, ["videoray", "bluerov2_heavy"]))
 def test_every_state_and_angle_can_be_set_at_the_start(name: str) -> None:
     """Those of the attitude under the names that the results have; the quaternion as a whole."""
     vehicle = rov_fmu.load(name)

@@ -110,7 +110,7 @@ def bound_by_permissions() -> list[str]:
 @pytest.mark.parametrize(
     ("file_mode", "folder_mode", "reason"),
     [
-        (0o644, 0o555, "its folder is read-only"),
+        pytest.param(0o644, 0o555, "its folder is read-only", marks=pytest.mark.long),
         pytest.param(0o444, 0o755, "cannot be written: is read-only", marks=pytest.mark.long),
     ],
 )

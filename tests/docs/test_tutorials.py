@@ -71,7 +71,7 @@ def check_trust(found: Identification) -> None:
         assert axis.main.error < axis.main.unchanged
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_otter(otter: Identification) -> None:
     names = re.findall(r'"((?:a_d|b_d|beta|F_0)_[uwr])"', text(TANK))
     assert len(names) == 10

@@ -100,6 +100,7 @@ def test_the_heading_counts_turns_while_the_nose_is_not_up_or_down() -> None:
     assert SIX.calculated(inputs, SIX.layout.at_rest | there | {"psi": 12.0})["psi"] == pytest.approx(4.0 * pi)
 
 
+@pytest.mark.long
 def test_a_long_step_of_a_motion_that_never_settles_is_many_short_ones() -> None:
     """The roll of the Heavy decays with the inverse of time, so that a long step takes thousands of pieces.
 

@@ -10,6 +10,7 @@ from rov_fmu.equation.python import step as module
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import in_engine, in_python, worst
+from tests.often import spread
 from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, still
 
 COUPLED, LAGGING = VEHICLES["coupled without lag, three commands, no heave"], VEHICLES["lag without coupling"]
@@ -46,7 +47,7 @@ def case(rov: Vehicle, inputs: Values, state: Values) -> tuple[Vehicle, State, S
     return rov, {**still(rov), **inputs}, {**at_rest(rov), **state}
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", spread(CASES, [*CASES][::2], CASES))
 def test_a_step_in_a_special_case_is_exact(name: str) -> None:
     rov, inputs, state, steps = CASES[name]
     for h in steps:
@@ -81,6 +82,7 @@ def test_a_step_that_ends_at_a_reversal_or_near_it_is_exact(rov: Vehicle) -> Non
         assert worst(rov, inputs, state, h) <= 1e-13, h
 
 
+@pytest.mark.long
 def test_a_velocity_that_just_touches_zero_or_nearly_is_exact() -> None:
     """The lagging thrust reverses while the vehicle slows down, so that its velocity has a minimum near zero."""
     rov, inputs, state = case(LAGGING, {"u_l": 0.6, "u_r": 0.6}, {"F_l": -25.0, "F_r": -25.0})

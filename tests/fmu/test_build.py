@@ -90,13 +90,6 @@ def test_platforms_that_are_lost_and_those_that_cannot_be_run_are_told(
     assert capsys.readouterr().out.startswith(f"Replaced {path}, which also had linux32.\n")
 
 
-@pytest.mark.usefixtures("without_page")
-def test_a_second_compilation_gives_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fmu_compile._Library, "compile", compile_anew)
-    one, other = (rov_fmu.load(BARE).build(tmp_path / name, platforms="host").path for name in ("a.fmu", "b.fmu"))
-    assert one.read_bytes() == other.read_bytes()
-
-
 @pytest.mark.long
 def test_a_second_build_gives_the_same_bytes_and_says_what_it_built(
     either_fmu: Path,

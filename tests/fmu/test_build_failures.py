@@ -15,6 +15,7 @@ import pytest
 from rov_fmu.c import compile as fmu_compile
 from rov_fmu.cli import main
 from tests.commands import BARE, ROOT, endless_compiler
+from tests.often import spread
 
 _SCRIPT = str(ROOT / "build_fmu.py")
 _OLD = b"the old one"
@@ -133,7 +134,7 @@ def _wait_until(is_so: Callable[[], object], process: subprocess.Popen[str] | No
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="signals are POSIX, /proc is Linux")
-@pytest.mark.parametrize("signal_", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.long)])
+@pytest.mark.parametrize("signal_", spread([signal.SIGINT, signal.SIGTERM], (), [signal.SIGINT]))
 def test_an_interrupted_build_ends_at_once_and_leaves_nothing(
     old: Path, tmp_path: Path, signal_: signal.Signals
 ) -> None:

@@ -52,6 +52,23 @@ _OF_REFERENCE = [*ROVS.keys() - {"dead time"}]
 ROVS |= {"drawn, four axes": random_vehicle(random.Random(0)), "drawn, six": random_body(random.Random(0), "uvwpqr")}
 ROVS["pulse widths"] = pulsed(ROVS["dead time"], (1100.0, 1480.0, 1900.0))
 
+KINDS = spread(
+    ROVS,
+    (
+        "VideoRay",
+        "heave only",
+        "dead time",
+        "everything",
+        "six axes",
+        "tied, Heavy",
+        "tied, six",
+        "pulse widths",
+        "drawn, six",
+    ),
+    ("yaw only", "tied, yaw only", "drawn, four axes", "q alone"),
+)
+"""The default tests take each part of a vehicle once, and the weekly ones all combinations."""
+
 SCHEMAS = Path(fmpy.__file__).with_name("schema")
 TIME = {
     "name": "time",
@@ -120,7 +137,7 @@ def units(root: etree._Element) -> dict[str, bytes]:
     return {unit.get("name"): etree.tostring(unit, method="c14n").strip() for unit in root.iter("Unit")}
 
 
-@pytest.mark.parametrize("kind", ROVS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_the_description_is_valid_and_that_of_both_versions(kind: str, tmp_path: Path) -> None:
     """FMI 2.0 numbers variables from 0, and FMI 3.0 from 1. OMSimulator takes the references in ModelStructure for
     positions in ModelVariables, from 1: it ends with "bad dependency on variable with index 0", or takes another one.
@@ -146,7 +163,7 @@ def test_the_description_is_valid_and_that_of_both_versions(kind: str, tmp_path:
         assert validate_model_description(description, fmi == 2, validate_model_structure=True) == []
 
 
-@pytest.mark.parametrize("kind", ROVS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_in_fmi_3_the_unit_and_the_bounds_stand_in_the_type_only(kind: str) -> None:
     """FMI Library loses the unit of a variable that has bounds; fmi-sim refuses a unit on a variable."""
     schema("fmi3/fmi3BuildDescription.xsd").assertValid(etree.fromstring(build_description("a_rov")))
@@ -179,7 +196,7 @@ def members(terminal: etree._Element) -> list[str]:
     return [member.get("variableName") for member in terminal.iter("TerminalMemberVariable")]
 
 
-@pytest.mark.parametrize("kind", ROVS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
     """The members of a terminal have the same causality, unless it is the port of a point; its name is unique."""
     declared = {v.name: v.causality for v in variables(ROVS[kind])}
@@ -201,7 +218,7 @@ def test_every_input_and_output_is_in_one_terminal(kind: str) -> None:
         assert len({v.get("memberName") for v in variable_names}) == len(variable_names)
 
 
-@pytest.mark.parametrize("kind", ROVS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_velocity_says_of_what_it_is_and_those_over_ground_are_outputs(kind: str) -> None:
     """The derivative of a position is a velocity over ground; derivatives are local.
 
@@ -273,7 +290,7 @@ def references(group: etree._Element) -> list[str]:
     return [variable.get("ref") for variable in group]
 
 
-@pytest.mark.parametrize("kind", ROVS)
+@pytest.mark.parametrize("kind", KINDS)
 def test_every_input_and_output_is_in_one_group(kind: str) -> None:
     """The variables of a group have the same causality and unit, and different axes."""
     rov = ROVS[kind]

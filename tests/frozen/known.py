@@ -241,7 +241,7 @@ RESULTS: dict[str, Callable[[], str]] = {
     },
 }
 """A function that makes each result anew, by the name of its file."""
-LONG = {f"identify_{name}.txt" for name in ("otter", "videoray_refit")}
+LONG = {f"identify_{name}.txt" for name in ("otter", "pool", "videoray_refit")}
 """Those that take more than a few seconds."""
 
 

@@ -23,18 +23,11 @@ REPEATED = {
 }
 """A line of a fit, and two numbers in it that are the same."""
 CHANGED = {
-    "an evidence": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | 2.6 | N | {{}} | reported |", "5.8", "6.3"),
     "the sign of an evidence": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | 2.6 | N | {{}} | reported |", "0.6", "−0.6"),
-    "a value": (f"{EFFECTS}Load | heave | {{}} | 1.4 | 2.6 | N | 8.0 | reported |", "2.0", "2.2"),
-    "its width": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | {{}} | N | 8.0 | reported |", "2.6", "2.8"),
     "a value of a file": ('F_0 = {{ value = {}, unit = "N", interval = [-0.302, 0.235] }}', "-0.021", "0.021"),
-    "a value in a sentence": ("the load is {} N (−0.30 to 0.24), of yaw", "−0.021", "0.021"),
-    "a correlation": ("b = {{ error = 0.3, correlation = {{ a = {} }} }}", "0.1", "-0.1"),
-    "a number without an interval": ("steady at {} m/s", "0.9979", "1.010"),
     "an exponent": ("a limit of {} N", "4.4·10⁻⁵", "4.4·10⁻⁶"),
     "an exponent alone": ("a limit of {} N", "10⁶", "10⁵"),
     "an exponent of a file": ("a limit of {} N", "1e-05", "1e-06"),
-    "a count": ("{} more doubts", "3", "4"),
     "another table": (
         f"{EFFECTS}\n## Variables\n{VARIABLES}a | b | c | fixed | 1.00 | N | {{}} | 2.00 |",
         "0.50",

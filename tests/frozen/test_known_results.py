@@ -6,7 +6,7 @@ from tests.frozen.known import FOLDER, LONG, RESULTS, difference, now
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in LONG else ()) for name in RESULTS]
+    "name", [pytest.param(name, marks=pytest.mark.weekly if name in LONG else ()) for name in RESULTS]
 )
 def test_a_known_result_stays(name: str) -> None:
     """If it has to change, `python -m tests.frozen` writes it anew, and prints the difference for review."""

@@ -161,35 +161,6 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
     assert plain["alpha_w"] == 1.0
 
 
-def test_effects_are_told_in_their_units(fit: Fit) -> None:
-    """A dead band is not known to better than 1 % of a command, and a ratio has the interval of its logarithm."""
-    full = fit.known.full["heave"]
-    expected = {
-        ("time constant of the thrusters", ""): (0.2, 0.2 - HALF, 0.2 + HALF, "s"),
-        ("dead time of the commands", ""): (0.1, 0.1 - HALF, 0.1 + HALF, "s"),
-        ("dead band", "top"): (0.05, 0.04, 0.06, "1"),
-        ("loss of thrust with the speed of advance, relative to full thrust", "top"): (
-            0.1,
-            0.1 - HALF,
-            0.1 + HALF,
-            "s/m",
-        ),
-        ("drag astern relative to drag ahead", "heave"): (1.3, 1.3 * np.exp(-HALF), 1.3 * np.exp(HALF), "1"),
-        ("constant load", "heave"): (0.03 * full, (0.03 - HALF) * full, (0.03 + HALF) * full, "N"),
-    }
-    told = {(one.name, one.of): one for one in effects_of(found(fit))}
-    for key, (value, low, high, unit) in expected.items():
-        effect = told[key]
-        assert (effect.value, *effect.interval) == pytest.approx((value, low, high)), key
-        assert (effect.unit, effect.kept) == (unit, True)
-    assert told["constant load", "yaw"].unit == "N.m"
-    assert told["dead band", "top"].beyond == pytest.approx(0.4), "a deviation of 0.05, of 2.5"
-    assert not told["time constant of the thrusters", ""].is_unusual
-    (late,) = (one for one in effects_of(found(fit, dead_time=0.13)) if one.kind == "dead time")
-    assert late.is_unusual
-    assert late.beyond == pytest.approx(2.6 / 2.5)
-
-
 def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
     """However clear: a lag of 0.0159 s has a corner frequency of 10 Hz, at which the sensor is sampled."""
     for lag, is_told in ((0.0155, False), (0.0163, True)):
@@ -328,6 +299,7 @@ def moved(drag: Callable[[float], float]) -> tuple[Columns, np.ndarray, np.ndarr
         pytest.param(0.8, -0.2, marks=pytest.mark.long),
     ],
 )
+@pytest.mark.long
 def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float, offset: float, tmp_path: Path) -> None:
     """They move no answer: V_ss are those of 78 c |c| = 38 |V| V + 9 V. Without them, nothing is told."""
     columns, position, velocity = moved(lambda v: 38.0 * abs(v) * v + 9.0 * v)
@@ -346,6 +318,7 @@ def test_scale_and_offset_of_a_velocity_beside_a_position_are_told(scale: float,
     assert any(effect.is_unusual for effect in kept.values()) == (abs(log(scale)) > 0.2)
 
 
+@pytest.mark.long
 def test_another_power_of_drag_is_found(tmp_path: Path) -> None:
     """The drag is 38 |u| u |2 u|^(-1/2) + 4 u. The file has the nearest linear and quadratic drag."""
 
@@ -390,7 +363,9 @@ def of_depth(
     return identified(folder, f"{HEAD}[known]\n{mass}{thrust}", every, "log_heave.csv")
 
 
-@pytest.mark.parametrize(("lag", "noise", "is_short"), [(0.11, 0.02, False), (0.0, 0.0003, True)])
+@pytest.mark.parametrize(
+    ("lag", "noise", "is_short"), [pytest.param(0.11, 0.02, False, marks=pytest.mark.long), (0.0, 0.0003, True)]
+)
 def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
     lag: float, noise: float, is_short: bool, tmp_path: Path
 ) -> None:
@@ -405,6 +380,7 @@ def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
 
 
 @pytest.mark.parametrize("lag", [0.6, pytest.param(0.0, marks=pytest.mark.long)])
+@pytest.mark.long
 def test_a_lag_of_a_sensor_is_not_one_of_the_thrusters(lag: float, tmp_path: Path) -> None:
     result = of_depth(tmp_path, HELD, 0.005, sensor=lag)
     (heave,) = result.axes

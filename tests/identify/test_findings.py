@@ -367,23 +367,6 @@ def test_each_kind_is_told_for_its_reason_alone(
     assert beside is None or not said(beside, kind)
 
 
-@pytest.mark.parametrize(
-    ("interval", "kind"),
-    [
-        ((-0.2, -0.149), "logging"),
-        ((-0.2, -0.151), "clock"),
-        ((0.049, 0.1), "logging"),
-        ((0.051, 0.1), "clock"),
-        ((-0.1, 0.0), ""),
-        ((0.0, 0.1), ""),
-    ],
-)
-def test_commands_that_act_up_to_one_row_early_are_usual(interval: tuple[float, float], kind: str) -> None:
-    """Half an interval of 0.1 s more is allowed at both ends."""
-    result = quiet(logging=(replace(LATE, offset_interval=interval),))
-    assert [one.kind for one in findings_of(result)] == [kind] * bool(kind)
-
-
 def test_every_own_kind_has_a_sentence_here() -> None:
     own = {*SENTENCES} - {*reading.SENTENCES}
     of_tuning = {kind for kind in own if kind.startswith("implausible tuned")}

@@ -101,7 +101,7 @@ def test_any_folder_is_read_or_one_clear_line(examples: int, tests: Path, tmp_pa
 
 
 @pytest.mark.parametrize("examples", [2, pytest.param(30, marks=pytest.mark.weekly)])
-@pytest.mark.parametrize("only", ["rov.toml", "steady_heave_down.csv", pytest.param(LOG, marks=pytest.mark.long)])
+@pytest.mark.parametrize("only", spread(["rov.toml", "steady_heave_down.csv", LOG], ["rov.toml"], [LOG]))
 def test_any_folder_is_identified_or_one_clear_line(
     only: str, examples: int, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -137,7 +137,7 @@ STRANGE = {
 }
 
 
-@pytest.mark.parametrize("case", STRANGE)
+@pytest.mark.parametrize("case", spread(STRANGE, [*STRANGE][::2], STRANGE))
 def test_a_strange_recording_is_identified_or_one_clear_line(
     case: str, tests: Path, tmp_path: Path, capsys: Capsys
 ) -> None:

@@ -18,7 +18,6 @@ from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
-from tests.folders import HEAD, SPEED, read
 from tests.identify.conftest import SHORT, TRUTH, with_logs
 from tests.recordings import run
 
@@ -107,9 +106,3 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
     assert test.target == wider.target == "the speed at -50%"
     assert wider.now == pytest.approx(0.3)
     assert wider.then == pytest.approx(np.sqrt(test.then**2 + 0.3**2 - test.now**2))
-
-
-def test_percent_are_a_fraction(tmp_path: Path) -> None:
-    rov = f'base = "videoray"\n{HEAD}[limits]\ncommand_max = "60 %"\n'
-    tests = read(tmp_path, rov, {"steady_heave.csv": f"{SPEED}\n0.3,0.163\n"})
-    assert tests.description.tables.limits == TankLimits(command_max=0.6)

@@ -13,6 +13,8 @@ from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, TESTS
 from tests.identify.conftest import Identified
 
+pytestmark = pytest.mark.long
+
 HELD_OUT = {
     ("surge", "V_ss"): 0.0828,
     ("heave", "V_ss"): 0.0709,

@@ -26,6 +26,7 @@ from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import HEAD, folder_of
 from tests.identify.conftest import FORCES, KNOWN
 from tests.identify.scenarios.catalogue import COMPLETE
+from tests.often import spread
 from tests.recordings import PLANS, Measured, run
 from tests.vehicles import VIDEORAY
 
@@ -60,10 +61,8 @@ SLIPS = {
     "yaw to port": Slip(YAW, value=-1.0, words=_TURNED),
     "surge astern": Slip(SURGE, value=-1.0, words=_TURNED),
 }
-BY_DEFAULT = 1
-"""The first slip is that of the default tests."""
-OFTEN = ("depths a hundredfold", "distances in feet", "yaw to port")
-"""A wrong scale, unit and sign, which the long tests plant in all logs."""
+OFTEN = ("distances in feet",)
+"""What the long tests plant in all logs."""
 
 
 @cache
@@ -109,8 +108,7 @@ def names(lines: Sequence[str], file: str, words: str) -> bool:
 @pytest.mark.parametrize(
     ("kind", "how_many"),
     [
-        *((kind, "one of three") for kind in [*SLIPS][:BY_DEFAULT]),
-        *(pytest.param(kind, "one of three", marks=pytest.mark.weekly) for kind in [*SLIPS][BY_DEFAULT:]),
+        *(pytest.param(kind, "one of three", marks=pytest.mark.weekly) for kind in SLIPS),
         *(pytest.param(kind, "all", marks=pytest.mark.long if kind in OFTEN else pytest.mark.weekly) for kind in SLIPS),
     ],
 )
@@ -158,7 +156,7 @@ def asked_of(folder: Path, *, may_be_thrusters: bool = False) -> dict[tuple[str,
     return {(one.file, one.quantity): one.words for one in found}
 
 
-@pytest.mark.parametrize("kind", QUESTIONS)
+@pytest.mark.parametrize("kind", spread(QUESTIONS, ["depths a hundredfold", "yaw to port"], ["degrees under radians"]))
 def test_a_slip_is_asked_in_its_words(kind: str, tmp_path: Path) -> None:
     """Nothing tells the drag but the log and the mass."""
     slip = SLIPS[kind]
@@ -181,7 +179,10 @@ def test_a_fit_is_not_refined_where_a_slip_explains_the_errors(tmp_path: Path, m
 
 @pytest.mark.parametrize(
     ("axis", "quantity", "scale", "question"),
-    [(HEAVE, "depth", FEET, "is it in ft"), (SURGE, "velocity", KNOTS, "is it in knots")],
+    [
+        pytest.param(HEAVE, "depth", FEET, "is it in ft", marks=pytest.mark.weekly),
+        pytest.param(SURGE, "velocity", KNOTS, "is it in knots", marks=pytest.mark.long),
+    ],
 )
 def test_feet_and_knots_are_asked_about_where_another_log_shows_them(
     axis: Axis, quantity: str, scale: float, question: str, tmp_path: Path
@@ -195,7 +196,7 @@ def test_feet_and_knots_are_asked_about_where_another_log_shows_them(
     assert {file: words for (file, _), words in found.items()} == {wrong.file: question}
 
 
-@pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])
+@pytest.mark.parametrize("axis", spread((HEAVE, SURGE, YAW), [HEAVE], [SURGE]))
 def test_nothing_is_asked_of_a_log_without_slip(axis: Axis, tmp_path: Path) -> None:
     assert not asked(tmp_path, recordings(axis)[0], rov=KNOWN)
 
@@ -222,6 +223,7 @@ def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_tha
     assert tried == [int(is_suspected)]
 
 
+@pytest.mark.long
 def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
     """A sensor that shows nothing but noise is no slip, and hides none."""
     kinds = "depths a hundredfold", "radians under degrees"
@@ -232,7 +234,7 @@ def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
     assert found == {(log.file, SENSOR[log.axis.name]): QUESTIONS[kind] for log, kind in zip(logs, kinds, strict=True)}
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 @pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])
 def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
     assert not told(write_folder(tmp_path, recordings(axis)[:2]))

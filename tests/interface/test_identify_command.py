@@ -54,6 +54,7 @@ def test_the_progress_names_what_is_done_and_never_goes_back(
     }
 
 
+@pytest.mark.long
 def test_a_log_alone_is_identified_with_a_vehicle_that_is_assumed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -19,6 +18,7 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import VECTORED
+from tests.often import spread
 from tests.tank.logs import commanded, measured
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
@@ -82,9 +82,7 @@ def weigh(folder: Path) -> None:
     path.write_text(draft.replace('\nm_rov = { value = "?"', "\nm_rov = { value = 12"), encoding="utf-8")
 
 
-@pytest.mark.parametrize(
-    "name", [pytest.param(name, marks=pytest.mark.long if name in (".bag", ".db3") else ()) for name in FILES]
-)
+@pytest.mark.parametrize("name", spread(FILES, (".tlog", ".mcap", "three files", "one file"), (".bin", ".ulg")))
 def test_a_log_is_read_with_its_draft_and_a_mass(name: str, tmp_path: Path, inspect: Inspect) -> None:
     write, axes = FILES[name]
     write(tmp_path)
@@ -135,11 +133,9 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     ("titles", "base"),
     [
         ([f"T{n}" for n in range(1, 7)], "bluerov2"),
-        ([f"servo{n}_raw" for n in range(1, 7)], "bluerov2"),
         ([f"motor_{n} [us]" for n in range(6, 0, -1)], "bluerov2"),
         (["H1", "H2", "H3", "H4", "V1", "V2"], ""),
         ([f"Leg{n} (mbar)" for n in range(1, 7)], "?"),
-        ([f"RC{n}" for n in range(1, 7)], "?"),
         (["T1"], "?"),
     ],
 )
@@ -225,24 +221,16 @@ def test_headers_of_loggers_are_read_and_no_sentence_contradicts_them(tmp_path: 
     assert "no log has a velocity or a position of sway, unless Fahrgeschwindigkeit [m/s] is one. " in out
 
 
-def test_a_header_is_not_proposed_for_a_column_that_is_there(tmp_path: Path, inspect: Inspect) -> None:
-    names = ",".join(f"u_{name} [1]" for name in motion.THRUSTERS)
-    table(tmp_path / "dive.csv", f"time [s],{names},depth [m],bar30_depth_m", TIME, *THRUSTERS, DEPTH, 0.0 * DEPTH)
-    out, draft = inspect()
-    assert '"bar30_depth_m" = "depth' not in draft
-    assert "bar30_depth_m: always 0, another depth [m]" in out
-
-
 def test_thousands_of_columns_take_seconds_and_are_not_all_shown(tmp_path: Path, inspect: Inspect) -> None:
-    """If each header were compared with all others, it would take minutes."""
+    """If each header were compared with all others, it would take a minute."""
     start = process_time()
-    titles = ["time [s]", "depth [m]", *(f"x{n}" for n in range(2500))]
+    titles = ["time [s]", "depth [m]", *(f"x{n}" for n in range(1100))]
     table(tmp_path / "log.csv", ",".join(titles), *(DEPTH[:3] for _ in titles))
     shown = inspect()
-    assert process_time() - start < 20.0
+    assert process_time() - start < 10.0
     assert "depth" in shown[0]
     for text in shown:
-        assert "2400 more" in text
+        assert "1000 more" in text
         assert len(text.splitlines()) < 200
 
 
@@ -304,7 +292,7 @@ INCOMPLETE: dict[str, tuple[str, set[str]]] = {
 """What a rov.toml has, and what `--draft` adds."""
 
 
-@pytest.mark.parametrize("name", INCOMPLETE)
+@pytest.mark.parametrize("name", spread(INCOMPLETE, [*INCOMPLETE][::2], INCOMPLETE))
 def test_a_draft_completes_what_is_there_and_keeps_it(name: str, tmp_path: Path, inspect: Inspect) -> None:
     own, added = INCOMPLETE[name]
     (tmp_path / "rov.toml").write_text(own, encoding="utf-8")
@@ -330,7 +318,7 @@ REFUSED = {
 """What is misspelt in a folder: the file, the word, and what stands there in its place."""
 
 
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("name", spread(REFUSED, ("a column", "nothing"), REFUSED))
 def test_what_identify_refuses_is_not_recommended(name: str, tmp_path: Path, capsys: Capsys) -> None:
     (tmp_path / "rov.toml").write_text(VECTORED, encoding="utf-8")
     for n in (1, 2):
@@ -361,7 +349,7 @@ UNREADABLE: dict[str, bytes] = {
 }
 
 
-@pytest.mark.parametrize("name", UNREADABLE)
+@pytest.mark.parametrize("name", spread(UNREADABLE, ("cut.mcap", "image.bin"), UNREADABLE))
 def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     name: str, tmp_path: Path, capsys: Capsys
 ) -> None:
@@ -379,33 +367,3 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
         assert main(["identify", *arguments]) == 2
         (error,) = [line for line in capsys.readouterr().err.splitlines() if str(tmp_path / name) in line]
         assert error.startswith(f"rov-fmu: {tmp_path / name}")
-
-
-def test_outputs_that_never_change_may_be_those_of_lights(tmp_path: Path, inspect: Inspect) -> None:
-    """With its seven outputs, the vehicle would be no vehicle that ships."""
-    lights = np.full((len(TIME), 1), 1100)
-    LOGS[".tlog"](tmp_path, replace(DIVE, pulses=np.column_stack([DIVE.pulses, lights])))
-    out, draft = inspect()
-    assert "thruster 7" in out
-    assert parsed(draft)["base"] == "bluerov2"
-
-
-def test_logs_without_commands_are_not_said_to_be_identifiable(
-    tmp_path: Path, inspect: Inspect, capsys: Capsys
-) -> None:
-    """A file with motion alone, and one with commands alone, are refused with the table that joins them."""
-    table(tmp_path / "in.csv", "time [s],depth [m]", TIME, DEPTH)
-    end = f"add the commands, or name their columns, then rov-fmu identify {tmp_path}\n"
-    assert inspect()[0].endswith(f"Next: edit this draft, then {end}")
-    assert inspect()[0].endswith(f"Next: {end}")
-    (tmp_path / "rov.toml").unlink()
-    table(tmp_path / "out.csv", "time [s],u_l [%],u_r [%],u_t [%]", TIME + 900.0, TIME, TIME, TIME)
-    _, draft = inspect()
-    weigh(tmp_path)
-    text = re.sub(r'= "\?"', "= 0.3", draft).partition("[dives")[0]
-    (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
-    assert main(["identify", str(tmp_path)]) == 2
-    lines = capsys.readouterr().err.splitlines()
-    assert [line.rpartition("; ")[2] for line in lines] == [
-        "if another file of the same dive has it, [dives] in rov.toml joins the files"
-    ] * 2

@@ -9,8 +9,8 @@ from jinja2 import UndefinedError
 from pydantic import TypeAdapter, ValidationError
 
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, part, reason_of, shown
-from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
+from rov_fmu.io.messages import FileError, brief, first_of, lines_on, only, reason_of, shown
+from rov_fmu.io.reading import read_bytes, root_of_xml
 from rov_fmu.io.templates import render
 from rov_fmu.io.toml_file import Finite, Name, Symbol, Text, join_names
 
@@ -37,11 +37,6 @@ def test_no_reason_is_empty_or_the_name_of_a_class(error: Exception) -> None:
     reason = reason_of(error)
     assert " " in reason
     assert type(error).__name__ not in reason
-
-
-@pytest.mark.parametrize("most", [1_000, 100_000, 2_000_000, 500_000_000])
-def test_the_size_of_a_file_that_is_too_large_differs_from_what_is_allowed(most: int) -> None:
-    assert too_large(most + 1, most) == f"has {most + 1:,} bytes; at most {most:,} are read"
 
 
 def test_xml_of_a_stranger_contains_no_other_file(tmp_path: Path) -> None:
@@ -71,12 +66,6 @@ def test_a_file_has_a_largest_size(tmp_path: Path) -> None:
     assert read_bytes(path, most=3) == b"abc"
     with pytest.raises(FileError, match=r"has 3 bytes; at most 2 are read$"):
         read_bytes(path, most=2)
-
-
-def test_a_part_of_the_work_has_a_part_of_the_progress() -> None:
-    shown: list[tuple[str, float]] = []
-    part(lambda *step: shown.append(step), 0.25, 0.75)("x", 0.5)
-    assert shown == [("x", 0.5)]
 
 
 TEMPLATE = """{% for one in names %}

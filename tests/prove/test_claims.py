@@ -173,6 +173,7 @@ def test_an_altered_result_is_found(videoray_fmu: Path, tmp_path: Path) -> None:
     assert "Experiment surge_70_tuned: x deviates by" in found.sentence
 
 
+@pytest.mark.long
 def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(measures, "_WAIT", 1.0)
     step = "h == 0.0 and time.sleep(30.0); h < 0.0 and os.abort(); h > 1.0 and os._exit(3)"
@@ -186,6 +187,7 @@ def test_an_answer_that_does_not_come_is_told(tmp_path: Path, monkeypatch: pytes
 # ---- Any FMU ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_strangers_fmu_that_ends_its_process_fails_the_claims_that_apply_and_gets_a_page(
     tmp_path: Path, capsys: Capsys
 ) -> None:

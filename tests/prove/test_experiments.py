@@ -63,12 +63,6 @@ def test_the_times_of_the_fmu_come_before_the_defaults_and_after_those_of_the_ex
     assert times(read(tmp_path, own, child, **default)) == (2.0, 9.0, 0.25, 1e-6)
 
 
-def test_a_million_steps_are_run_and_one_more_is_not(tmp_path: Path) -> None:
-    assert times(read(tmp_path, 'stopTime="1000000" stepSize="1"'))[1] == 1e6
-    with pytest.raises(FileError, match=r"takes 1e\+06 steps from 0 to 1e\+06 s; at most 1000000 are run"):
-        read(tmp_path, 'stopTime="1000001" stepSize="1"')
-
-
 def test_parameters_and_references_are_read(tmp_path: Path) -> None:
     (experiment,) = read(tmp_path, inside=f'<!-- a word --><Parameters source="m.ssv"/>{_REFERENCES}<Annotations/>')
     assert (experiment.name, experiment.parameters, experiment.stimuli) == ("a", {"k": "2"}, None)

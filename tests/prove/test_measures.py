@@ -73,24 +73,6 @@ def test_the_experiment_with_the_most_held_inputs_is_run() -> None:
 
 
 @pytest.mark.parametrize(
-    ("times", "stop", "step", "allowed"),
-    [
-        ({"stopTime": "4", "stepSize": "0.5", "tolerance": "1e-4"}, 4.0, 0.5, 1e-4),
-        ({"startTime": "2", "stopTime": "2"}, 3.0, 0.002, 1e-3),
-        ({"stopTime": "4", "stepSize": "4"}, 4.0, 4.0, 1e-3),
-        ({"stopTime": "4", "stepSize": "4.1"}, 4.0, 0.008, 1e-3),
-        ({"stopTime": "4", "stepSize": "4e-6"}, 4.0, 0.008, 1e-3),  # more than a million steps
-    ],
-)
-def test_otherwise_the_default_experiment_is_run(
-    times: Mapping[str, str], stop: float, step: float, allowed: float
-) -> None:
-    found = subject(_unasked, defaultExperiment=SimpleNamespace(**times))
-    assert found.plan == Plan(float(times.get("startTime", 0.0)), ((stop, {}),), {}, ["u"])
-    assert (found.step, found.allowed) == (step, allowed)
-
-
-@pytest.mark.parametrize(
     ("given", "reason"),
     [
         ({"fmiVersion": "1.0"}, "It is an FMU of FMI 1.0, and this is measured in FMI 2.0 and 3.0."),

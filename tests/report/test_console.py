@@ -13,11 +13,8 @@ from rich.progress import TextColumn
 
 from rov_fmu.io.messages import InputError, print_message
 from rov_fmu.process import exit_code
-from rov_fmu.prove.check import MetaData
-from rov_fmu.prove.claims import CLAIMS, Proof
-from rov_fmu.prove.measures import Evidence
 from rov_fmu.report import console as terminal
-from rov_fmu.report.console import console, paragraph, print_claims, print_end, print_table, table
+from rov_fmu.report.console import console, paragraph, print_end, print_table, table
 from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
 from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
 
@@ -97,18 +94,6 @@ def test_numbers_and_words_are_written_for_readers() -> None:
     assert sentence("log_1.csv: it lacks") == "log_1.csv: it lacks"
     assert [*map(pretty_unit, ("N.m.s2/rad2", "1", "us", "deg/s"))] == ["N·m·s²/rad²", "1", "µs", "°/s"]
     assert [in_words("time to 63 %", "s"), in_words("force", "1")] == ["Time to 63 % (s)", "Force"]
-
-
-def test_a_claim_has_its_figure_or_why_it_was_not_checked(capsys: pytest.CaptureFixture[str]) -> None:
-    found = [
-        Evidence("holds", "It is so."),
-        Evidence("fails", "It is not.", "3 of 4"),
-        Evidence("does not apply", "No states."),
-    ]
-    print_claims(Proof(Path("a.fmu"), "", None, MetaData(), "", [(CLAIMS[0], one) for one in found]))
-    rows = [re.split("  +", line) for line in capsys.readouterr().out.splitlines()[2:]]
-    results = ["holds"], ["fails", "3 of 4"], ["does not apply", "No states."]
-    assert rows == [["expected results", *cells] for cells in results]
 
 
 def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_column(

@@ -34,7 +34,7 @@ def decoded(png: bytes) -> Any:
     return imread(BytesIO(png), format="png")
 
 
-@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy", pytest.param("bluerov2", marks=pytest.mark.long)])
+@pytest.mark.parametrize("name", ["videoray", pytest.param("bluerov2_heavy", marks=pytest.mark.long)])
 def test_the_pictures_are_small_and_need_nothing(name: str) -> None:
     shapes = {}
     for path, content in shipped(name).items():

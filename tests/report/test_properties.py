@@ -114,7 +114,9 @@ def test_the_equations_shown_are_those_of_the_vehicle(kind: str) -> None:
     assert named - rov.layout.added.keys() <= found, "the page has these in words"
 
 
-@pytest.mark.parametrize("vehicles", [10, pytest.param(300, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "vehicles", [4, pytest.param(60, marks=pytest.mark.long), pytest.param(300, marks=pytest.mark.weekly)]
+)
 def test_the_equations_shown_are_those_of_any_vehicle(vehicles: int) -> None:
     rng = random.Random(2)
     for axes in ("uvwpqr", "uwq", "pq", "uvwpqr"):

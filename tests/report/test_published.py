@@ -12,7 +12,7 @@ from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.report.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import ALONE
 from tests.paper.test_paper import NON_LINEAR, ROWS, SCALED, closed_form
 from tests.vehicles import with_axes
@@ -103,12 +103,6 @@ def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tu
     vehicle_file, folder = tmp_path / VIDEORAY.name, tmp_path / DATA.name
     (folder / name).write_bytes(change((DATA / name).read_text(encoding="utf-8")))
     return vehicle_file, folder / name
-
-
-def test_full_command_and_no_motion_are_allowed(tmp_path: Path) -> None:
-    vehicle_file, _ = tables_with(tmp_path, SURGE_STEADY, lambda text: text.replace("20,0.31", "100,0").encode())
-    (*_, surge) = load_tables(load_vehicle(vehicle_file))
-    assert surge.steady[Decimal(100)] == 0
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)

@@ -236,7 +236,7 @@ def audit() -> Audit:
 
 @pytest.mark.parametrize(
     "count",
-    [100, pytest.param(500, marks=pytest.mark.long), pytest.param(10_000, marks=pytest.mark.weekly)],
+    [40, pytest.param(300, marks=pytest.mark.long), pytest.param(10_000, marks=pytest.mark.weekly)],
 )
 def test_random_expressions_give_numbers_and_arrays_and_open_no_file(count: int, audit: Audit) -> None:
     found: Counter[str] = Counter()

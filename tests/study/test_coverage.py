@@ -104,7 +104,6 @@ def true_motion(k: Vehicle) -> dict[str, Array]:
 @pytest.mark.parametrize(
     ("kind", "vehicles", "width"),
     [
-        pytest.param("points", 4, 0.4, marks=pytest.mark.long),
         pytest.param("points", 60, 0.4, marks=pytest.mark.weekly),
         pytest.param("recordings", 15, 0.1, marks=pytest.mark.weekly),
     ],

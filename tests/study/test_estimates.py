@@ -148,9 +148,15 @@ same = "0*a_d_u"
     return folder / "plan.toml"
 
 
+@pytest.mark.long
 def test_the_command_tells_the_warnings_and_the_results_keep_the_estimates(
-    videoray_fmu: Path, tmp_path: Path, scheduler: str, capsys: pytest.CaptureFixture[str]
+    videoray_fmu: Path,
+    tmp_path: Path,
+    scheduler: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.setattr("rov_fmu.study.results.plots.inline_svg", lambda *_, **__: "")
     plan = str(planned(tmp_path, videoray_fmu, 10))
     assert main(["study", plan, "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
     results = Results(tmp_path / "results")

@@ -63,9 +63,9 @@ def _close(results: Results, other: Results, rtol: float = 1e-11) -> None:
 
 
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
-    """Each run is repeated in Python, which shares no code with the FMU."""
+    """Some runs are repeated in Python, which shares no code with the FMU."""
     rov = load_vehicle(VIDEORAY)
-    for number, run in native.runs.iterrows():
+    for number, run in native.runs.iloc[::6].iterrows():
         own = type(rov)(rov.layout, {**rov.coefficients, "alpha_u": run.alpha_u, "m_rov": run.m_rov})
         state = dict.fromkeys(rov.layout.state, 0.0) | {"w": 0.1}
         inputs = dict.fromkeys(rov.layout.inputs, 0.0) | {"V_N": run.V_N, "u_r": 0.3}
@@ -112,19 +112,13 @@ def test_a_vehicle_in_lanes_and_its_fmu_give_the_same_rows_and_the_lanes_load_ne
     _close(study(plan, tmp_path / "results", scheduler=scheduler), native)
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
     assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
     _close(study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
 
 
 @pytest.mark.long
-def test_more_workers_give_the_same_rows(tmp_path: Path, videoray_fmu: Path, native: Results) -> None:
-    results = study(_plan(tmp_path, videoray_fmu), tmp_path / "results", workers=3)
-    pd.testing.assert_frame_equal(results.runs, native.runs, check_exact=True)
-    pd.testing.assert_frame_equal(results.trajectories(), native.trajectories(), check_exact=True)
-
-
 def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
     tmp_path: Path,
     videoray_fmu: Path,

@@ -24,6 +24,7 @@ from rov_fmu.study.run.lanes import _Runs, simulated
 from rov_fmu.study.run.simulator import Simulator
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
+from tests.often import spread
 from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, VIDEORAY, a_vehicle, passed, with_rotors
 
 KINDS: dict[str, Vehicle] = {
@@ -66,7 +67,7 @@ def _prepared(rov: Vehicle, **keys: Any) -> Prepared:
     return prepare(Plan.model_validate(plan), Path("plan.toml"), model)
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
 def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: pytest.FixtureRequest) -> None:
     """They are read before the first step and after each one, with the inputs of the step that ends there."""
     rov, folder = KINDS[kind], str(request.getfixturevalue(f"{kind}_dir"))
@@ -84,7 +85,7 @@ def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: 
     assert max(worst.values()) < 1e-12, {n: v for n, v in worst.items() if v > 1e-12}
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
 def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
     prepared, rov = _prepared(KINDS[kind]), KINDS[kind]
     values = prepared.design.rows(0, RUNS)
@@ -93,7 +94,7 @@ def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
         assert np.array_equal(simulated(prepared.job, rov, values[order], 2)[0], together[order])
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
 def test_a_vehicle_has_the_variables_of_its_fmu(kind: str, request: pytest.FixtureRequest) -> None:
     folder = request.getfixturevalue(f"{kind}_dir")
     description = fmpy.read_model_description(str(folder), validate=False)
@@ -132,7 +133,7 @@ def _same(results: Results, other: Results) -> None:
     pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), check_exact=True)
 
 
-@pytest.mark.parametrize("sampler", ["sobol", "random", "latin-hypercube", "saltelli"])
+@pytest.mark.parametrize("sampler", spread(["sobol", "random", "latin-hypercube", "saltelli"], ["sobol"], ["saltelli"]))
 def test_parts_are_merged_to_the_bits_of_one_run(
     sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -233,6 +234,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
     assert {now.total for now in progress} == {40}
 
 
+@pytest.mark.long
 def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(
     six_dir: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -71,6 +71,7 @@ def test_the_page_leads_with_the_figures_and_their_units() -> None:
         assert page.xpath(f"string(//tr[td/code='{name}']/td[2])").strip() == "m/s"
 
 
+@pytest.mark.long
 def test_a_study_of_which_all_runs_failed_has_a_page_and_nothing_to_plot(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str
 ) -> None:
@@ -83,6 +84,7 @@ def test_a_study_of_which_all_runs_failed_has_a_page_and_nothing_to_plot(
     assert str(statistics(np.array([2.0]), [0.5])) == "([2.0], 2.0, nan)"
 
 
+@pytest.mark.long
 def test_the_page_shows_which_sobol_indices_are_uncertain(
     foreign: Callable[..., Path], tmp_path: Path, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -251,7 +251,7 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     foreign: Callable[..., Path], tmp_path: Path
 ) -> None:
     (tmp_path / "u.csv").write_text("time,u\n0.1,1\n0.3,3\n0.3,-1\n0.5,-1\n")
-    fmu = beside(foreign(), tmp_path)
+    fmu, model = beside(foreign(), tmp_path), read_model(foreign())
     head = f'fmu = "{fmu}"\nstop_time = 0.7\nstep = 0.1\nsampler = "grid"\n[keep]\noutputs = ["y"]\n'
     expected = {
         "[inputs]\nu = 0.5\n": [0.5] * 7,
@@ -265,5 +265,5 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     for text, values in expected.items():
         path = tmp_path / "plan.toml"
         path.write_text(head + text)
-        job = prepare(load_plan(path), path, read_model(foreign())).job
+        job = prepare(load_plan(path), path, model).job
         assert job.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text

@@ -96,16 +96,10 @@ def _processes(word: str) -> set[int]:
 
 
 @pytest.fixture(scope="module")
-def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign) -> Results:
-    """The results of two workers, which are processes. The other studies here are done by one worker."""
-    folder, others, started = tmp_path_factory.mktemp("whole"), _processes("spawn_main"), list[int]()
-
-    def count(_: Progress) -> None:
-        started.append(len(_processes("spawn_main") - others))
-
-    results = study(_plan(folder, foreign()), folder / "results", workers=2, on_progress=count)
-    assert {*started} == {2}
-    return results
+def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign, scheduler: str) -> Results:
+    """The results of an undisturbed study."""
+    folder = tmp_path_factory.mktemp("whole")
+    return study(_plan(folder, foreign()), folder / "results", scheduler=scheduler)
 
 
 def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -126,7 +120,7 @@ def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pyte
     assert whole.trajectories([3, 5]).run.tolist() == [3] * 5 + [5] * 5
 
 
-@pytest.mark.parametrize("reset", [1, 2])
+@pytest.mark.parametrize("reset", [pytest.param(1, marks=pytest.mark.long), 2])
 def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     reset: int, do: Callable[..., Results], whole: Results
 ) -> None:
@@ -134,6 +128,17 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
     others = _processes("_serve")
     _same(do(reset), whole)
     assert _processes("_serve") <= others, "the processes of the FMU have ended"
+
+
+@pytest.mark.long
+def test_workers_that_are_processes_give_the_same_rows(foreign: Foreign, tmp_path: Path, whole: Results) -> None:
+    others, started = _processes("spawn_main"), set[int]()
+
+    def count(_: Progress) -> None:
+        started.add(len(_processes("spawn_main") - others))
+
+    _same(study(_plan(tmp_path, foreign()), tmp_path / "results", workers=2, on_progress=count), whole)
+    assert started == {2}
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
@@ -167,16 +172,16 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
 @pytest.mark.parametrize(
     ("mode", "reason"),
     [
-        (2, "ended its process: SIGABRT"),
-        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.long, posix]),
-        pytest.param(4, "did not return within time_limit = 5 s", marks=[pytest.mark.long, posix]),
+        pytest.param(2, "ended its process: SIGABRT", marks=pytest.mark.long),
+        pytest.param(3, "ended its process: SIGSEGV", marks=[pytest.mark.weekly, posix]),
+        pytest.param(4, "did not return within time_limit = 2 s", marks=[pytest.mark.long, posix]),
     ],
 )
 def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_tell_if_the_vehicle_turned_over(
     mode: float, reason: str, foreign: Foreign, tmp_path: Path
 ) -> None:
     """With a = 2 the roll passes 90 degrees. A run takes thousandths of a second."""
-    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]", limit=5.0), tmp_path / "unpacked"
+    plan, folder = _plan(tmp_path, foreign(), vary="mode.values = [0]", limit=2.0), tmp_path / "unpacked"
     job = prepare(load_plan(plan), plan, read_model(foreign())).job
     job.model.unpack(folder)
     child = Child(str(folder), replace(job, trials=np.zeros((1, 4))))
@@ -190,6 +195,7 @@ def test_a_run_that_ends_its_process_or_does_not_return_fails_alone_and_others_t
     assert np.isnan(runs[1].figures).tolist() == [True, True]
 
 
+@pytest.mark.long
 def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     foreign: Foreign, tmp_path: Path, whole: Results, do: Callable[..., Results], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -347,6 +353,7 @@ def test_a_scheduler_that_is_not_there_is_a_line(
     assert not (tmp_path / "results").exists()
 
 
+@pytest.mark.long
 def test_a_scheduler_without_workers_is_told_and_its_workers_are_waited_for(
     foreign: Foreign, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -401,6 +408,7 @@ def test_what_goes_wrong_on_the_workers_is_a_line(
     assert found.value.args == told.args
 
 
+@pytest.mark.long
 def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
     foreign: Foreign, tmp_path: Path, do: Callable[..., Results], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -418,7 +426,7 @@ def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
         assert str(lost.value) == f"{told}; {needs}"
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_a_scheduler_that_goes_takes_nothing_with_it(
     foreign: Foreign, tmp_path: Path, slow: Results, scheduler: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

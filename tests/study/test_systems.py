@@ -12,6 +12,7 @@ from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
 from rov_fmu.study import study
 from tests.commands import without_progress
+from tests.often import spread
 
 PLAN = """
 system = "my.ssp"
@@ -66,7 +67,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("old", WRONG)
+@pytest.mark.parametrize("old", spread(WRONG, [*WRONG][::2], WRONG))
 def test_what_does_not_fit_a_system_is_one_line(old: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     new, message = WRONG[old]
     (folder / "plan.toml").write_text(PLAN.replace(old, new), encoding="utf-8")

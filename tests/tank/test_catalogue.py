@@ -7,19 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import AXES, HEAVE, YAW
-from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import VehicleAxis
-from rov_fmu.io.columns import Column, read_columns
-from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.equation.catalogue import HEAVE, YAW
+from rov_fmu.io.columns import read_columns
 from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
-from rov_fmu.tank.columns import TIME, Names, columns_of, columns_of_log
+from rov_fmu.tank.columns import TIME, columns_of
 from rov_fmu.tank.inspection.headers import guessed
 from rov_fmu.tank.log import Source
-from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.tables import rules_of_page
-from tests.vehicles import VIDEORAY
 
 COLUMNS = {name: Column(one.units) for name, one in QUANTITIES.items()} | {"time": TIME} | columns_of("thrust")
 EQUAL: Mapping[str, Mapping[str, float]] = {
@@ -46,55 +41,6 @@ def test_all_units_of_a_column(name: str, tmp_path: Path) -> None:
 
 
 # The columns of each kind of file, a header, and for each limit a number within and one beyond.
-BY_FILE: Mapping[str, Mapping[str, Column]] = {
-    **{kind: columns_of(kind) for kind in ("thrust", "steady", "time_constant")},
-    "log": columns_of_log(VIDEORAY.layout, HEAVE),
-    "wrench": columns_of_log(Layout.of_wrench(map(VehicleAxis, AXES.values())), None),
-}
-LIMITS: Sequence[tuple[str, str, Mapping[float, float]]] = [
-    ("thrust", "command [%]", {-100: -100.01, 100: 100.01, 0.01: 0.0099}),
-    ("thrust", "force [N]", {-1e6: -1000001, 1e6: 1000001}),
-    ("steady", "velocity [m/s]", {-1e3: -1000.1, 1e3: 1000.1, -1e-5: -9.9e-6}),
-    ("steady", "velocity [rad/s]", {-1e3: -1000.1}),
-    ("time_constant", "time constant [s]", {1e5: 100001, 1e-4: 9.9e-5}),
-    ("log", "time [s]", {-1e10: -1.0001e10, 1e10: 1.0001e10}),
-    ("log", "command [1]", {-1: -1.001, 1: 1.001}),
-    ("wrench", "X_ext [N]", {-1e6: -1000001, 1e6: 1000001}),
-    ("wrench", "torque z [N.m]", {1e6: 1000001}),
-]
-
-
-@pytest.mark.parametrize(("file", "title", "limits"), LIMITS)
-def test_bounds_of_every_column(file: str, title: str, limits: Mapping[float, float], tmp_path: Path) -> None:
-    path, name = tmp_path / "a.csv", title.partition(" [")[0]
-    columns = {key: column for key, column in BY_FILE[file].items() if name in (key, *column.also)}
-    for within, beyond in limits.items():
-        path.write_text(f"{title}\n{within}\n", encoding="utf-8")
-        assert [*read_columns(path, columns).values]
-        path.write_text(f"{title}\n{beyond}\n", encoding="utf-8")
-        with pytest.raises(DataFileError, match="line 2, column"):
-            read_columns(path, columns)
-
-
-@pytest.mark.parametrize("name", QUANTITIES)
-def test_bounds_of_every_quantity(name: str, tmp_path: Path) -> None:
-    quantity, path = QUANTITIES[name], tmp_path / "a.csv"
-    beside = "heading [rad]" if name == "depth" else "depth [m]"
-    assert quantity.minimum == (0.0 if name in ("pressure", "voltage") else -quantity.maximum), "these have no sign"
-    for limit, beyond in (
-        (quantity.minimum, quantity.minimum * 1.001 - 1.0),
-        (quantity.maximum, quantity.maximum * 1.001),
-    ):
-        rows = [f"time [s],u_t [%],{beside},{name} [{quantity.unit}]", *(f"{n},{n},{n},{{{n % 2}}}" for n in range(9))]
-        path.write_text("\n".join(rows).format(limit, limit), encoding="utf-8")
-        assert len(read_logs(path, VIDEORAY.layout, Names())) == 1
-        if limit < quantity.least:  # what is below is no measurement
-            continue
-        path.write_text("\n".join(rows).format(beyond, (1.0 + 1e-8) * beyond), encoding="utf-8")
-        with pytest.raises(DataFileError, match=r"column .* as in 9 rows: must be within"):
-            read_logs(path, VIDEORAY.layout, Names())
-
-
 @pytest.mark.parametrize(
     ("kind", "field", "number", "quantity", "expected"),
     [

@@ -1,7 +1,6 @@
 """CSV logs from loggers and spreadsheets: what is read, what is left out with a finding, and what is refused."""
 
 from collections.abc import Sequence
-from io import StringIO
 from math import radians
 from pathlib import Path
 
@@ -12,9 +11,8 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
-from rov_fmu.tank.columns import COMMAND, Names
+from rov_fmu.tank.columns import COMMAND
 from rov_fmu.tank.findings import sentences
-from rov_fmu.tank.readers.tables import read_table
 from tests.tank.logs import Read, commanded, measured, read_log, used
 from tests.vehicles import VIDEORAY, thruster
 
@@ -137,12 +135,6 @@ def test_logs_of_which_nothing_is_left_are_refused(rows: list[str], told: str, t
         read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE)
 
 
-def test_the_slowest_and_the_fastest_rate_that_are_likely(tmp_path: Path) -> None:
-    for step in (10.0, 1.01e-5):
-        rows = [f"{step * n},{30 * (n > 9)},{n}" for n in range(N)]
-        assert not read(tmp_path, "time [s],command [%],depth [cm]", rows, HEAVE).findings
-
-
 # ---- Several commands ------------------------------------------------------------------------------------------------
 
 
@@ -215,21 +207,6 @@ def test_commands_that_cannot_be_in_their_unit_are_refused(case: str, tmp_path: 
     except DataFileError as error:
         found = str(error).removeprefix(f"{tmp_path / 'log.csv'}, column 'command [{unit}]': ")
     assert found == SLIPS[case]
-
-
-def test_a_table_is_parsed_as_often_whatever_the_unit_of_its_commands(tmp_path: Path) -> None:
-    path, counts = tmp_path / "log.csv", []
-    for unit in ("1", "us", "us 0 400", "N 50"):
-        opened: list[StringIO] = []
-
-        def lines(unit: str = unit, opened: list[StringIO] = opened) -> StringIO:
-            rows = (f"{n / 10},{0 if unit == '1' else 100 * n},{n}" for n in range(N))
-            opened.append(StringIO("\n".join([f"time [s],u_t [{unit}],depth [m]", *rows])))
-            return opened[-1]
-
-        read_table(path, VIDEORAY.layout, None, Names(), lines)
-        counts.append(len(opened))
-    assert len({*counts}) == 1, counts
 
 
 # ---- What is refused -------------------------------------------------------------------------------------------------

@@ -1,13 +1,12 @@
 """Times and values of commands, headings that wrap, and gaps."""
 
 from dataclasses import replace
-from math import nan, pi
+from math import pi
 
 import numpy as np
 import pytest
 
-from rov_fmu.tank.arrays import Array, range_in_words
-from rov_fmu.tank.clocks import gaps, in_rows
+from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.quality import uninterrupted
 from tests.tank.logs import channel, commands
@@ -31,20 +30,6 @@ def test_an_angle_that_ranges_over_clearly_more_than_a_turn_is_no_wrapped_one() 
     assert channel("heading", STEPS, values).unwrapped[1].tolist() == values.tolist()
 
 
-@pytest.mark.parametrize(
-    ("values", "words"),
-    [
-        ([nan], "empty"),
-        ([2.0, 2.0, nan], "always 2"),
-        ([1.5, -0.2], "-0.2 to 1.5"),
-        ([1e6, 1000001.0], "1000000 to 1000001"),
-        ([1.0, 1.000000000001], "1 to 1.0000000000010001"),
-    ],
-)
-def test_ranges_in_words_have_as_many_digits_as_tell_their_ends_apart(values: list[float], words: str) -> None:
-    assert range_in_words(np.array(values)) == words
-
-
 def test_commands_hold_for_one_more_usual_interval_and_begin_at_0() -> None:
     told = commands(np.array([3.0]), {"a": np.array([0.5])})
     assert (told.interval, told.end) == (0.0, 3.0)
@@ -65,26 +50,6 @@ def test_commands_at_any_times_are_held_while_measurements_go_on_even_if_some_re
     held = told.held_while(measured)
     assert {*measured[measured >= rows[0]]} <= {*held.rows}
     assert held.at(measured).tolist() == told.at(measured).tolist()
-
-
-def test_regular_commands_with_a_gap_stay_as_they_are() -> None:
-    """They may have changed between their rows, and during the gap."""
-    rows = np.concatenate([np.arange(0.0, 10.0, 0.5), np.arange(15.0, 25.0, 0.5)])
-    told = commands(rows, {"a": np.repeat(np.linspace(-0.5, 0.5, 10), 4)})
-    assert told.held_while(np.arange(0.0, 25.0, 0.1)) is told
-
-
-def test_rows_begin_when_each_series_has_a_value() -> None:
-    rows, values = in_rows({"a": (STEPS[:3], STEPS[:3]), "b": (STEPS[1:4] + 0.05, STEPS[:3])})
-    assert rows == pytest.approx([0.15, 0.2, 0.25, 0.35])
-    assert values["a"] == pytest.approx([0.1, 0.2, 0.2, 0.2])
-    assert values["b"] == pytest.approx([0.0, 0.0, 0.1, 0.2])
-
-
-def test_a_gap_is_longer_than_1_s_and_than_ten_usual_intervals() -> None:
-    for usual, within, beyond in ((0.05, 0.99, 1.01), (0.2, 1.99, 2.01)):
-        time = np.cumsum([0.0, *[usual] * 5, within, *[usual] * 5, beyond, *[usual] * 5])
-        assert gaps(time, time) == [pytest.approx((time[11], time[12]))]
 
 
 def test_a_log_in_which_nothing_is_told_for_a_time_is_several_logs_with_all_its_samples() -> None:

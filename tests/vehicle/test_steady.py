@@ -18,6 +18,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.steady import speed_table, steady_at
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.commands import BARE
+from tests.often import spread
 from tests.vehicles import VEHICLES
 
 DRIVEN = {name: one for name, one in VEHICLES.items() if any(one.layout.signs(axis) for axis in one.layout.bare_axes)}
@@ -135,7 +136,7 @@ def test_the_vehicles_that_ship_are_listed_with_their_descriptions(capsys: pytes
         assert re.search(rf"^{name} +{re.escape(rov_fmu.load(name).description)}$", said, re.MULTILINE)
 
 
-@pytest.mark.parametrize("share", [0.5, 0.92, 1.0, 1.08, 2.0])
+@pytest.mark.parametrize("share", spread([0.5, 0.92, 1.0, 1.08, 2.0], [0.5, 1.0], [1.08]))
 def test_another_top_speed_than_the_stated_one_is_told_where_it_is_flown(
     share: float, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

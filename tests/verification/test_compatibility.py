@@ -36,7 +36,7 @@ def check(folder: Path) -> None:
     assert not [*wrong_results(folder)]
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_all_vehicles_keep_the_rules_and_another_result_is_found(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

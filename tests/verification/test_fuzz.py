@@ -1,8 +1,7 @@
 """The fuzzer's corpus finds nothing in the FMU's C, and it finds planted defects."""
 
 import re
-from base64 import b64decode
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -11,7 +10,8 @@ import pytest
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.toml_file import read_toml
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.often import spread
 from verification.fuzzing import __main__ as command
 from verification.fuzzing.campaign import FindingError, build_target, fuzz, replay, unpack_corpus
 from verification.references.c_programs import clang
@@ -40,8 +40,7 @@ MISSING = {
 }
 
 
-@pytest.mark.long
-@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("fmi", spread([2, 3], (), [3]))
 def test_the_corpus_reaches_every_function(tmp_path: Path, corpus: Path, fmi: int) -> None:
     """And finds nothing. `python -m verification.fuzzing` begins with the corpus, for every vehicle."""
     build_target(_sources("videoray", fmi), tmp_path / "target", fmi)
@@ -62,7 +61,6 @@ class Planted:
     before: str
     after: str
     report: str
-    often: bool = False
 
     @property
     def sources(self) -> dict[str, str]:
@@ -80,33 +78,13 @@ _FILE = Path(__file__).with_name("planted.toml")
 PLANTED = {name: Planted(**keys) for name, keys in read_toml(_FILE, FileError).items()}
 
 
-@pytest.mark.long
-def test_a_finding_can_be_made_again(
-    vehicle: Vehicle, corpus: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """From the file that is kept, or from what is printed of it."""
-    planted = PLANTED["the time is not in the bytes"]
-    told, content = planted.report, replace(native_content(vehicle), sources=planted.sources)
-    monkeypatch.setattr(command, "native_content", lambda *_, **__: content)
-    monkeypatch.chdir(tmp_path)
-    assert command.main(["--vehicle", "videoray", "--fmi", "2", str(corpus)]) == 1
-    assert told in (words := capsys.readouterr().err)
-    (kept,) = tmp_path.glob("finding-*")
-    assert f"again with: python -m verification.fuzzing --vehicle videoray --fmi 2 ./{kept.name}, in base64:\n" in words
-    assert b64decode(words.split()[-1]) == kept.read_bytes()
-    assert command.main(["--vehicle", "videoray", "--fmi", "2", kept.name]) == 1
-    assert told in capsys.readouterr().err
-
-
 def test_every_defect_has_a_place_to_be_planted() -> None:
     places = {name: _sources(p.vehicle, p.fmi)[p.file].count(p.before) for name, p in PLANTED.items()}
     assert [name for name, number in places.items() if number != 1] == []
 
 
-@pytest.mark.parametrize(
-    "name",
-    [pytest.param(n, marks=pytest.mark.long if p.often else pytest.mark.weekly) for n, p in PLANTED.items()],
-)
+@pytest.mark.weekly
+@pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_defect_is_found_within_a_minute(corpus: Path, tmp_path: Path, name: str) -> None:
     planted = PLANTED[name]
     build_target(planted.sources, tmp_path / "target", planted.fmi)

@@ -5,7 +5,6 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 
 import pandas as pd
@@ -15,54 +14,11 @@ from tests.commands import ROOT
 from tests.conftest import Made
 from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, RUNNERS, Importer, pinned
-from verification.interoperability.manoeuvre import DETOUR, MANOEUVRES, TIMES, Manoeuvre
+from verification.interoperability.manoeuvre import MANOEUVRES
 from verification.interoperability.run import Verdict, build_fmu, run
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
-
-
-# ---- The manoeuvre ---------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    "manoeuvre",
-    [
-        pytest.param(m, marks=pytest.mark.long if name in ("bluerov2_heavy", "every_option") else ())
-        for name, m in MANOEUVRES.items()
-    ],
-    ids=list(MANOEUVRES),
-)
-def test_a_manoeuvre_uses_every_input_and_turns_every_velocity_around(manoeuvre: Manoeuvre) -> None:
-    layout, starts = manoeuvre.rov.layout, sorted(manoeuvre.phases)
-    phases = [manoeuvre.inputs_at(start) for start in starts]
-    assert (TIMES[0], TIMES[-1]) == (0.0, 30.0)
-    assert {*starts, DETOUR} <= set(TIMES), "the inputs change, and the detour starts, at communication points"
-    assert phases[0] == layout.usual_inputs, "it does not matter when an importer sets the first inputs"
-    for name in layout.inputs:
-        values = [inputs[name] - layout.inputs[name].start for inputs in phases]
-        assert any(values), f"{name} is used"
-        if name in layout.commands:
-            changes = list(pairwise(values))
-            assert any(0.0 <= a < b for a, b in changes), f"{name} steps up"
-            assert any(a > b > 0.0 for a, b in changes), f"{name} steps down"
-            assert any(a * b < 0.0 for a, b in changes), f"{name} steps through zero"
-    for name in layout.velocities:
-        values = [row[name] for row in manoeuvre.reference]
-        assert min(values) < -0.1 < 0.1 < max(values), f"{name} changes sign"
-    assert {layout.coefficients[name].tunable for name in manoeuvre.parameters} == {True, False}
-
-
-def test_a_vehicle_with_every_option_joins_the_importers_that_set_inputs_in_events() -> None:
-    layout = MANOEUVRES["every_option"].rov.layout
-    assert len(layout.axes) == 6
-    assert all((layout.coupled, layout.cross, layout.restoring, layout.fins, layout.mix, layout.pulse, layout.lagging))
-    assert layout.has_dead_time
-    assert "voltage" in layout.inputs
-    assert any(curve.tables for curve in layout.curves)
-    left_out = [importer for importer in IMPORTERS if not importer.suits(layout)]
-    assert {importer.title for importer in left_out} == {"CasADi", "PathSim-FMI", "fmi-sim", "fmi-rs"}
-    assert {i.name for i in left_out if i.interface == "CS"} == {"fmi-sim-cs", "fmi-sim-cs-fmi3"}
 
 
 # ---- The comparison --------------------------------------------------------------------------------------------------
@@ -73,11 +29,10 @@ def write_result(path: Path, rows: list[dict[str, float]]) -> Path:
     return path
 
 
-@pytest.mark.parametrize("point", [0, 300])
-def test_difference_is_noticed(tmp_path: Path, point: int) -> None:
+def test_difference_is_noticed(tmp_path: Path) -> None:
     for name in SIMPLE.outputs:
         rows = [*SIMPLE.reference]
-        rows[point] = rows[point] | {name: rows[point][name] + 1e-6}
+        rows[-1] = rows[-1] | {name: rows[-1][name] + 1e-6}
         assert SIMPLE.difference(write_result(tmp_path / "result.csv", rows)) == pytest.approx(1e-6), name
 
 
@@ -102,9 +57,7 @@ def tools(tmp_path: Path) -> Path:
         ("agree", EXACT, Verdict.AGREES),
         ("differ", EXACT, Verdict.DIFFERS),
         ("pass", None, Verdict.NO_FINDING),
-        ("pass", EXACT, Verdict.FAILED),
         ("raise SystemExit(3)", None, Verdict.FAILED),
-        ("import os; os.abort()", EXACT, Verdict.FAILED),
     ],
 )
 def test_verdict(

@@ -32,7 +32,7 @@ def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_the_inventory_of_an_fmu_names_every_file(fmu: Path) -> None:
     text = release.fmu_inventory(fmu)
     assert valid(text)
@@ -57,7 +57,7 @@ def test_a_wheel_is_built_with_what_the_package_needs_in_the_pinned_versions(mon
     assert not {*pins} & {*build_backend.get_requires_for_build_wheel()}
 
 
-@pytest.mark.long
+@pytest.mark.weekly
 def test_two_builds_have_the_same_bytes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("HATCH_BUILD_NO_HOOKS", "true")  # tests/cli/test_wheel.py looks at the FMUs in a wheel
     first, second = tmp_path / "first", tmp_path / "the second"

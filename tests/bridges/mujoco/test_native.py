@@ -21,22 +21,10 @@ import rov_fmu
 from rov_fmu.bridges.mujoco import mujoco_files
 from rov_fmu.bridges.mujoco.native import connector, library_in
 from rov_fmu.bridges.mujoco.source import water_sources
-from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.terms import equation_of
 from tests.bridges.test_mujoco import EULER, FILES, IMPLICIT, loaded, mujoco, scene
 from tests.commands import BARE
 
 Array = NDArray[np.float64]
-KINDS: dict[str, Callable[[Layout], bool]] = {
-    "dead time": lambda layout: layout.has_dead_time,
-    "lag": lambda layout: bool(layout.lagging),
-    "rotors": lambda layout: equation_of(layout).has_rotors,
-    "fins": lambda layout: bool(layout.fins),
-    "tables of thrust": lambda layout: bool(equation_of(layout).tables),
-    "pulse widths": lambda layout: layout.pulse is not None,
-    "a heading alone": lambda layout: not layout.has_attitude,
-    "roll and pitch": lambda layout: layout.has_attitude,
-}
 STEPS = 240
 
 
@@ -103,13 +91,16 @@ def assert_same(found: Array, expected: Array) -> None:
     assert (np.abs(found - expected) <= 1e-12 * np.maximum(1.0, np.abs(expected).max(axis=0))).all()
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_is_among_the_vehicles(kind: str) -> None:
-    assert any(KINDS[kind](rov_fmu.load(file).layout) for file in FILES.values())
-
-
-@pytest.mark.parametrize("integrator", [EULER, *IMPLICIT], ids=lambda one: one.name)
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize(
+    ("name", "integrator"),
+    [
+        pytest.param(
+            name, one, marks=() if n % 2 == 0 and n // 2 % 3 == m else pytest.mark.weekly, id=f"{name}-{one.name}"
+        )
+        for n, name in enumerate(FILES)
+        for m, one in enumerate((EULER, *IMPLICIT))
+    ],
+)
 def test_it_moves_as_in_python(name: str, integrator: int) -> None:
     """Also with dead time, lag, rotors, changed coefficients, and after resets to earlier and to later times."""
     vehicle, package = loaded(name)
@@ -335,6 +326,7 @@ def test_without_the_library_of_mujoco_the_step_is_in_python(monkeypatch: pytest
     assert type(connector(package.equation, library)(model)).__name__ == "Rov"
 
 
+@pytest.mark.long
 def test_the_folder_has_the_c_and_its_libraries_for_all_systems() -> None:
     bare = rov_fmu.load(BARE)
     files = mujoco_files(bare, "rov", {}, {})

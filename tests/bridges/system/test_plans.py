@@ -18,6 +18,7 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
 from tests.bridges.system.fmus import described, foreign, undescribed_build
 from tests.commands import without_progress
+from tests.often import spread
 
 PLAN = """
 step = 0.1
@@ -121,7 +122,7 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
+@pytest.mark.parametrize("case", spread(WRONG, [*WRONG][::2], WRONG))
 @pytest.mark.usefixtures("folder")
 def test_what_does_not_fit_is_one_line(
     case: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -96,14 +96,14 @@ def test_a_step_with_reversals_of_rotors_and_velocities_is_exact(name: str, h: f
 @pytest.mark.parametrize("name", ROTORS)
 def test_random_steps_are_exact(name: str) -> None:
     rov, rng = ROTORS[name], random.Random(name)
-    for _ in range(20):
+    for _ in range(6):
         _, inputs, state, h = random_case(rng, rov, longest=-0.3)
         assert max(errors(rov, inputs, state, h)) <= TOLERANCE, (inputs, state, h)
 
 
 @pytest.mark.long
 def test_commands_that_arrive_after_the_dead_time_turn_rotors_back_within_steps() -> None:
-    commands = 12
+    commands = 4
     rov = ROTORS["six axes"]
     late = Vehicle(replace(rov.layout, has_dead_time=True), {**rov.coefficients, "T_d": 0.013})
     rng = random.Random(commands)

@@ -25,7 +25,7 @@ UNTIED = {
 }
 ROVS = {name: tied(rov, **POINTS) for name, rov in UNTIED.items()}
 LENGTHS = (1e-3, 0.1, 10.0)
-_SOME = ("coupled", "six")
+_SOME = ("coupled",)
 
 
 def _of(y: object) -> NDArray[np.float64]:

@@ -41,11 +41,11 @@ ROVS = {
 }
 
 
-_SOME = ("videoray_dir", "everything3_dir", "outside3_dir")
+_SOME = ("videoray_dir", "everything3_dir")
 """The FMUs of the default tests: each vehicle once, and both versions of FMI."""
 
 
-@pytest.fixture(scope="module", params=spread(ROVS, _SOME, ["rotors_dir"]))
+@pytest.fixture(scope="module", params=spread(ROVS, _SOME, ["outside3_dir", "rotors_dir"]))
 def fmu(request: pytest.FixtureRequest) -> Fmu:
     """Return the FMU of the VideoRay, or of a vehicle with lag and coupling, with all effects, or with six axes.
 

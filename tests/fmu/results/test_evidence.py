@@ -33,7 +33,7 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import write_tuned, write_vehicle
 from tests.commands import BARE, make_key
 from tests.conftest import Made, without_page
-from tests.often import often
+from tests.often import often, spread
 from tests.vehicles import THRUST_EFFECTS
 
 Capsys = pytest.CaptureFixture[str]
@@ -260,7 +260,7 @@ def refused(capsys: Capsys) -> Callable[..., str]:
         META_DATA,
     ],
 )
-@pytest.mark.parametrize("version", ["videoray_fmu", "videoray3_fmu"])
+@pytest.mark.parametrize("version", spread(["videoray_fmu", "videoray3_fmu"], ["videoray3_fmu"]))
 def test_one_altered_byte_is_named(
     part: str, version: str, tmp_path: Path, refused: Callable[..., str], request: pytest.FixtureRequest
 ) -> None:
@@ -277,7 +277,7 @@ def test_one_altered_byte_is_named(
     )
 
 
-@often("stride", 7, 3, 1)
+@often("stride", 31, 7, 1)
 def test_no_byte_of_the_meta_data_can_be_altered(stride: int, tmp_path: Path) -> None:
     """Whether it is a name, a hash, a word or a part of the XML: the line names the meta-data."""
     files = {"a": b"1", "b": b"2"}
@@ -347,13 +347,12 @@ def signed_fmu(keys: Path, made_once: Made) -> Path:
 
 
 def test_a_signed_fmu_is_proved(signed_fmu: Path, keys: Path, capsys: Capsys) -> None:
-    for option in ([], ["--key", str(keys / "key.pub")]):
-        assert main(["prove", str(signed_fmu), *option]) == 0
-        out, err = capsys.readouterr()
-        assert err == ""
-        assert re.search(
-            r"All \d+ files are as they were built\. Signed with the key SHA256:\S{43}\.", " ".join(out.split())
-        )
+    assert main(["prove", str(signed_fmu), "--key", str(keys / "key.pub")]) == 0
+    out, err = capsys.readouterr()
+    assert err == ""
+    assert re.search(
+        r"All \d+ files are as they were built\. Signed with the key SHA256:\S{43}\.", " ".join(out.split())
+    )
     _check_meta_data(signed_fmu)
 
 

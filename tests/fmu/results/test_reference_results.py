@@ -22,6 +22,7 @@ from rov_fmu.fmu.reference_results import TOLERANCE, reference_results
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ROOT
+from tests.often import spread
 from tests.vehicles import at_rest, four_axes, still
 from verification.references import reference
 from verification.references.vehicles import IDENTIFIED
@@ -74,7 +75,7 @@ def _experiments(files: Mapping[str, bytes]) -> dict[str, Any]:
     return {x.get("name"): x for x in etree.fromstring(files[f"{FOLDER}/experiments.exp"])}
 
 
-@pytest.mark.parametrize("name", [*SHIPPED, "identified"])
+@pytest.mark.parametrize("name", spread([*SHIPPED, "identified"], ("videoray", "identified")))
 def test_the_files_have_the_form_of_the_standards(name: str) -> None:
     vehicle, files = _shipped(name)
     manifest = etree.fromstring(files[MANIFEST])

@@ -155,7 +155,7 @@ def measured(k: Vehicle, log: Record, seed: int = 1, lags: tuple[float, ...] = (
     return replace(log, value=log.value - off + noise)
 
 
-@pytest.mark.parametrize("lags", [(), (0.3, 0.5)])
+@pytest.mark.parametrize("lags", [pytest.param((), marks=pytest.mark.long), (0.3, 0.5)])
 @pytest.mark.parametrize(("longest", "near"), [(0.1, 0.01), pytest.param(0.00025, 2e-4, marks=pytest.mark.long)])
 def test_innovations_and_variances_are_those_of_a_textbook(
     longest: float, near: float, lags: tuple[float, ...]

@@ -76,7 +76,7 @@ def write(
         np.savetxt(folder / f"log_surge_{n}.csv", rows, "%.6g", ",", header=header, comments="")
 
 
-@pytest.mark.parametrize("quantity", ["velocity [m/s]", "distance [m]"])
+@pytest.mark.parametrize("quantity", ["velocity [m/s]", pytest.param("distance [m]", marks=pytest.mark.long)])
 def test_drag_relative_to_inertia_follows_from_logs_without_thrust(quantity: str, tmp_path: Path) -> None:
     """The velocity at the start is free. Drag alone and inertia alone stay open, as a free decay does not tell them."""
     write(tmp_path, HEAD + THRUSTER, quantity, [(1.2, 0.0), (-1.0, 0.0)])

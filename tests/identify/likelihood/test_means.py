@@ -147,7 +147,7 @@ def test_headings_that_were_averaged_across_north_are_left_out(rate: float, tmp_
     assert np.array_equal(depth, other), "a depth has no north"
 
 
-@pytest.mark.parametrize(("kind", "rate"), [("moments", 2.0), ("last values", 1.0), ("means", 1.0), ("means", 2.0)])
+@pytest.mark.parametrize(("kind", "rate"), [("moments", 2.0), ("means", 1.0)])
 def test_rows_are_told(kind: str, rate: float, tmp_path: Path) -> None:
     """J tells whether rows are means, and with means, the drag and the inertia are those of the simulation."""
     table(tmp_path, kind, rate)

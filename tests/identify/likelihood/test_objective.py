@@ -158,9 +158,8 @@ def test_the_gradient_is_that_of_j_where_the_model_is_wrong(tmp_path: Path) -> N
     check_gradient(objective, z)
 
 
-@pytest.mark.parametrize("threads", [2, 4])
 def test_the_number_of_threads_changes_no_bit(
-    objective: Objective, point: Array, threads: int, monkeypatch: pytest.MonkeyPatch
+    objective: Objective, point: Array, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def found(cores: int) -> bytes:
         monkeypatch.setattr("rov_fmu.identify.likelihood.objective.usable_cores", lambda: cores)
@@ -168,7 +167,7 @@ def test_the_number_of_threads_changes_no_bit(
         arrays = [best.z, best.information, *(one.gains for one in best.runs), *(one.slopes for one in best.data)]
         return b"".join(array.tobytes() for array in arrays)
 
-    assert found(threads) == found(1)
+    assert found(4) == found(1)
 
 
 def test_j_is_the_sum_of_its_parts(objective: Objective, point: Array) -> None:
@@ -184,6 +183,7 @@ def test_j_is_the_sum_of_its_parts(objective: Objective, point: Array) -> None:
     assert objective.value(point, runs) == pytest.approx(expected, rel=1e-12)
 
 
+@pytest.mark.long
 def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objective, point: Array) -> None:
     """Without each log and without each row, from the minimum for all data."""
     best = minimise(objective, point)

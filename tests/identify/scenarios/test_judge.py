@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.identify.scenarios.judge import Promise, broken, promises
+from tests.identify.scenarios.judge import broken, promises
 from tests.identify.scenarios.outcome import Band, Estimate, Outcome
 from tests.identify.scenarios.scenario import Expected
 
@@ -43,22 +43,9 @@ def wrong(outcomes: Sequence[Outcome], expected: Expected = COMPLETE, family: in
     return broken(promises(outcomes, expected), family)
 
 
-@pytest.mark.parametrize("n", [2, 20, 200])
 @pytest.mark.parametrize("expected", [COMPLETE, INCOMPLETE, OWNER])
-def test_kept_promises_pass(n: int, expected: Expected) -> None:
-    assert wrong(seeds(n), expected, family=300) == []
-
-
-# ---- Chance ----------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("p_values", "family", "failed"),
-    [((0.0003, 0.0004, 0.5), 0, "ab"), ((0.0003, 0.0006, 0.5), 0, "a"), ((0.0009,), 10, ""), ((0.0,), 10**9, "a")],
-)
-def test_holms_correction(p_values: Sequence[float], family: int, failed: str) -> None:
-    """The smallest of m probabilities is compared with 0.1 %/m, the next with 0.1 %/(m - 1) ..."""
-    assert broken([Promise(name, p) for name, p in zip("abc", p_values, strict=False)], family) == [*failed]
+def test_kept_promises_pass(expected: Expected) -> None:
+    assert wrong(seeds(20), expected, family=300) == []
 
 
 # ---- Each promise can be broken --------------------------------------------------------------------------------------
@@ -107,28 +94,3 @@ def test_some_runs_may_be_wrong_and_no_more(
         assert with_changes(passes) == []
     if fails:
         assert any(found.startswith(words) for found in with_changes(fails))
-
-
-@pytest.mark.parametrize(("n", "share"), [(2, 1.0), (5, 0.6), (200, 0.2)])
-def test_intervals_that_cover_too_seldom_fail(n: int, share: float) -> None:
-    found = wrong(seeds(n, lambda seed, _: seed % 20 < min(n, 20) * share), family=300)
-    assert found
-    assert all("intervals cover" in words for words in found)
-
-
-def test_intervals_that_always_cover_fail_if_the_data_narrow_them() -> None:
-    """V_ss has a least error, and an interval may be that of the prior: these may cover always."""
-    always = seeds(200, lambda *_: False)
-    assert wrong(always, family=1000) == ["as many as 600 of 600 intervals cover"]
-    wide = [replace(o, estimates=tuple(replace(e, narrowed=0.9) for e in o.estimates)) for o in always]
-    assert wrong(wide) == []
-
-
-def test_a_bias_fails() -> None:
-    """The intervals are ± 10 %, so a standard error is 5.1 %: 200 seeds allow about 2 %, and 2 seeds more."""
-    assert wrong(seeds(200, offset=0.019)) == []
-    found = wrong(seeds(200, offset=0.04))
-    assert len(found) == len(TRUTHS)
-    assert all("a bias of 4.0%" in words for words in found)
-    assert wrong(seeds(2, offset=0.04)) == []
-    assert wrong(seeds(2, offset=0.04, half=0.01))

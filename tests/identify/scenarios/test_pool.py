@@ -5,13 +5,14 @@ import random
 import numpy as np
 import pytest
 
+from tests.often import spread
 from tests.vehicles import VEHICLES, at_rest, still
 from verification.references.pool import Array, swim
 
 STEP = 0.25
 
 
-@pytest.mark.parametrize("name", [name for name, k in VEHICLES.items() if not k.layout.mix])
+@pytest.mark.parametrize("name", spread([n for n, k in VEHICLES.items() if not k.layout.mix], ["VideoRay", "Heavy"]))
 def test_a_swim_is_that_of_the_exact_step(name: str) -> None:
     """Every thruster has random commands of 1 s in a current; missing degrees of freedom have no effect."""
     k = VEHICLES[name]

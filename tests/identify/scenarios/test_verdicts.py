@@ -1,16 +1,16 @@
 """Verdicts of vehicles drawn anew: right models are good, and no answer that is far off is called good."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from tests.identify.scenarios.drawn import Drawn, Fault
 from tests.identify.scenarios.judge import at_least
-from tests.identify.scenarios.outcome import Estimate, Outcome, outcome
+from tests.identify.scenarios.outcome import outcome
 from tests.identify.scenarios.verdicts import RIGHT, WRONG, Line, broken, off, run
 
 
+@pytest.mark.long
 def test_a_right_model_is_good() -> None:
     """The others are run every week."""
     line = Line.of([run("load of 0.6 %", 0)])
@@ -38,17 +38,3 @@ def test_verdicts_keep_what_they_promise(seed: int) -> None:
     right = Line.of([o for name in RIGHT for o in kept[name]])
     assert at_least("good", right.words.count("good"), len(right.words), 0.9).p_value > 0.001
     assert right.coverage > 0.8
-
-
-def test_what_a_line_says() -> None:
-    """An answer is off by the logarithm of its ratio to the truth, in half-widths; another sign is infinitely far."""
-    near = Estimate("surge", "V_ss 50 %", 1.1, (1.0, 1.21), 1.0)
-    assert off(near) == pytest.approx(1.0)
-    assert off(replace(near, value=-1.1)) == float("inf")
-    far = replace(near, truth=0.5)
-    kept = [
-        Outcome((near, far, replace(near, interval=None)), verdicts={"surge": "good", "yaw": "usable"}, seconds=2.0)
-    ]
-    line = Line.of(kept)
-    assert (line.words, line.good, line.coverage, line.far) == (["good", "usable"], 0.5, 0.5, (1, 1))
-    assert [words.partition(" ")[0] for words in broken({"tether": kept})] == ["1"]

@@ -9,16 +9,16 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify.assess import answers, answers_of_file, commands_of_answers
+from rov_fmu.identify.assess import answers, answers_of_file
 from rov_fmu.identify.assess import tested_commands as of_tests
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.result import Tested, half_width
+from rov_fmu.identify.result import Tested
 from rov_fmu.tank.arrays import Array
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import REFIT
 from tests.folders import HEAD, MASS, TURNS, folder_of, responses
 from tests.identify.conftest import FORCES
@@ -33,57 +33,6 @@ def of_drag(deviation: float) -> Posterior:
     drag = Parameter("quadratic drag", "surge", is_log=True, sets=("a_d_u",))
     table = Table(VIDEORAY.layout, VIDEORAY.coefficients, {}, (drag,))
     return Posterior(table, np.log([VIDEORAY["a_d_u"]]), np.array([[deviation**2]]))
-
-
-def test_answers_are_as_uncertain_as_the_drag_and_the_vehicle_file() -> None:
-    """The file has other curves than the fit, and none is exact."""
-    uncertain, file = of_drag(0.04), VIDEORAY.with_(b_d_u=1.1 * VIDEORAY["b_d_u"])
-    axis = VIDEORAY.layout.by_name["surge"]
-
-    def numbers(rov: Vehicle, command: float) -> np.ndarray:
-        V, Tau = rov.response(SURGE, command)
-        return np.array([abs(V), Tau, rov.alone(SURGE, rov.layout.usual_inputs).stopping_distance(abs(V), 0.1)])
-
-    more, less = (VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(s)) for s in (0.01, -0.01))
-    found = answers([uncertain], SURGE, file, FULL)
-    assert axis
-    assert [one.command for one in found] == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0]
-    for answer in found:
-        c = answer.command
-        slopes = np.log(numbers(more, c) / numbers(less, c)) / 0.02
-        half = t.ppf(0.975, 10) * 0.04 * np.abs(slopes)
-        for (value, (low, high)), number, fitted, width in zip(
-            (answer.steady, answer.rise, answer.stop), numbers(file, c), numbers(VIDEORAY, c), half, strict=True
-        ):
-            assert abs(value) == pytest.approx(number)
-            assert low < value < high
-            ends = np.minimum(fitted * np.exp(-width), number * 0.99), np.maximum(fitted * np.exp(width), number * 1.01)
-            assert sorted(map(abs, (low, high))) == pytest.approx(ends, rel=1e-3)
-    for answer in answers([of_drag(0.0)], SURGE, VIDEORAY, FULL):
-        for value, (low, high) in (answer.steady, answer.rise):
-            assert sorted((low / value, high / value)) == pytest.approx([np.exp(-0.01), np.exp(0.01)])
-
-
-def test_the_time_with_the_lag_is_as_certain_as_the_tests_tell_it_and_not_its_parts() -> None:
-    """The tests tell the sum of both times, not how it is shared: a longer lag goes with less inertia."""
-    rov = extended(VIDEORAY, T_rear=0.2)
-    lag, inertia = Parameter("lag", ""), Parameter("inertia", "surge", is_log=True)
-    table = Table(rov.layout, rov.coefficients, {}, (lag, inertia))
-    z = np.array([0.2, np.log(rov.effective_inertia(rov.layout.by_name["surge"]))])
-
-    def half(posterior: Posterior) -> float:
-        (lagged,) = (one.lagged for one in answers([posterior], SURGE, rov, FULL) if one.command == 0.5)
-        assert lagged
-        assert lagged[1][0] < lagged[0] < lagged[1][1]
-        return half_width(lagged)
-
-    alone, opposed, equal = (
-        half(Posterior(table, z, np.array([[0.03**2, r * 0.03 * 0.1], [r * 0.03 * 0.1, 0.1**2]])))
-        for r in (0.0, -0.9, 0.9)
-    )
-    assert opposed < alone < equal
-    assert alone**2 == pytest.approx(0.5 * (opposed**2 + equal**2), rel=0.05), "as variances add"
-    assert not any(one.lagged for one in answers([of_drag(0.04)], SURGE, VIDEORAY, FULL)), "it has no lag"
 
 
 def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_tests_are_wider() -> None:
@@ -163,11 +112,3 @@ def test_a_steady_table_tests_its_commands_and_thrust_tables_test_none(tmp_path:
     known, logs, rows = begin(tests)
     objective = Objective.of_known(known, logs, rows)
     assert of_tests(objective, objective.mean)[HEAVE] == (0.7, 0.8)
-
-
-@pytest.mark.parametrize(
-    ("tested", "more"),
-    [((0.7, 0.57), [-0.7, 0.57]), ((0.0, 0.5), []), ((0.31, 0.97), []), ((0.04, 0.6), [0.6])],
-)
-def test_the_strongest_tested_commands_are_answered_unless_they_are_usual(tested: Tested, more: list[float]) -> None:
-    assert commands_of_answers(tested) == [0.3, -0.3, 0.5, -0.5, 1.0, -1.0, *more]

@@ -30,6 +30,7 @@ from rov_fmu.vehicle.writer import vehicle_text
 from tests.folders import HEAD, folder_of, read, responses
 from tests.identify.scenarios.drawn import Drawn
 from tests.identify.scenarios.verdicts import RIGHT
+from tests.often import spread
 from tests.report.pages import text_of
 from tests.report.test_report import leave_plots_out
 from tests.vehicles import VIDEORAY
@@ -65,7 +66,7 @@ def drawn(base: str, *columns: str) -> tuple[Array, dict[str, Array]]:
     return time, commands | {name: np.sin((1.0 + 0.1 * n) * time) for n, name in enumerate(columns)}
 
 
-@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("base", spread(BASES, ["bluerov2"]))
 def test_a_dive_that_shows_no_turn_concerns_only_the_axes_that_it_shows(base: str, tmp_path: Path) -> None:
     """With a heading, roll or pitch, the others stay: only their drag and inertia are uncertain beside the tests'."""
     folder = folder_of(tmp_path, f'base = "{base}"\n{HEAD}', {})
@@ -156,6 +157,7 @@ def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> Non
         assert low < truth < high
 
 
+@pytest.mark.long
 def test_it_is_told_why_a_log_identifies_no_axis(tmp_path: Path) -> None:
     """Nobody steers, and the heading is logged; nothing shows surge and sway."""
     rov, time = load("bluerov2"), np.arange(0.0, 20.0, 0.2)
@@ -188,7 +190,7 @@ def surfaces(result: Identification, monkeypatch: pytest.MonkeyPatch) -> Iterato
     yield "page of the FMU", text_of(documentation_page(result.vehicle))
 
 
-@pytest.mark.parametrize("tested", [(HEAVE, YAW), (YAW,)])
+@pytest.mark.parametrize("tested", spread([(HEAVE, YAW), (YAW,)], [(YAW,)]))
 def test_every_surface_has_the_same_word_for_every_axis(
     tested: tuple[Axis, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

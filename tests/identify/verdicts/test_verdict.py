@@ -66,31 +66,11 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
             "An unknown slow velocity over ground of 1.0 N (RMS) acts in log.csv.",
         ),
         (
-            {"answers": results.answers(1.0, 0.2)},
-            "usable",
-            "The steady velocity at -100% is known to no better than 20% of the largest tested one.",
-        ),
-        ({"answers": ()}, "do not use", "No steady velocity is determined."),
-        (
             {"slips": [Slip("log.csv", "depth", "is it in cm", 20.0)]},
             "do not use",
             "The depth in log.csv seems to have another unit or sign, and all axes are fitted to this log.",
         ),
-        ({"effects": [SLOW]}, "usable", "The time constant of the thrusters is unusual."),
         ({"effects": [replace(SLOW, beyond=0.96)]}, "good", ""),
-        ({"is_assumed": True}, "usable", "The mass and the thrusters are assumed."),
-        ({"difference": 40.5}, "do not use", "Two starts of the fit led to different vehicles."),
-        (
-            {"structure": 4.2},
-            "usable",
-            "The model's errors are 4.2 times what noise explains, so it lacks something.",
-        ),
-        (
-            {"inertia": 0.8},
-            "do not use",
-            "The inertia is at most 80% of that of the vehicle in air, which cannot be: check the unit of velocity, "
-            "the mass, and a thrust that is assumed.",
-        ),
     ],
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:

@@ -47,8 +47,11 @@ def test_each_thruster_moves_the_model_as_the_page_says(page: str) -> None:
 
 @pytest.mark.parametrize("kind", ["a dive", "no commands", "a vehicle of one's own", "refused", "a draft"])
 def test_the_page_names_the_next_step_that_the_terminal_names(
-    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    monkeypatch.setattr(
+        "rov_fmu.report.inspection_page.inline_svg", lambda *_, **__: ""
+    )  # which takes most of the time
     folder = tmp_path / "dives"
     folder.mkdir()
     if kind == "no commands":

@@ -57,7 +57,10 @@ COMPRESSED = [
 """The version of ROS, the suffix, and the compression: of the pieces of a file, of each message or of the file."""
 
 
-@pytest.mark.parametrize(("version", "suffix", "compression"), COMPRESSED)
+@pytest.mark.parametrize(
+    ("version", "suffix", "compression"),
+    [pytest.param(*one, marks=pytest.mark.long if n % 3 else ()) for n, one in enumerate(COMPRESSED)],
+)
 def test_compressed_bags_are_those_that_were_compressed(
     version: int, suffix: str, compression: tuple[Any, ...], tmp_path: Path
 ) -> None:

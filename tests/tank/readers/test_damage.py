@@ -15,6 +15,7 @@ from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.folder import folder_and_files
 from rov_fmu.tank.readers.listing import list_files
 from rov_fmu.tank.readers.parsers import one_parser, read_topics
+from tests.often import spread
 from tests.tank.logs import Read, measured, read_log
 from tests.tank.readers.motion import BLUEROV2, DEPTH, DIVE
 from tests.tank.readers.writers import Ros, bag, messages_of
@@ -87,7 +88,11 @@ def _depths(log: Read) -> int:
     return len(values)
 
 
-@pytest.mark.parametrize("name", RECORDED)
+CUT_FILES = ("MCAP with zstd", "MCAP without chunks", "ROS 1 with lz4", "ROS 2")
+"""Those of the default tests: each way of storing messages, and of compressing chunks."""
+
+
+@pytest.mark.parametrize("name", spread(RECORDED, CUT_FILES, RECORDED))
 def test_a_file_that_was_cut_is_read_up_to_the_cut(name: str, tmp_path: Path) -> None:
     """Its end is missing, or the disk has zeros there."""
     path = RECORDED[name](tmp_path)
@@ -101,7 +106,7 @@ def test_a_file_that_was_cut_is_read_up_to_the_cut(name: str, tmp_path: Path) ->
         assert any(CUT in line for line in sentences(log.findings))
 
 
-@pytest.mark.parametrize("name", [*RECORDED][:4])
+@pytest.mark.parametrize("name", spread([*RECORDED][:4], ["MCAP with zstd", "MCAP without chunks"], ["MCAP"]))
 def test_a_chunk_that_is_damaged_costs_only_itself(name: str, tmp_path: Path) -> None:
     """A kB of other bytes stands in the middle of a whole file."""
     path = RECORDED[name](tmp_path)
@@ -118,6 +123,7 @@ def test_a_chunk_that_is_damaged_costs_only_itself(name: str, tmp_path: Path) ->
         assert any(("left out" if is_chunked else CUT) in line for line in sentences(log.findings))
 
 
+@pytest.mark.long
 def test_the_longer_a_file_is_the_more_is_read(tmp_path: Path) -> None:
     for name in ("MCAP with zstd", "ROS 1", "ROS 2"):
         folder = tmp_path / name

@@ -68,8 +68,14 @@ def test_a_time_of_day_goes_on_over_midnight(clock: str, tmp_path: Path) -> None
         assert times(tmp_path, title, [CLOCKS[clock](at) for at in AT]) == pytest.approx(SINCE_MIDNIGHT)
 
 
-@pytest.mark.parametrize("date", DATES)
-@pytest.mark.parametrize("clock", CLOCKS)
+@pytest.mark.parametrize(
+    ("date", "clock"),
+    [
+        pytest.param(date, clock, marks=() if c == d % len(CLOCKS) else pytest.mark.weekly)
+        for d, date in enumerate(DATES)
+        for c, clock in enumerate(CLOCKS)
+    ],
+)
 def test_a_date_may_stand_in_its_own_column_or_before_the_time(date: str, clock: str, tmp_path: Path) -> None:
     """It changes at midnight, which also tells whether the day or the month comes first."""
     own = [(at.strftime(DATES[date]), CLOCKS[clock](at)) for at in AT]
