@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
-from rov_fmu.io.columns import read_columns
+from rov_fmu.io.columns import Column, read_columns
 from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
 from rov_fmu.tank.columns import TIME, columns_of
