@@ -116,7 +116,6 @@ def test_a_cause_is_weighed_by_the_integrals_over_its_size_and_over_that_of_the_
 @pytest.mark.parametrize(
     ("evidence", "names"),
     [
-        ({}, ""),
         ({"a": 5.9}, ""),
         ({"a": 6.1}, "a"),
         ({"a": 6.1, "b": -3.0}, ""),

@@ -309,7 +309,7 @@ def best_explanations(evidence: Mapping[_Key, float]) -> list[_Key]:
     `evidence` has 2 ln of the Bayes factor of each against none. Something else is as probable before as the whole
     list, and each on the list as another.
     """
-    least = max(KEPT + 2.0 * log(len(evidence) or 1), max(evidence.values(), default=0.0) - KEPT)
+    least = max(KEPT + 2.0 * log(len(evidence)), max(evidence.values()) - KEPT)
     return [key for key in sorted(evidence, key=evidence.__getitem__, reverse=True) if evidence[key] > least]
 
 
