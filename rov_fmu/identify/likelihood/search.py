@@ -368,7 +368,9 @@ def fitted(
     is None if one diverges from both, or if the evidence of thinned logs is below `enough`.
     """
     thinned, objective = applied(plain, starts, thinned=True), applied(plain, starts)
-    for z in (np.where(thinned.mean == near.objective.mean, near.minimum.z, thinned.mean), start_of(thinned)):
+    ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
+    there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
+    for z in (there, start_of(thinned)):
         with suppress(DivergedError):
             end = minimise(thinned, begun(thinned, z, starts), enough=QUICK, last=False)
             quick = evidence(thinned, end)
