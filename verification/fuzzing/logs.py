@@ -93,10 +93,10 @@ def _inspected(path: Path) -> tuple[str, float, float]:
     """
     printed, told = StringIO(), StringIO()
     begin = time.monotonic()
-    _forget_peaks()
+    before = forget_peaks()
     with redirect_stdout(printed), redirect_stderr(told):
         code = main(["inspect", str(path)])
-    seconds, memory = time.monotonic() - begin, _peak()
+    seconds, memory = time.monotonic() - begin, peak_since(before)
     lines = told.getvalue().splitlines()
     assert code in (0, 2), f"exit code {code}: {lines}"
     if code and not (lines and all(line.startswith(f"rov-fmu: {path}") and line.isprintable() for line in lines)):
@@ -110,15 +110,24 @@ def _processes() -> list[Path]:
     return [Path("/proc/self"), *(Path("/proc", child) for text in texts for child in text.split())]
 
 
-def _forget_peaks() -> None:
-    if sys.platform == "linux":
-        for process in _processes():
-            (process / "clear_refs").write_text("5", encoding="ascii")
+def forget_peaks() -> int:
+    """Begin to measure the memory of this process and its children anew, and return the peak of those that ended."""
+    if sys.platform != "linux":
+        return 0
+    import resource
+
+    for process in _processes():
+        (process / "clear_refs").write_text("5", encoding="ascii")
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
 
 
-def _peak() -> float:
+def peak_since(before: int) -> float:
     """Return the peaks of the memory of this process and of its children together, bytes; 0 on other systems than
-    Linux. Children that have ended count as the largest one that ever ended."""
+    Linux.
+
+    Of the children that ended, Linux tells only the largest peak since this process began. It counts if it has grown
+    since `before`, what `forget_peaks` returned: others may have started larger programs in this process.
+    """
     if sys.platform != "linux":
         return 0.0
     import resource
@@ -126,4 +135,4 @@ def _peak() -> float:
     rows = [(process / "status").read_text(encoding="utf-8").splitlines() for process in _processes()]
     own, *children = (int(row.split()[1]) for status in rows for row in status if row.startswith("VmHWM"))
     ended = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
-    return 1024.0 * (own + max(sum(children), ended))
+    return 1024.0 * (own + max(sum(children), ended if ended > before else 0))
