@@ -155,11 +155,11 @@ def answers(
     ratios = [abs(push) / strongest_of(tested, push) for push in pushes or commands]
     beyond = (_EXPONENT * np.log(np.maximum(ratios, 1.0))) ** 2
     ends = [own - narrowest, own + narrowest]
+    of_table = partial(logarithms, axis=axis, commands=commands, pushes=pushes, with_lag=with_lag)
 
     def fitted(table: Table, z: Array) -> Array:
         return of_table(table)(z[:, None]).reshape(own.shape)
 
-    of_table = partial(logarithms, axis=axis, commands=commands, pushes=pushes, with_lag=with_lag)
     for posterior in posteriors:
         with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
             slopes = posterior.slopes(of_table(posterior.table))

@@ -110,29 +110,32 @@ def _processes() -> list[Path]:
     return [Path("/proc/self"), *(Path("/proc", child) for text in texts for child in text.split())]
 
 
+def _largest_that_ended() -> int:
+    """Return the largest peak of the memory of all children that ended since this process began, KiB."""
+    import resource  # not on Windows
+
+    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+
+
 def forget_peaks() -> int:
-    """Begin to measure the memory of this process and its children anew, and return the peak of those that ended."""
+    """Begin to measure the memory anew, and return what `peak_since` needs: the peak of children that ended, KiB."""
     if sys.platform != "linux":
         return 0
-    import resource
-
     for process in _processes():
         (process / "clear_refs").write_text("5", encoding="ascii")
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    return _largest_that_ended()
 
 
 def peak_since(before: int) -> float:
     """Return the peaks of the memory of this process and of its children together, bytes; 0 on other systems than
     Linux.
 
-    Of the children that ended, Linux tells only the largest peak since this process began. It counts if it has grown
-    since `before`, what `forget_peaks` returned: others may have started larger programs in this process.
+    Of the children that ended, Linux tells only the largest peak since this process began. It counts if it is larger
+    than `before`, what `forget_peaks` returned: larger programs may have ended earlier.
     """
     if sys.platform != "linux":
         return 0.0
-    import resource
-
     rows = [(process / "status").read_text(encoding="utf-8").splitlines() for process in _processes()]
     own, *children = (int(row.split()[1]) for status in rows for row in status if row.startswith("VmHWM"))
-    ended = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    ended = _largest_that_ended()
     return 1024.0 * (own + max(sum(children), ended if ended > before else 0))

@@ -193,7 +193,7 @@ class SampledLog:
     @property
     def is_slow_table(self) -> bool:
         """True if its measurements have the times of its commands, and these are so far apart that J tells means from
-        values of a moment: a mean is late by half the time between rows, and a usual lag of the thrusters by less."""
+        values of a moment. A mean is late by half the time between rows, which must be more than a usual lag."""
         commands = self.log.commands
         assert commands
         return 0.5 * self.interval > PRIORS[LAG].deviation and all(

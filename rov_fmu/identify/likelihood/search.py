@@ -363,11 +363,12 @@ def fitted(
 ) -> StructureFit | None:
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
-    `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. The fit begins where another
-    one ended, but where the hypotheses expect something else, and from scratch if a motion diverges there. The result
-    is None if one diverges from both, or if the evidence of thinned logs is below `enough`.
+    `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
+    fit `near` ended, or at its prior mean if the hypotheses change that. If a motion diverges from there, all begin as
+    in a first fit. The result is None if a motion diverges from both starts, or if the evidence of thinned logs is
+    below `enough`.
     """
-    thinned, objective = applied(plain, starts, thinned=True), applied(plain, starts)
+    thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
     for z in (there, start_of(thinned)):
@@ -376,6 +377,7 @@ def fitted(
             quick = evidence(thinned, end)
             if not quick > enough:
                 return None
+            objective = applied(plain, starts)
             return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
     return None
 
@@ -475,8 +477,8 @@ class StructureSearch:
     def _explains(self, suspect: Suspect) -> bool:
         """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger.
 
-        The loss by errors is ln R. As with the score of predictions, it falls by half, from the model without it to the
-        noise, where R is 1.
+        The loss by errors is ln R, as in the score of predictions: it is 0 where noise alone is left (R = 1). A
+        hypothesis that explains the errors takes away at least half of it.
         """
         (kind, of), layout = suspect, self.now.objective.table.layout
         if not HYPOTHESES[kind].changes_thrust or HYPOTHESES[kind].has_times:

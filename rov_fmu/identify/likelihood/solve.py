@@ -68,10 +68,11 @@ def minimise(
 
     All runs take the steps of the first one: J jumps by a few units where other parameters need other steps. The first
     derivatives are those `near` the start, if they are given. The fit ends when derivatives twice in turn reduce J by
-    less than `enough`, the second time exact ones. It ends early where the minimum within reach, and the reduction of J
-    by the derivatives before, which is infinite at first, promise nothing. Data and information of a `last` fit have
-    exact derivatives: those of the step before if J hardly fell, and otherwise others, after one more step with them,
-    unless motions beside the minimum diverge. Those of a fit that is not the last are of the step before.
+    less than `enough`, the second time exact ones. It ends early if `promises` returns False. This gets the minimum
+    within reach, and the reduction of J by the derivatives before, which is infinite at first. Data and information of
+    a `last` fit have exact derivatives: those of the step before if J hardly fell, and otherwise others, after one more
+    step with them, unless motions beside the minimum diverge. Those of a fit that is not the last are of the step
+    before.
     """
     z = np.clip(start, objective.low, objective.high)
     runs = objective.runs(z)
@@ -155,7 +156,7 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
 
 
 def _within_reach(objective: Objective, minimum: Minimum) -> Minimum:
-    """Return the minimum if a step reduces J by twice what is expected."""
+    """Return what is reached if the next step reduces J by twice what is expected of it."""
     gradient, information = total(objective, minimum.z, minimum.data)
     change = _step(objective, minimum.z, gradient, information, np.ones(len(minimum.z), bool), 0.0) - minimum.z
     value = minimum.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change)
@@ -306,8 +307,8 @@ def laplace(J: float, information: Array) -> float:
 def best_explanations(evidence: Mapping[_Key, float]) -> list[_Key]:
     """Return which explanations of a list are told, the best first: those near the best, if they are better than none.
 
-    `evidence` has 2 ln of the Bayes factor of each against none. Something else is as probable before as the whole
-    list, and each on the list as another.
+    `evidence` has 2 ln of the Bayes factor of each against none. Before the data, none of them is as probable as all
+    together, and each is as probable as any other.
     """
     least = max(KEPT + 2.0 * log(len(evidence)), max(evidence.values()) - KEPT)
     return [key for key in sorted(evidence, key=evidence.__getitem__, reverse=True) if evidence[key] > least]

@@ -55,8 +55,8 @@ def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[Unknow
 def _evidence(objective: Objective, best: Minimum, index: int) -> float:
     """Return 2 ln of the Bayes factor of a slow process, from a fit of all other parameters without it.
 
-    The fit ends early where strong evidence is certain: the minimum within reach is not low enough. What the data tell
-    of the other parameters is taken as the same without it: that of small sizes is rough.
+    The fit ends early where strong evidence is certain: the minimum within reach is not low enough. The information
+    about the other parameters is taken to be the same without it, because that about small sizes is rough.
     """
     without, with_it = objective.without([index]), evidence(objective, best)
 

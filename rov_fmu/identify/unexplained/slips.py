@@ -58,8 +58,9 @@ _CERTAIN, _WEIGHED = 2.0, 0.05
 and the water inside change from dive to dive."""
 _CLOSE = KEPT + 2.0 * QUICK
 """Up to which difference of evidence quick fits go on to their end, each of which may be QUICK from it."""
-_LEFT = 3.0
-"""A fit goes on while J may still fall by so many times what it just fell by: each step by 3/4 of the step before."""
+_REST = 3.0
+"""J may still fall by so many times what it fell by in the last step: the sum of steps that each gain 3/4 of the one
+before. A fit that cannot come close to the best one by this is given up."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -127,10 +128,13 @@ def slips(
     light = {axis for axis, ratio, error in inertias if ratio < -_CERTAIN * error}
     suspected = {one: scales for one in compared if (scales := [*one.scales, *_customary(one, compared, light)])}
     frames = {*_frames(compared)}
-    untried = {*_scalings(suspected), *frames}
+    untried, as_it_is = {*_scalings(suspected), *frames}, frozenset[tuple[_Match, float]]()
     if not untried:
         return (), inf
-    fits = dict[Scaling, tuple[Objective, Minimum]]()
+    fits, found = dict[Scaling, tuple[Objective, Minimum]](), dict[Scaling, float]()
+
+    def is_close(value: float) -> bool:
+        return value > max(found.values(), default=-inf) - _CLOSE
 
     def fit(scaling: Scaling, start: Array | None = None, most: int = MOST_STEPS) -> float:
         """Return the evidence of a quick fit, or of one to its end if a quick fit was made before."""
@@ -138,7 +142,7 @@ def slips(
         unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
         def promises(end: Minimum, gain: float) -> bool:
-            return not scaling or is_close(evidence(quick, end) + _LEFT * gain - unlikely)
+            return is_close(evidence(quick, end) + _REST * gain - unlikely)
 
         try:
             if is_exact := scaling in fits:
@@ -153,21 +157,17 @@ def slips(
         fits[scaling] = quick, end
         return evidence(quick, end) - unlikely
 
-    found = dict[Scaling, float]()
-    as_it_is = fit(frozenset(), best, 1)
-
-    def is_close(value: float) -> bool:
-        return value > max((as_it_is, *found.values())) - _CLOSE
-
+    found[as_it_is] = fit(as_it_is, best, 1)
     while untried:  # The best explanation may need fewer channels than it has.
         found |= {one: fit(one) for one in untried}
         found |= {one: fit(one) for one in untried if is_close(found[one])}
-        first = max(found, key=lambda one: found[one])
+        first = max(filter(None, found), key=lambda one: found[one])
         fewer = {first - {member} for member in first} if first not in frames and is_close(found[first]) else set()
-        untried = fewer - found.keys() - {frozenset()}
-    if is_close(found[first]) and is_close(as_it_is):
-        as_it_is = fit(frozenset())
-    gains, told = {one: value - as_it_is for one, value in found.items()}, dict[tuple[str, str], dict[str, float]]()
+        untried = fewer - found.keys()
+    if is_close(found[first]) and is_close(found[as_it_is]):
+        found[as_it_is] = fit(as_it_is)
+    gains = {one: value - found[as_it_is] for one, value in found.items() if one}
+    told = dict[tuple[str, str], dict[str, float]]()
     for scaling in best_explanations(gains):
         for match, scale in scaling:
             name, question = match.channel.quantity.name, _words(match.channel, scale)
