@@ -334,6 +334,9 @@ static outcome set_values(fmu *f, const unsigned vr[], size_t n, const double va
     if (coefficient) {
         model_prepare(f->now.values, &f->numbers);
     }
+    if (!f->now.has_moved) {
+        current_keep(f->now.values); /* the current of the first step is the one before it */
+    }
     if (f->now.mode == INSTANTIATED || f->now.mode == INITIALIZATION) {
         replace_guess(f, vr, n, value);
     }
@@ -642,6 +645,7 @@ static outcome advance(fmu *f, double t, double h, int *cuts)
     }
     memcpy(&f->now.values[FIRST_STATE], next, sizeof next);
     delay_commit(f->now.values, &f->now.line, f->now.time, h);
+    f->now.has_moved = KEEPS_CURRENT;
     f->now.heading = heading;
     f->now.time = t + h; /* the model is autonomous: whatever t says, h seconds have passed */
     check_depth(f);

@@ -62,11 +62,18 @@ typedef enum { TYPE_MODEL_EXCHANGE, TYPE_CO_SIMULATION } interface_type;
 /* The result of a call. The numbers are those of fmi2Status and fmi3Status. */
 typedef enum { DONE, WARNED, DISCARDED, REFUSED } outcome;
 
+/* Whether the current during the step before is part of the state, and so whether there was a step. */
+#ifdef CURRENT_PASSES
+enum { KEEPS_CURRENT = 1 };
+#else
+enum { KEEPS_CURRENT = 0 };
+#endif
+
 /* The data that an FMU state saves: everything that a run depends on. Calculated variables follow from it. */
 typedef struct {
     interface_type type;
     lifecycle mode;
-    bool experiment_defined, stop_defined;
+    bool experiment_defined, stop_defined, has_moved; /* the last one stays false unless KEEPS_CURRENT */
     double time, stop, heading; /* the heading counts turns; only a vehicle with an attitude uses it */
     double values[N_VARIABLES]; /* by place */
     delay_line line;            /* the changes of commands that wait for the dead time */

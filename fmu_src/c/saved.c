@@ -201,7 +201,7 @@ static outcome serialize(fmu *f, void *state, unsigned char bytes[], size_t size
     memcpy(bytes + MAGIC_SIZE, MODEL_TOKEN, TOKEN_SIZE);
     put_word(&to, (uint64_t)s->type);
     put_word(&to, (uint64_t)s->mode);
-    put_word(&to, (s->experiment_defined ? 1u : 0u) | (s->stop_defined ? 2u : 0u));
+    put_word(&to, (s->experiment_defined ? 1u : 0u) | (s->stop_defined ? 2u : 0u) | (s->has_moved ? 4u : 0u));
     put_double(&to, s->time);
     put_double(&to, s->stop);
     if (HAS_ATTITUDE) {
@@ -225,13 +225,14 @@ static outcome deserialize(fmu *f, const unsigned char bytes[], size_t size, voi
     REQUIRE(get_word(&from) == checksum(bytes, SERIALIZED_SIZE - 8), "the bytes are damaged.");
     from = bytes + MAGIC_SIZE + TOKEN_SIZE;
     const uint64_t type = get_word(&from), mode = get_word(&from), flags = get_word(&from);
-    REQUIRE(type <= 1 && mode <= FAILED && flags <= 3, "the bytes are damaged.");
+    REQUIRE(type <= 1 && mode <= FAILED && flags <= (KEEPS_CURRENT ? 7 : 3), "the bytes are damaged.");
     fmu_state s;
     memset(&s, 0, sizeof s);
     s.type = (interface_type)type;
     s.mode = (lifecycle)mode;
     s.experiment_defined = (flags & 1u) != 0;
     s.stop_defined = (flags & 2u) != 0;
+    s.has_moved = (flags & 4u) != 0;
     s.time = get_double(&from);
     s.stop = get_double(&from);
     s.heading = HAS_ATTITUDE ? get_double(&from) : 0.0;

@@ -58,6 +58,9 @@ void begin(void)
 int step(double h)
 {
     double next[N_STATES];
+    if (elapsed == 0.0) {
+        current_keep(at); /* the current of the first step is the one before it */
+    }
     const bool done = delayed_step(at, &numbers, &line, elapsed, h, next, &heading) > 0 && all_finite(next, N_STATES);
     if (done) {
         memcpy(at + FIRST_STATE, next, sizeof next);

@@ -86,8 +86,6 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
     def exit_initialization_mode(self) -> None:
         """Begin the simulation. From now on, only inputs and tunable parameters change."""
         self.is_initialized = True
-        self.memory.current = {before: self.values[name] for name, before in self.memory.names_before.items()}
-        self.values |= self.memory.current
 
     def set_real(self, references: list[int], values: list[float]) -> None:
         """Set all values, or none if one is refused."""
@@ -105,6 +103,8 @@ class Rov(Fmi2Slave):  # type: ignore[misc]
                 self._warn_of_input(v, value)
             else:
                 self._warn_once("again", f"{v['name']} {_TOO_LATE}, but it has this value already")
+        if not self.memory.current:  # until the first step, the current before it is the present one
+            self.values |= {before: self.values[name] for name, before in self.memory.names_before.items()}
         if not self.is_initialized:
             self._set_attitude()
         for v, value in pairs:

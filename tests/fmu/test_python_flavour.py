@@ -225,10 +225,14 @@ def test_inputs_that_saturate_and_steps_that_cannot_be_taken_are_told(
 
 
 def test_the_current_before_is_part_of_the_state(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The current at the end of the initialization is no change. A current that passes leaves the way over ground."""
+    """The current of the first step is no change. A current that passes leaves the way over ground."""
     slave = Slave(replace(a_vehicle(passed(HEAVY)), identifier="passed"), tmp_path, monkeypatch)
-    slave.put(V_N=0.2, u=0.1)
+    slave.put(V_N=0.7, u=0.1)
     slave.rov.exit_initialization_mode()
+    slave.put(V_N=0.4)
+    slave.rov._set_fmu_state(json.loads(json.dumps(slave.rov._get_fmu_state())))
+    slave.put(V_N=0.2)
+    assert slave.get("V_N_before") == [0.2]
     assert slave.step(0.0, 1e-9)[0]
     assert slave.get("u", "V_N_before") == pytest.approx([0.1, 0.2], abs=1e-8)
     before = slave.rov._get_fmu_state()

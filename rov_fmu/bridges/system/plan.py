@@ -54,7 +54,7 @@ class ComponentTable(Strict):
     coefficients: Beside | None = None
     """A vehicle file or name. Its coefficients are start values of the FMU, which must have them."""
     start: Annotated[dict[str, _StartValue], Field(max_length=_MOST_NAMED)] = Field({})
-    """Start values of inputs, states and parameters, by name."""
+    """Start values of inputs, states and parameters, by name. A connected input begins with that of its source."""
 
     @model_validator(mode="after")
     def _of_one_kind(self) -> Self:

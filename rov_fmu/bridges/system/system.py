@@ -1,6 +1,7 @@
 """A system from its plan: everything that does not fit is told, and then the FMUs of vehicles are built."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -68,6 +69,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         wrong.append(f"connect: {' -> '.join(around)} {reason}")
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
+    _pass_on(connections, parts, values)
     for name, kind in kinds.items():
         if vehicle := vehicles.pop(kind, None):
             on_part(name)
@@ -158,6 +160,21 @@ def _connect(plan: SystemPlan, parts: Mapping[str, Part], connections: list[Conn
         has = parts[component].variables if component in parts else {}
         if name not in has or kind_of(has[name]) == "String":
             yield key_line("plot", "must name variables that are numbers, as component.variable", f"{component}.{name}")
+
+
+def _pass_on(
+    connections: Iterable[Connection], parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]]
+) -> None:
+    """Give connected inputs the start values of their sources, where the plan has these.
+
+    Otherwise a current at the depth of the vehicle would begin with that at the surface, and jump at the first exchange.
+    """
+    for (source, output), (component, name), factor in connections:
+        if output in values[source] and name not in values[component]:
+            value = values[source][output]
+            with suppress(ValueError):  # it is not within the bounds of the input
+                passed = value if factor == 1.0 else factor * float(value)
+                values[component][name] = parts[component].start_value(name, passed)
 
 
 def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:

@@ -178,6 +178,7 @@ def test_a_plan_becomes_a_system(capsys: pytest.CaptureFixture[str]) -> None:
     assert {("rov", name) for name in into} <= ends.keys()
     assert {start[1] for start in ends.values() if start[0] == "rov"} == names.keys() - into | {"z"}
     assert found.values["rov"] == {"z": 3.0}
+    assert found.values["water"] == {"z": 3.0}, "a connected input begins as its source"
     assert [one.factor for one in found.connections if one.end == ("b", "u")] == [2.0]
     # FMPy validates the structure and the parameter sets, and sets every input that is a connector.
     elements = read_ssd("my.ssp").system.elements

@@ -25,14 +25,21 @@ def held(n: int) -> dict[str, float]:
     return {name: float(row[n]) for name, row in INPUTS.items()}
 
 
-def test_steps_are_those_of_the_engine_also_from_a_saved_state(fmu: Fmu) -> None:
-    """The current at the end of the initialization is that of the start, and no change."""
+@pytest.mark.parametrize("first", [{}, {"V_N": -0.7}, held(0)], ids=["set after it", "changed after it", "set in it"])
+def test_steps_are_those_of_the_engine_also_from_a_saved_state(fmu: Fmu, first: dict[str, float]) -> None:
+    """The current of the first step is no change, whenever the initialization ended. A state says whether it came."""
     expected, state = simulate(ROV, TIMES, INPUTS).values[:, 0], [*ROV.layout.state]
     with fmu.instance() as rov, fmu.instance() as other:
-        rov.start(held(0))
+        rov.start(first)
         other.start()
         for n, t in enumerate(TIMES[:-1].tolist()):
+            rov.set({"V_N": 0.33})
+            other.load(rov.save())
+            rov, other = other, rov  # noqa: PLW2901
             rov.set(held(n))
+            assert (rov.get(["V_N_before"]) == [INPUTS["V_N"][n]]) == (
+                n == 0 or INPUTS["V_N"][n] == INPUTS["V_N"][n - 1]
+            )
             rov.step(t, 0.5)
             assert rov.get(state) == expected[:, n + 1].tolist(), n
             other.load(rov.save())
@@ -42,9 +49,10 @@ def test_steps_are_those_of_the_engine_also_from_a_saved_state(fmu: Fmu) -> None
 def test_a_step_that_is_refused_keeps_the_current(fmu: Fmu) -> None:
     with fmu.instance() as rov:
         rov.start()
+        rov.step(0.0, 1.0)
         rov.set({"V_N": 0.5})
         before = rov.save()
-        rov.step(0.0, -1.0, ERROR)
+        rov.step(1.0, -1.0, ERROR)
         assert rov.save() == before
         assert rov.get(["V_N_before"]) == [0.0]
 
