@@ -51,6 +51,7 @@ class Prebuilt(BuildHookInterface[Any]):
 
 def prebuild(folder: Path) -> None:
     """Compile everything into a folder."""
+    from rov_fmu.bridges.autopilot.law import FILES, law_sources
     from rov_fmu.build import build
     from rov_fmu.c.compile import HOSTS, compile_engine, compile_module
     from rov_fmu.c.library import engine_sources
@@ -59,6 +60,9 @@ def prebuild(folder: Path) -> None:
     from rov_fmu.vehicle.shipped import SHIPPED
     from rov_fmu.vehicle.vehicle import load_vehicle
 
+    law = law_sources(*FILES)
+    for kind in HOSTS:
+        prebuilt_path(folder, kind, law).write_bytes(compile_engine(law, kind))
     for name, file in SHIPPED.items():
         vehicle = load_vehicle(file)
         build(vehicle, folder / f"{name}.fmu")

@@ -19,13 +19,13 @@ from rov_fmu.c.simulation import on_cores, pointer, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
-class _Memory:
+class Memory:
     """The memory in which C keeps vehicles of the same layout between their steps.
 
     It is an array, so Python frees it, and a copy of this object is a copy of the vehicles.
     """
 
-    def __init__(self, vehicle: Vehicle, count: int, file: Path) -> None:
+    def __init__(self, vehicle: Vehicle, count: int, file: Path = ENGINE_FILE) -> None:
         self.vehicle, self._file = vehicle, file
         library = load_library(vehicle, file)
         library.single_size.restype = ctypes.c_size_t
@@ -45,6 +45,11 @@ class _Memory:
         self.states = self._memory[:, inputs : inputs + states]
         """The states (vehicles x states), which may be set."""
 
+    @property
+    def in_c(self) -> tuple[ctypes.CDLL, int, int]:
+        """The library, the address of the first vehicle, and the bytes from one vehicle to the next."""
+        return self._c[0], self._memory.ctypes.data, self._memory.strides[0]
+
     def __getstate__(self) -> dict[str, Any]:
         made = ("_c", "_variables", "inputs", "states")
         return {name: value for name, value in vars(self).items() if name not in made}
@@ -61,7 +66,7 @@ class _Memory:
             library.single_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
 
 
-class Stepper(_Memory):
+class Stepper(Memory):
     """One vehicle that is stepped from time 0 on, with the bits of the FMU. Each step is exact."""
 
     def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
@@ -101,7 +106,7 @@ class Stepper(_Memory):
         return results
 
 
-class LaneStepper(_Memory):
+class LaneStepper(Memory):
     """Many vehicles that are stepped together, in the lanes of vectors on all cores, as `simulate` does with `lanes`.
 
     They begin at rest with the usual inputs. Raises BuildError when the engine cannot be compiled.

@@ -15,7 +15,7 @@ import pytest
 
 from rov_fmu.bridges.ardusub.files import gains_files, table_of
 from rov_fmu.bridges.ardusub.gains import Tuned, read_gains, tuned
-from rov_fmu.bridges.ardusub.loop import FIRMWARE, ROWS, Leg, fly
+from rov_fmu.bridges.ardusub.law import FIRMWARE, ROWS, Leg, fly
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis

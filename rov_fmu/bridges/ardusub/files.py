@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from rich.table import Table
 
 from rov_fmu.bridges.ardusub.gains import HEAD, NEW_NAMES, REST, Tuned
-from rov_fmu.bridges.ardusub.loop import FIRMWARE, RATE
+from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.io.messages import one_line
 from rov_fmu.report.console import table, text

@@ -20,7 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.bridges.ardusub.loop import FIRMWARE, RATE, ROWS, Flown, Leg, Mixer, fly
+from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE, ROWS, Flown, Leg, Mixer, fly
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, listed, shown
 from rov_fmu.io.reading import read_text
@@ -81,8 +81,9 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     notes = [f"{given}: {whose}the vehicle is {vehicle.identifier}"] if whose else []
     why = dict.fromkeys(axes, "as given") if given else {axis: _refusal(vehicle, mixer, axis) for axis in axes}
     shares = dict.fromkeys(axes, 1.0)
-    others, load = _variations(vehicle), mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0
+    others = _variations(vehicle)
     is_usual = np.arange(len(others)) == 1
+    loads = np.where(np.arange(len(others)) < 2, 0.0, mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0)
 
     def gains_along(axis: Axis) -> dict[str, tuple[float, str]]:
         if not why[axis]:
@@ -92,7 +93,7 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     while True:
         gains = {name: gain for axis in axes for name, gain in gains_along(axis).items()}
         flying = {name: np.where(is_usual, FIRMWARE[name], value) for name, (value, _) in gains.items()}
-        flown = [*fly(vehicle, flying, [leg for leg in LEGS if leg.axis in (SURGE, *axes)], others, load)]
+        flown = [*fly(vehicle, flying, [leg for leg in LEGS if leg.axis in (SURGE, *axes)], others, loads)]
         flaws = {axis: words for axis, words in _flaws(flown).items() if given or not why.get(axis, "no axis")}
         if given and flaws:
             raise FileError(f"{given}: {whose}on {vehicle.identifier} {listed(flaws.values())}")
