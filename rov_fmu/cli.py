@@ -612,13 +612,14 @@ def _prove(fmu: Path, **options: Any) -> None:
 @_commands.command("system")
 @click.argument("plan", type=_FILE, required=False)
 @_output_option(metavar="FILE.ssp", help="System to write.")
-@click.option("--run", "runs", is_flag=True, help="Run it, and write FILE.csv and FILE.svg.")
+@click.option("--run", "runs", is_flag=True, help="Run it, also with half the step, and write FILE.csv and FILE.svg.")
 @click.option("--list", "lists", is_flag=True, help="List the companions that ship, with their variables.")
 @_force_option()
 def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, force: bool) -> None:
     """Connect vehicles, their companions and other FMUs to a system (SSP), as PLAN (TOML) says.
 
-    Units, causalities and connections are checked.
+    Units, causalities and connections are checked. FMUs are programs: --run runs those of others, too, in a process
+    with limits, which is no sandbox.
     """
     from rov_fmu.bridges.system.system_command import list_companions, write_system
 

@@ -7,6 +7,7 @@ and the result does not depend on the order of the FMUs. Ecos and libcosim do th
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
+from math import isnan
 from types import MappingProxyType
 from typing import Any
 
@@ -16,6 +17,7 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.prove.runs import (
     RunError,
+    forget_message,
     free_instance,
     function_of,
     last_message,
@@ -26,6 +28,8 @@ from rov_fmu.prove.runs import (
 Name = tuple[str, str]
 """A component and a variable."""
 _Values = dict[Name, Any]
+_MOST_WARNINGS = 20
+"""The most warnings of a run that are kept: an FMU may give another one at every step."""
 
 
 class Master:
@@ -44,6 +48,11 @@ class Master:
         }
         self._wanted = {*read, *(c.start for c in connections)}
         self._fmus: dict[str, Any] = {}
+        self._warnings: dict[str, float] = {}
+
+    def warnings(self) -> list[str]:
+        """Return the different warnings that FMUs gave in a run, each with the start of the step that gave it first."""
+        return [f"{text} (at {t:.6g} s)" for text, t in self._warnings.items()]
 
     def begin(
         self,
@@ -58,9 +67,9 @@ class Master:
         `inputs` has the values of inputs that are not connected, one for each step.
         """
         self.end()
-        self._start, self._step, self._done = start, step, 0
+        self._start, self._step, self._done, self._warnings = start, step, 0, {}
         for name in self._folders:
-            with _reasons(name, "the initialization", self._folders):
+            with self._reasons(name, "the initialization"):
                 self._initialize(name, values.get(name, {}), start, stop)
         self._getters = self._calls("get", self._wanted)
         self._setters = self._calls("set", self._sources)
@@ -72,16 +81,15 @@ class Master:
         """Take some steps, and return the variables after each one. Raises RunError."""
         rows = []
         for _ in range(count):
-            t = self._start + self._done * self._step
             for name, names, put in self._given:
-                with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
+                with self._reasons(name, "setting the inputs"):
                     put([self._inputs[one][self._done] for one in names])
             for name, ends, put in self._setters:
-                with _reasons(name, f"setting the inputs at {t:.6g} s", self._folders):
+                with self._reasons(name, "setting the inputs"):
                     put([self._passed(end) for end in ends])
             for name, fmu in self._fmus.items():
-                with _reasons(name, f"the step at {t:.6g} s", self._folders):
-                    returned = fmu.doStep(currentCommunicationPoint=t, communicationStepSize=self._step)
+                with self._reasons(name, "the step"):
+                    returned = fmu.doStep(currentCommunicationPoint=self._time, communicationStepSize=self._step)
                     if returned and returned[1]:
                         raise RunError("the FMU ended the run")
             self._done += 1
@@ -98,7 +106,7 @@ class Master:
         self._fmus = {}
 
     def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
-        fmu = self._fmus[name] = new_instance(self._folders[name], self._descriptions[name])
+        fmu = self._fmus[name] = new_instance(self._folders[name], self._descriptions[name], logging=True)
         begin_initialization = set_up(fmu, start, stop)
         for _, names, put in self._calls("set", [(name, variable) for variable in values]):
             put([values[variable] for _, variable in names])
@@ -121,19 +129,31 @@ class Master:
     def _outputs(self) -> _Values:
         now: _Values = {}
         for name, names, get in self._getters:
-            with _reasons(name, "reading the outputs", self._folders):
-                now.update(zip(names, get(), strict=True))
+            with self._reasons(name, "reading the outputs"):
+                for key, value in zip(names, get(), strict=True):
+                    if isinstance(value, float) and isnan(value):
+                        raise RunError(f"{key[1]} is no number (NaN)")
+                    now[key] = value
         return now
 
     def _row(self) -> list[float]:
         return [float(self._now[name]) for name in self._read]
 
+    @property
+    def _time(self) -> float:
+        return self._start + self._done * self._step
 
-@contextmanager
-def _reasons(name: str, what: str, folders: Mapping[str, str]) -> Iterator[None]:
-    """Raise RunError, with the component and what it did, in place of what FMPy raises."""
-    try:
-        yield
-    except Exception as error:  # FMPy raises that itself
-        reason = brief(reason_of(error).replace(folders[name], "").rstrip("."), 240)
-        raise RunError(f"{name}: {what}: {reason}{brief(last_message(), 240)}") from error
+    @contextmanager
+    def _reasons(self, name: str, what: str) -> Iterator[None]:
+        """Raise RunError, with the component, what it did and its own reason, in place of what FMPy raises.
+
+        Keep what the component warned of if it did not fail.
+        """
+        forget_message()
+        try:
+            yield
+        except Exception as error:  # FMPy raises that itself
+            reason = brief(reason_of(error).replace(self._folders[name], "").rstrip("."), 240)
+            raise RunError(f"{name}: {what} at {self._time:.6g} s: {reason}{brief(last_message(), 240)}") from error
+        if (text := last_message(f"{name}: ")) and len(self._warnings) < _MOST_WARNINGS:
+            self._warnings.setdefault(brief(text, 240), self._time)

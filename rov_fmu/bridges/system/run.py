@@ -5,10 +5,12 @@ from contextlib import ExitStack, closing
 from io import BytesIO
 from pathlib import Path
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from rov_fmu.bridges.system.half_step import HalfStep
 from rov_fmu.bridges.system.master import Master, Name
 from rov_fmu.bridges.system.part import kind_of
 from rov_fmu.bridges.system.ssp import Structure
@@ -29,6 +31,15 @@ _MOST = 100_000_000
 """The most values of a run, which are in memory."""
 
 
+class Run(NamedTuple):
+    """What a run gave."""
+
+    rows: Array
+    """The variables at the start and after each step, a row for each."""
+    warnings: list[str]
+    """What the FMUs warned of."""
+
+
 def recorded(structure: Structure) -> list[Name]:
     """Return all outputs of a system that are numbers."""
     return [
@@ -37,6 +48,12 @@ def recorded(structure: Structure) -> list[Name]:
         for name in part.names("output")
         if kind_of(part.variables[name]) != "String"
     ]
+
+
+def passed(structure: Structure) -> list[Name]:
+    """Return the outputs that are connected and are numbers."""
+    starts = {one.start for one in structure.connections}
+    return [name for name in recorded(structure) if name in starts]
 
 
 def unpack_parts(structure: Structure, folder: str) -> dict[str, str]:
@@ -48,9 +65,18 @@ def unpack_parts(structure: Structure, folder: str) -> dict[str, str]:
 
 
 def run_system(
-    structure: Structure, path: Path, read: Sequence[Name], step: float, steps: int, on_progress: Progress = silent
-) -> Array:
-    """Return the variables at the start and after each step, a row for each. Raises FileError about the path."""
+    structure: Structure,
+    path: Path,
+    read: Sequence[Name],
+    step: float,
+    steps: int,
+    on_progress: Progress = silent,
+    parts: int = 1,
+) -> Run:
+    """Run a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
+
+    Raises FileError about the path.
+    """
     if (count := (steps + 1) * len(read)) > _MOST:
         raise FileError(
             f"{path}: {steps} steps of {len(read)} variables give {count:,} values; at most {_MOST:,} are kept"
@@ -61,24 +87,26 @@ def run_system(
             folders = unpack_parts(structure, folder)
             child = ChildProcess(Master, folders, structure.connections, read, limits=budget(TIME_LIMIT))
             stack.enter_context(closing(child))
-            rows.append(np.array([child.call("begin", structure.values, step, step * steps)]))
+            rows.append(np.array([child.call("begin", structure.values, step / parts, step * steps)]))
             done, count = 0, 1
             while done < steps:
                 began = perf_counter()
-                rows.append(np.array(child.call("step", min(count, steps - done))))
+                rows.append(np.array(child.call("step", parts * min(count, steps - done))[parts - 1 :: parts]))
                 done += len(rows[-1])
                 count = max(1, min(2 * count, int(count * _CALL / (perf_counter() - began + 1e-9))))
                 on_progress("running", done / steps)
+            warnings = child.call("warnings")
             child.call("end")
         except (ChildError, RunError) as error:
             raise FileError(f"{path}: the system cannot be run: {error}") from error
-    return np.concatenate(rows)
+    return Run(np.concatenate(rows), warnings)
 
 
-def table(read: Sequence[Name], step: float, rows: Array) -> bytes:
-    """Return the rows as CSV, with the time first."""
-    header = ",".join(["time", *map(".".join, read)])
-    lines = (",".join(map(repr, [n * step, *row])) for n, row in enumerate(rows.tolist()))
+def table(read: Sequence[Name], step: float, rows: Array, half: HalfStep | None = None) -> bytes:
+    """Return the rows as CSV, with the time first, and at the end what half the step changes."""
+    columns = [[n * step for n in range(len(rows))], *rows.T.tolist(), *([half.shares.tolist()] if half else [])]
+    header = ",".join(["time", *map(".".join, read), *(["half_step"] if half else [])])
+    lines = (",".join(map(repr, row)) for row in zip(*columns, strict=True))
     return "\n".join([header, *lines, ""]).encode()
 
 

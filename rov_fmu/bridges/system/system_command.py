@@ -1,16 +1,27 @@
 """The command `rov-fmu system`: a plan becomes an SSP, which is run; the companions are listed."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
+import numpy as np
+from rich.table import Table
+
 from rov_fmu.bridges.system.companion import COMPANIONS, lack, slave_of
-from rov_fmu.bridges.system.plan import load_system_plan
-from rov_fmu.bridges.system.run import picture, recorded, run_system, table
-from rov_fmu.bridges.system.ssp import is_unchanged, ssp_content
+from rov_fmu.bridges.system.half_step import HalfStep, half_step
+from rov_fmu.bridges.system.master import Name
+from rov_fmu.bridges.system.plan import SystemPlan, load_system_plan
+from rov_fmu.bridges.system.run import passed, picture, recorded, run_system, table
+from rov_fmu.bridges.system.ssp import Structure, is_unchanged, ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
 from rov_fmu.io.file_kinds import SYSTEM
+from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
+from rov_fmu.prove.runs import Array
 from rov_fmu.report import console
-from rov_fmu.report.progress import parts
+from rov_fmu.report.progress import Parts, parts
+
+_MOST_SHOWN = 10
+"""The most variables of the table of what half the step changes."""
 
 
 def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
@@ -24,7 +35,7 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
         return file == output and is_unchanged(file)
 
     check_targets([(output, SYSTEM), *((file, "") for file in results)], [path], force=force, is_ours=is_ours)
-    plan = load_system_plan(path)
+    plan, half, changes = load_system_plan(path), None, None
     with parts() as shown:
         structure = made(plan, path, lambda name: shown.begin(f"making {name}"))
         for sentence in unconnected(plan, structure):
@@ -32,15 +43,46 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
         outputs = [Output(output, ssp_content(files_of(plan, structure, output.stem)))]
         if runs:
             read = list(dict.fromkeys([*recorded(structure), *plan.plotted]))
-            rows = run_system(structure, path, read, plan.step, plan.steps, shown.begin("running"))
+            rows, warnings = run_system(structure, path, read, plan.step, plan.steps, shown.begin("running"))
+            for warning in warnings:
+                shown.print(f"warning: {warning}")
+            if passed(structure):
+                half, changes = _half_step(structure, plan, path, dict(zip(read, rows.T, strict=True)), shown)
             motion, plot = results
             drawing = picture(structure, read, plan.plot, plan.step, rows)
             outputs += [
-                Output(motion, table(read, plan.step, rows)),
+                Output(motion, table(read, plan.step, rows, half)),
                 Output(plot, sealed(drawing, "system").encode()),
             ]
     files = write_whole(*outputs, force=force, is_ours=is_ours)
+    if changes:
+        console.print_table(changes)
     console.print_end(files, "open the plot" if runs else "open it in a co-simulation tool, or add --run")
+
+
+def _half_step(
+    structure: Structure, plan: SystemPlan, path: Path, found: Mapping[Name, Array], shown: Parts
+) -> tuple[HalfStep | None, Table | None]:
+    """Return what half the step changes of the values `found`, also as a table. None, with a line, if it cannot run."""
+    names = passed(structure)
+    try:
+        halved = run_system(structure, path, names, plan.step, plan.steps, shown.begin("running with half the step"), 2)
+    except FileError as error:
+        shown.print(f"warning: with half the step: {error}")
+        return None, None
+    half = half_step(np.array([found[name] for name in names]).T, halved.rows)
+    order = np.argsort(-half.typical, kind="stable")[:_MOST_SHOWN]
+    shown.print(half.words(names))
+    columns = ["unit", "from", "to", "half the step changes it by up to", "root mean square of its range"]
+    printed = console.table(
+        f"step of {plan.step:g} s: the error is about twice what half the step changes", "variable", columns
+    )
+    for n in order:
+        component, name = names[n]
+        low, high = found[names[n]].min(), found[names[n]].max()
+        numbers = (f"{low:.4g}", f"{high:.4g}", f"{half.largest[n]:.2g}", f"{half.typical[n]:.1%}")
+        printed.add_row(f"{component}.{name}", structure.parts[component].unit(name)[0], *numbers)
+    return half, printed
 
 
 def list_companions() -> None:

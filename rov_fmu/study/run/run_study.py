@@ -10,10 +10,11 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
-from rov_fmu.study.plan.system_model import read_system
+from rov_fmu.study.plan.system_model import SystemModel, read_system
 from rov_fmu.study.results.store import RUNS, Part, Store
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.run import LoadError
+from rov_fmu.study.run.system_simulator import half_step_words
 from rov_fmu.study.run.work import Progress, Spent, Work
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -118,6 +119,8 @@ def run_study(
     if work.spent.turned:
         count = f"in {work.spent.turned} of {work.spent.runs} runs"
         on_warning(f"{count} the vehicle turned over: phi or theta passed 90 degrees")
+    if isinstance(model, SystemModel) and work.spent.runs and (words := half_step_words(prepared.job, model)):
+        on_warning(words)
     return work.spent, store
 
 

@@ -1,13 +1,21 @@
 """Run a system many times, with new instances for each run."""
 
 from collections.abc import Sequence
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.master import Master
 from rov_fmu.bridges.system.part import Value
+from rov_fmu.io.child_process import ChildError, ChildProcess, Functions
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.prove.description import budget
+from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.plan.system_model import SystemModel, split
 
@@ -15,11 +23,15 @@ from rov_fmu.study.plan.system_model import SystemModel, split
 class SystemSimulator:
     """An unpacked system, in a process of its own."""
 
-    def __init__(self, folder: str, job: Job, model: SystemModel) -> None:
-        self._job, self._model = job, model
+    def __init__(self, folder: str, job: Job, model: SystemModel, parts: int = 1) -> None:
+        """Each step of the job is made of some `parts`, between which the FMUs exchange values, too."""
+        self._job, self._model, self._parts = job, model, parts
         folders = {name: f"{folder}/{name}" for name in model.sources}
         self._master = Master(folders, model.connections, [split(name) for name in job.recorded])
-        self._inputs = {split(name): [self._value(name, x) for x in values] for name, values in job.inputs.items()}
+        self._inputs = {
+            split(name): [self._value(name, x) for x in values for _ in range(parts)]
+            for name, values in job.inputs.items()
+        }
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
         """Run once and return every recorded variable at every communication point. Raises RunError.
@@ -31,8 +43,8 @@ class SystemSimulator:
         for name, value in {**plan.set, **dict(zip(self._job.varied, values, strict=True))}.items():
             component, own = split(name)
             start[component][own] = self._value(name, value)
-        rows = [self._master.begin(start, plan.step, plan.stop_time, plan.start_time, self._inputs)]
-        rows += self._master.step(plan.steps)
+        rows = [self._master.begin(start, plan.step / self._parts, plan.stop_time, plan.start_time, self._inputs)]
+        rows += self._master.step(plan.steps * self._parts)[self._parts - 1 :: self._parts]
         columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
         has = self._model.variables
         return {
@@ -49,3 +61,27 @@ class SystemSimulator:
         """Return a value as the type of a variable has it."""
         kind = self._model.variables[name].type
         return bool(value) if kind == "Boolean" else int(value) if kind == "Integer" else float(value)
+
+
+def half_step_words(job: Job, model: SystemModel) -> str:
+    """Return a line about what half the step changes in one run of a study; none if nothing is connected."""
+    starts = dict.fromkeys(".".join(one.start) for one in model.connections)
+    if not (names := [name for name in starts if name in model.variables]):
+        return ""
+    alike, limits = replace(job, recorded=names), budget(2.0 * job.plan.time_limit)
+    with temporary_folder("system-") as folder:
+        model.unpack(Path(folder))
+        try:
+            with closing(ChildProcess(Functions, limits=limits)) as child:
+                rows = [child.call("call", _rows, folder, alike, model, parts) for parts in (1, 2)]
+        except (ChildError, RunError) as error:
+            return f"half the step was tried in one run, which cannot be done: {error}"
+    return f"in one run, {half_step(*rows).words([*map(split, names)])}"
+
+
+def _rows(folder: str, job: Job, model: SystemModel, parts: int) -> Array:
+    """Return what a run records, a row for each communication point."""
+    simulator = SystemSimulator(folder, job, model, parts)
+    recorded = simulator.run(job.trials[0])
+    simulator.renew()
+    return np.array([recorded[name] for name in job.recorded], np.float64).T

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pythonfmu.builder import FmuBuilder
 from scipy.optimize import brentq
 
 from rov_fmu.bridges.system.companion import companion, slave_of
 from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import read_part
 from rov_fmu.bridges.system.run import run_system
 from rov_fmu.bridges.system.ssp import Structure
@@ -178,15 +180,56 @@ def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     part = read_part(Path("water"), companion("current"), is_ours=True)
     values = {"speed": 1.0, "exponent": 1.0, "seabed": 1.0, "z": 0.5}
     connections = [Connection(("a", "V_N"), ("b", "z"), 0.5)]
-    rows = run_system(
-        Structure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections),
-        tmp_path,
-        [("a", "V_N"), ("b", "V_N")],
-        1.0,
-        3,
-    )
+    structure = Structure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections)
+    names = [("a", "V_N"), ("b", "V_N")]
+    rows = run_system(structure, tmp_path, names, 1.0, 3).rows
     assert rows[:, 0].tolist() == [0.0, 0.25, 0.5, 0.5]
     assert rows[:, 1].tolist() == [0.5, 1.0, 1.0 - 0.5 * 0.25, 1.0 - 0.5 * 0.5]
+    # Half the step: V_N of the first half a step before.
+    halved = run_system(structure, tmp_path, names, 1.0, 3, parts=2).rows
+    assert halved[:, 1].tolist() == [0.5, 1.0 - 0.5 * 0.125, 1.0 - 0.5 * 0.375, 1.0 - 0.5 * 0.5]
+    half = half_step(rows, halved)
+    assert half.largest.tolist() == [0.0, 0.0625]
+    assert half.typical.tolist() == [0.0, pytest.approx(0.0625 / np.sqrt(2.0) / 0.5)]
+    assert half.shares.tolist() == [0.0, 0.125, 0.125, 0.0]
+    assert half.words(names).startswith("half the step changes b.V_N by 8.8% of its range: the numbers of this step")
+
+
+def test_the_command_tells_what_half_the_step_changes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Two waters, V = 1 - z, of which each is as deep as the other one was fast: they swing with every step."""
+    water = 'companion = "current"\nstart = { speed = 1.0, exponent = 1.0, seabed = 1.0 }\n'
+    connections = 'connect = [["a.V_N", "b.z", 0.9], ["b.V_N", "a.z", 0.5]]\n'
+    plan = tmp_path / "plan.toml"
+    plan.write_text(f"step = 1\nstop_time = 4\n{connections}[component.a]\n{water}[component.b]\n{water}", "utf-8")
+    assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == 0
+    printed = capsys.readouterr()
+    assert "V_N by " in printed.err
+    assert "of its range: the numbers of this step are not to be trusted" in printed.err
+    (row,) = (line.split() for line in printed.out.splitlines() if line.startswith("a.V_N"))
+    motion = np.genfromtxt(tmp_path / "my.csv", delimiter=",", names=True, deletechars="")
+    assert row[:4] == ["a.V_N", "m/s", f"{motion['a.V_N'].min():.4g}", f"{motion['a.V_N'].max():.4g}"]
+    assert motion["half_step"].max() > 0.5
+
+
+STRANGE = {
+    1: ("the step at 0.5 s: fmi2DoStep failed with status 2 (discard); the FMU: the rope is cut", 2),
+    2: ("the step at 0.5 s: fmi2DoStep failed with status 4 (fatal); the FMU: Fatal py exception", 2),
+    3: ("reading the outputs at 1 s: y is no number (NaN)", 2),
+    4: ("warning: a: the rope is thin (at 0.5 s)", 0),
+}
+
+
+@pytest.mark.parametrize("kind", STRANGE)
+def test_what_an_fmu_says_is_told_with_its_name_and_the_time(
+    kind: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    FmuBuilder.build_FMU(HERE / "strange.py", dest=tmp_path)
+    plan = tmp_path / "plan.toml"
+    start = f'fmu = "Strange.fmu"\nstart = {{ kind = {kind} }}\n'
+    plan.write_text(f"step = 0.5\nstop_time = 2\n[component.a]\n{start}", encoding="utf-8")
+    message, code = STRANGE[kind]
+    assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == code
+    assert capsys.readouterr().err.count(message) == 1
 
 
 def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -195,7 +238,7 @@ def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys:
     plan.write_text('step = 1.0\nstop_time = 1.0\n[component.a]\nfmu = "dead.fmu"\n', encoding="utf-8")
     assert main(["system", str(plan), "-o", str(tmp_path / "my.ssp"), "--run"]) == 2
     *_, line = without_progress(capsys.readouterr().err).splitlines()
-    assert "the system cannot be run: a: the initialization: " in line
+    assert "the system cannot be run: a: the initialization at 0 s: " in line
     assert sorted(path.name for path in tmp_path.iterdir()) == ["dead.fmu", "plan.toml"]
 
 

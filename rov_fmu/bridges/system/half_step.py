@@ -1,0 +1,42 @@
+"""What half the step changes in a run of a system: whether its numbers are to be trusted."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from rov_fmu.bridges.system.master import Name
+from rov_fmu.prove.runs import Array
+
+_TRUSTED = 0.05
+"""The largest root mean square of what half the step changes, relative to a variable's range, for numbers that may be
+trusted: the error is about twice as large."""
+
+
+class HalfStep(NamedTuple):
+    """How much half the step changes the variables that are connected.
+
+    Each output arrives a step late, so the error is of first order in the step, and about twice these changes.
+    """
+
+    largest: Array
+    """The largest change of each variable."""
+    typical: Array
+    """The root mean square of the change of each variable, relative to the variable's range in the run."""
+    shares: Array
+    """The largest change of all variables at each time, relative to their ranges."""
+
+    def words(self, names: Sequence[Name]) -> str:
+        """Return a line about the variable that half the step changes most, and whether numbers may be trusted."""
+        worst = int(self.typical.argmax())
+        of = f"half the step changes {'.'.join(names[worst])} by {self.typical[worst]:.1%} of its range"
+        if self.typical[worst] > _TRUSTED:
+            return f"{of}: the numbers of this step are not to be trusted, take a smaller one"
+        return f"{of}, and other connected variables by less"
+
+
+def half_step(rows: Array, halved: Array) -> HalfStep:
+    """Compare the rows of a run with those of one that took half the step."""
+    changes, ranges = np.abs(halved - rows), np.ptp(rows, axis=0)
+    shares = np.divide(changes, ranges, out=np.zeros_like(changes), where=ranges > 0.0)
+    return HalfStep(changes.max(axis=0), np.sqrt((shares**2).mean(axis=0)), shares.max(axis=1))
