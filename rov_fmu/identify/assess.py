@@ -127,7 +127,6 @@ def answers(
     tested: Tested,
     commands: Sequence[float] = COMMANDS,
     pushes: Sequence[float] = (),
-    fits: Sequence[Posterior] = (),
     least: float = EXACT,
     speeds: Mapping[str, float] | None = None,
 ) -> tuple[Answer, ...]:
@@ -135,10 +134,7 @@ def answers(
 
     `pushes`, if they are given, are the pushes of these commands relative to the full push of the fit, and `tested` is
     in this unit. The values are those of the vehicle file, and each interval contains those of all posteriors; that of
-    V_ss is never narrower than `least`. They are wider for commands beyond the strongest tested one, and contain the
-    answers of those of `fits`, which lack a part of the data, that disagree with the last posterior: the difference of
-    a fit to all data and of one to a part has the variance by which theirs differ (Hausman 1978,
-    doi:10.2307/1913827).
+    V_ss is never narrower than `least`. They are wider for commands beyond the strongest tested one.
 
     Where drag has another power, the file has the nearest quadratic drag up to the largest tested speeds, `speeds`. An
     interval reaches as far to either side of the value as this drag changes the answer.
@@ -170,10 +166,6 @@ def answers(
         middle = fitted(posterior.table, posterior.z)
         misfit = np.abs(fitted(posterior.table.of_file(posterior.z, speeds or {}), posterior.z) - middle)
         ends += [middle - half, middle + half, own - misfit, own + misfit]
-    for fit in fits:
-        other = fitted(posterior.table, fit.z)
-        lost = variances_of(slopes, fit.covariance - posterior.covariance).reshape(own.shape)
-        ends.append(np.where(((other - middle) / QUANTILE) ** 2 > lost, other, own))
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))
     return _finite(axis, commands, of_file, low, high)

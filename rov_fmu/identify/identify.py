@@ -15,7 +15,7 @@ from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
 from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_commanded, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
-from rov_fmu.identify.held_out import HeldOut, held_out, held_out_rows, points_of, predictions
+from rov_fmu.identify.held_out import held_out, held_out_rows, points_of, predictions
 from rov_fmu.identify.identified_vehicle import identified_vehicle, vehicle_of_file, with_own_inputs
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
@@ -120,7 +120,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
     for n, axis in enumerate(known.fitted):
         work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
-        axes.append(_axis(found, tests, fit, vehicle, coefficients, axis, tested[axis], out, predicted, points))
+        axes.append(_axis(found, tests, fit, vehicle, coefficients, axis, tested[axis], predicted, points))
     of_file = found.vehicle
     if not tests.description.tables.validity:
         ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
@@ -139,14 +139,12 @@ def _axis(
     coefficients: Mapping[str, Coefficient],
     axis: Axis,
     tested: Tested,
-    out: Sequence[HeldOut],
     predicted: Sequence[Prediction],
     points: Sequence[Point],
 ) -> AxisResult:
     """Return what concerns an axis; `found` has what concerns all axes, and `vehicle` is that of the fit."""
     # The thrust of a wrench is the largest force in the logs, if there is any.
     is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
-    fits = [one.fit for one in out if axis in one.axes]
     is_steady = all(d.share <= MOST_GAIN for d in found.disturbances if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
@@ -156,7 +154,7 @@ def _axis(
         commands = assess.commands_of_answers(tested_own)
         pushes = [push(c) for c in commands] if push else []
         posteriors = (*fit.rivals, *fit.posteriors)
-        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, fits, least, fit.speeds)
+        every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, least, fit.speeds)
         answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
     files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]

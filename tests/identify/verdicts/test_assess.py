@@ -52,20 +52,6 @@ def test_the_way_to_stop_is_without_the_loss_of_thrust_and_answers_beyond_the_te
     assert answers_of_file(losing, SURGE)[2].stop[0] == pytest.approx(half.stop[0])
 
 
-@pytest.mark.parametrize("share", [0.8, 1.2])
-def test_intervals_contain_what_a_part_of_the_data_says_where_it_differs_by_more_than_chance(share: float) -> None:
-    """The difference of an efficient fit and of one to a part of its data has the difference of their variances."""
-    part, difference = of_drag(0.05), share * t.ppf(0.975, 10) * 0.04
-    other = replace(part, z=part.z + difference)
-    V, Tau = VIDEORAY.with_(a_d_u=VIDEORAY["a_d_u"] * np.exp(difference)).response(SURGE, 0.5)
-    alone, both = (answers([of_drag(0.03)], SURGE, VIDEORAY, FULL, fits=fits)[2] for fits in ((), [other]))
-    if share < 1.0:
-        assert (both.steady, both.rise, both.stop) == (alone.steady, alone.rise, alone.stop)
-    else:
-        assert (both.steady[1][0], both.rise[1][0]) == pytest.approx((V, Tau))
-        assert (V, Tau) < (alone.steady[1][0], alone.rise[1][0])
-
-
 def test_answers_of_a_file_have_the_intervals_of_its_estimates() -> None:
     """A file without estimates has no intervals: both ends are the value."""
     rov = load_vehicle(REFIT)
