@@ -208,7 +208,6 @@ def begin(tests: Tests) -> tuple[Prior, list[SampledLog], list[TableRow]]:
         thrust_errors=_thrust_errors(tests, curves),
         unseen=unseen,
         has_times=bool(tests.folder.astern("time_constant")),
-        bent=frozenset(curve.name for curve in curves if curve.name not in measured),
     )
     return known, logs, [row for row, _, counts in table_rows(tests, layout) if counts]
 

@@ -59,10 +59,10 @@ class Fit:
     """The objective at its minimum: what is told, predicted and, without weak effects, written."""
 
     objective: Objective
-    """Where no test measured the forces of a curve, it is quadratic, as in the file."""
+    """A curve is quadratic, as in the file, unless measured forces and the logs show that it bends."""
     best: Minimum
     posterior: Posterior
-    """With all effects, also those without evidence, and with the shapes of all curves."""
+    """With all effects, also those without evidence, and with the shapes of the curves that bend."""
     file: FileFit
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
@@ -125,8 +125,8 @@ def fit_all(
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
 
-    A curve with measured forces is quadratic, as in the vehicle file, unless all data make it more probable that it
-    bends. The shapes of the other curves only widen the intervals: what is told is a fit in which these are quadratic.
+    A curve is quadratic, as in the vehicle file, unless its forces were measured and all data make it more probable
+    that it bends. An assumed curve never bends: its shape would explain what a weak or reversed thruster does.
 
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
     the reason, and not the structure. Such a fit is not refined, because nobody should use it.
@@ -176,22 +176,19 @@ def fit_all(
     odds = {**first, **search.odds}
     if max(apart, default=0.0) < 2.0 or odds:  # other vehicles had the wrong structure
         difference = 0.0
-    told, least, bent = full, best, full.table.known.bent
-    of_measured = bent.intersection(measured)
-    if of_measured < bent:
-        told, least = _less_bent(full, of_measured, best, work, refines=not is_wrong)
-    file = (told, least)
-    if of_measured:
-        file = _less_bent(full, frozenset(), least, work, refines=not is_wrong)
-    misfits = with_shared(full.table.layout, structure(told, least))
+    file = full, best
+    if full.table.known.bent:
+        other, show = _bending(full, frozenset()), work.steps("quadratic thrust")
+        file = other, minimise(other, best.z, show, near=best.data, enough=QUICK)
+    misfits = with_shared(full.table.layout, structure(full, best))
     ratios = {axis: one.ratio for axis, one in misfits.items()}
-    unseen = unseen_errors(told, least.z, before, misfits)
+    unseen = unseen_errors(full, best.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)
     # Time constants of tables contain the lag, so that tables alone need none.
     of_file = without_weak_effects(*file, posterior.lasting if logs else (), refines=not is_wrong)
     return Fit(
-        told,
-        least,
+        full,
+        best,
         posterior,
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
@@ -205,17 +202,8 @@ def fit_all(
 
 
 def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
-    """Return J where other curves bend."""
+    """Return J where only some curves bend."""
     return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
-
-
-def _less_bent(
-    objective: Objective, bent: frozenset[str], near: Minimum, work: Work, *, refines: bool
-) -> tuple[Objective, Minimum]:
-    """Return J where only some curves bend, and its minimum, from that where more do."""
-    other, show = _bending(objective, bent), work.steps("quadratic thrust")
-    most = MOST_STEPS if refines else _UNREFINED
-    return other, minimise(other, near.z, show, near=near.data, most=most, enough=QUICK, last=refines)
 
 
 def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:

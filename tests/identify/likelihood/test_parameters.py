@@ -48,8 +48,8 @@ voltage: 0.75 ± 0.75, 0 to 4, absent at 0
 sensor lag of the depth sensor: 0 ± 0.3, 0 to inf, absent at 0
 sensor lag of the position sensor: 0 ± 0.3, 0 to inf, absent at 0
 thrust scale rear: ln 1 ± 0.1, 0 to inf
-thrust shape rear: 0 ± 1, -inf to inf
-linear thrust rear: 0 ± 0.1, 0 to 0
+thrust shape rear: 0 ± 1, 0 to 0
+linear thrust rear: 0 ± 0.1, -0.0594 to inf
 reverse thrust rear: 0 ± 0.1, -inf to inf, absent at 0
 dead band rear: 0 ± 0.05, 0 to 0.5, absent at 0
 thrust scale top: ln 1 ± 1, 0 to inf
