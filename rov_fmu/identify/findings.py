@@ -706,7 +706,8 @@ def _structure(structure: Structure) -> Finding | None:
     words = {"of": structure.of, "value": size, **dict(structure.words)}
     if isnan(structure.probability):
         return Finding("nearest", words={"nearest": hypothesis.sentence.format(odds="", **words)})
-    odds = f" (probability {percent(structure.probability) if structure.probability < _SURE else 'above 99%'})"
+    share = percent(structure.probability) if structure.probability < _SURE else "above 99%"
+    odds = f" (probability {share} among the known causes)"
     return Finding(structure.kind, words={**words, "odds": odds})
 
 

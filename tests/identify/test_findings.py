@@ -180,7 +180,12 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         quiet(),
     ),
     ("momentary commands", structured(LOST), "about 30% of the yaw command is lost between its rows (10 per", quiet()),
-    ("reversed commands", quiet(structures=(Structure("reversed commands", "l", 0.97),)), "(probability 97%)", quiet()),
+    (
+        "reversed commands",
+        quiet(structures=(Structure("reversed commands", "l", 0.97),)),
+        "(probability 97% among",
+        quiet(),
+    ),
     ("swapped commands", quiet(structures=(Structure("swapped commands", "l and r", 1.0),)), "l and r: their", quiet()),
     (
         "idle commands",
@@ -197,7 +202,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     (
         "means of rows",
         quiet(structures=(Structure("means of rows", "a.csv", 0.98),)),
-        "a.csv: each row has the means of its interval (probability 98%)",
+        "a.csv: each row has the means of its interval (probability 98% among",
         quiet(),
     ),
     (

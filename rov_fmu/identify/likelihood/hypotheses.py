@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf, radians
+from math import exp, inf, pi, radians
 
 import numpy as np
 
@@ -67,6 +67,8 @@ class Hypothesis:
     """What may have it, as `of`, and what else the sentence says about it."""
     least: float = 0.0
     """If the number of its row is nearer than this to where it is absent, it is told as an effect alone."""
+    ends: tuple[float, ...] = ()
+    """The bounds of its row at which its number may be, because nothing lies beyond."""
     why_no_null: str = ""
     """Why nothing within its bounds is the model without it; empty if it is where its row has its null, or with
     times that leave out nothing."""
@@ -78,6 +80,8 @@ class Hypothesis:
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
     is_first: bool = False
     """True if it changes what samples are, which would mislead all others. So it is tried before these."""
+    leaves_out: bool = False
+    """True if it leaves out velocities, which makes any model better: it has to explain the errors of the others."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
 
@@ -297,6 +301,7 @@ HYPOTHESES = {
         in_words=_of_settled,
         changes_thrust=False,
         is_first=True,
+        leaves_out=True,
     ),
     "means of rows": Hypothesis(
         0.03,
@@ -331,6 +336,7 @@ HYPOTHESES = {
             "turns its values back. Correct the angle of mounting where the log is made"
         ),
         least=0.05,  # sensors are mounted to about three degrees
+        ends=(-pi, pi),  # the same direction
     ),
     "reversed commands": Hypothesis(
         0.03,
@@ -383,6 +389,7 @@ HYPOTHESES = {
         sentence="thruster {of}: its force is {value} of that of a whole one{odds}. Check it for weed and damage",
         in_words=_of_twins,
         least=PRIORS["thrust"].deviation,  # two thrusters of one type differ so
+        ends=(0.0,),  # dead
         is_contrast=True,
     ),
     "command limit": Hypothesis(

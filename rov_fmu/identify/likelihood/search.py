@@ -15,7 +15,7 @@ from math import hypot, inf, isnan, log, nan, sqrt
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import Axis
+from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.hypotheses import (
@@ -55,6 +55,8 @@ _FORCE, _LOUD = 0.03, 1.0
 its mean where J compares hypotheses before any fit."""
 _FARTHEST = 3.0
 """The most by which parameters adapt to a hypothesis there, in deviations of their priors."""
+_BESIDE = 1e-3
+"""How near the number of a hypothesis may be to its bounds, relative to the range between them."""
 _HALF = 0.5
 """The command whose time constant changes where commands act earlier or later."""
 MOST_OF_ROW = CONSTANTS["most of row"].value
@@ -388,16 +390,29 @@ def settled(plain: StructureFit) -> tuple[StructureFit, dict[Suspect, float]]:
     J is compared over the samples that no hypothesis leaves out.
     """
     odds = dict[Suspect, float]()
-    for kind in (kind for kind, hypothesis in HYPOTHESES.items() if hypothesis.is_first):
-        if plain.predicted > HYPOTHESES[kind].alarm:
-            every = [*HYPOTHESES[kind].suspects(plain.objective.table.known, plain.objective.logs)]
-            for of in every:
-                prior = 2.0 * log(HYPOTHESES[kind].probability / len(every))
-                fit = fitted(plain, plain.objective, {(kind, of): None}, prior)
-                if fit and (gain := fit.score - plain.score - _left_out(plain, fit.objective)) > WINS:
-                    odds[kind, of] = gain
-                    plain = replace(fit, starts={}, score=fit.score - prior)
+    for kind, hypothesis in HYPOTHESES.items():
+        if not hypothesis.is_first or plain.predicted <= hypothesis.alarm:
+            continue
+        every = [*hypothesis.suspects(plain.objective.table.known, plain.objective.logs)]
+        end, won = plain, dict[Suspect, float]()
+        for of in every:
+            prior = 2.0 * log(hypothesis.probability / len(every))
+            fit = fitted(end, end.objective, {(kind, of): None}, prior)
+            if fit and (gain := fit.score - end.score - _left_out(end, fit.objective)) > WINS:
+                won[kind, of] = gain
+                end = replace(fit, starts={}, score=fit.score - prior)
+        if not hypothesis.leaves_out or _explains_by_samples(plain, end):
+            plain, odds = end, odds | won
     return plain, odds
+
+
+def _explains_by_samples(before: StructureFit, after: StructureFit) -> bool:
+    """Return True if a fit without some velocities predicts the others, or far better than one with all of them did.
+
+    Any model that lacks something is better without most of a sensor's samples, so that J alone does not tell.
+    """
+    old, new = (max(fit.misfits.get(axis, Misfit()).ratio for axis in (SURGE, SWAY)) for fit in (before, after))
+    return new <= max(ALARM, sqrt(old))
 
 
 def _left_out(fit: StructureFit, objective: Objective) -> float:
@@ -440,7 +455,7 @@ class StructureSearch:
                 break
             self.now = self._with_needed(best)
         # Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
-        # else. A lag hardly shows in the errors over 10 s, and J sees it.
+        # else.
         while doubtful := {one: z for one, z in self.now.starts.items() if not self._explains(one)}:
             self.nearest |= doubtful
             self.now = self._best_of(self.now.starts.keys() - doubtful.keys())
@@ -475,16 +490,19 @@ class StructureSearch:
         return max(fits, key=lambda one: one.score)
 
     def _explains(self, suspect: Suspect) -> bool:
-        """Return False for a hypothesis about the thrust without which the errors of the fit are hardly larger.
+        """Return False for a hypothesis whose number is at its bound, and for one about the thrust without which the
+        errors of the fit are hardly larger.
 
         The loss by errors is ln R, as in the score of predictions: it is 0 where noise alone is left (R = 1). A
-        hypothesis that explains the errors takes away at least half of it.
+        hypothesis that explains the errors takes away at least half of it. A lag hardly shows in the errors over 10 s,
+        and J sees it, if the model is right about an axis.
         """
         (kind, of), layout = suspect, self.now.objective.table.layout
+        if self._is_at_bound(suspect):
+            return False
+        before, after = self._best_of(self.now.starts.keys() - {suspect}).misfits, self.now.misfits
         if not HYPOTHESES[kind].changes_thrust or HYPOTHESES[kind].has_times:
-            return True
-        without = self._best_of(self.now.starts.keys() - {suspect})
-        before, after = without.misfits, self.now.misfits
+            return bool(of) or not after or any(one.ratio <= ALARM for one in after.values())
         ill = [t for t in layout.thrusters if t.name in of or not of]
         on = {axis for axis in before if any(t in layout.thrusters_along(axis) for t in ill)}
         others = all(after[axis].ratio <= max(ALARM, before[axis].ratio) for axis in before.keys() - on)
@@ -495,6 +513,14 @@ class StructureSearch:
             return False
         explains = after[worst_of].ratio ** 2 <= before[worst_of].ratio
         return others and explains and all(after[axis].ratio <= ALARM for axis in on)
+
+    def _is_at_bound(self, suspect: Suspect) -> bool:
+        """Return True if the number of a hypothesis would be farther, but for a bound of the search."""
+        if (n := row_of(self.now.objective, suspect)) is None:
+            return False
+        end, p = self.now.starts[suspect], self.now.objective.table.parameters[n]
+        bounds = {p.low, p.high}.difference(HYPOTHESES[suspect[0]].ends)
+        return isinstance(end, float) and any(abs(end - bound) < _BESIDE * (p.high - p.low) for bound in bounds)
 
     def _gain(self, other: StructureFit) -> float:
         """Return by how much another fit is better than it must be. With fewer hypotheses, it may be a little worse."""

@@ -39,6 +39,7 @@ from rov_fmu.identify.likelihood.search import (
     comparison,
     fitted,
     rough,
+    settled,
     structure,
     times_of,
     unseen_errors,
@@ -622,6 +623,8 @@ def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(mo
 
 REVERSED: Suspect = "reversed commands", ("r",)
 DEAD: Suspect = "health", ("r",)
+DROP: Suspect = "voltage drop", ()
+ROTORS: Suspect = "rotor lag", ()
 
 
 @pytest.fixture(scope="module")
@@ -686,6 +689,62 @@ def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_
     assert [*search.odds] == names
     assert search.nearest == ({} if names else {DEAD: 0.0})
     assert search.now is (dead if names else plain)
+
+
+@pytest.mark.parametrize(
+    ("suspect", "end", "after", "is_named"),
+    [
+        (DROP, 0.7, {SURGE: 1.2, YAW: 1.2}, True),
+        (DROP, 0.8, {SURGE: 1.2, YAW: 1.2}, False),
+        (DEAD, 0.0, {SURGE: 1.2, YAW: 1.2}, True),
+        (ROTORS, None, {SURGE: 9.0, YAW: 2.9}, True),
+        (ROTORS, None, {SURGE: 9.0, YAW: 3.1}, False),
+    ],
+)
+def test_no_cause_is_named_at_a_bound_of_the_search_nor_a_lag_where_no_axis_is_right(
+    suspect: Suspect,
+    end: float | None,
+    after: dict[Axis, float],
+    is_named: bool,
+    reversed_model: Objective,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A dead thruster is at a bound beyond which nothing lies."""
+    errors = {"plain": {SURGE: 9.0, YAW: 9.0}, "with": after}
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.structure",
+        lambda _, of: {axis: Misfit(error) for axis, error in errors[of].items()},
+    )
+    plain = StructureFit({}, reversed_model, cast("Minimum", "plain"), 0.0, 0.0)
+    changed = applied(reversed_model, {suspect: end})
+    search = searching(plain, StructureFit({suspect: end}, changed, cast("Minimum", "with"), 100.0, 100.0), monkeypatch)
+    search.run()
+    assert [*search.odds] == [suspect] * is_named
+    assert [*search.nearest] == [suspect] * (not is_named)
+
+
+@pytest.mark.parametrize(("before", "after", "is_named"), [(20.0, 2.9, True), (20.0, 5.0, False), (100.0, 9.0, True)])
+def test_velocities_are_left_out_only_if_the_others_are_then_predicted(
+    before: float, after: float, is_named: bool, model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """J alone would leave out the velocities of any sensor that the model does not explain, such as a stale one."""
+    drifting = with_logs(model, [with_jump(one) for one in model.logs])
+    z = drifting.mean
+    runs = drifting.runs(z)
+    data = [Data.of(run, [], len(z)) for run in runs]
+    plain = StructureFit({}, drifting, Minimum(z, 0.0, runs, data, np.eye(len(z))), 0.0, 0.0)
+
+    def fit(_: object, plain: Objective, starts: Starts, *__: object) -> StructureFit:
+        return StructureFit(starts, applied(plain, starts), cast("Minimum", "without"), 1e9, 1e9)
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.structure",
+        lambda _, of, **__: {SURGE: Misfit(after if of == "without" else before), YAW: Misfit(8.0)},
+    )
+    found, odds = settled(plain)
+    assert [kind for kind, _ in odds] == ["unsettled velocity"] * is_named
+    assert (found is plain) == (not is_named)
 
 
 def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.MonkeyPatch) -> StructureSearch:
