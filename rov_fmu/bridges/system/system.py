@@ -167,7 +167,7 @@ def _pass_on(
 ) -> None:
     """Give connected inputs the start values of their sources, where the plan has these.
 
-    Otherwise a current at the depth of the vehicle would begin with that at the surface, and jump at the first exchange.
+    Otherwise a current at depth would begin with that at the surface, and jump at the first exchange.
     """
     for (source, output), (component, name), factor in connections:
         if output in values[source] and name not in values[component]:
