@@ -13,9 +13,9 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.likelihood.records import push_along
 from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import push_along
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
 

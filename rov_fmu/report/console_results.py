@@ -88,13 +88,14 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     if kept := [effect for effect in identification.effects if effect.kept]:
         words = (f"{e.name} ({f'{e.of} {effect_in_words(e)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
-    yield from (f"{sentence}." for sentence in sentences(identification.findings, "assumed thrust"))
+    for kind in ("rests", "assumed thrust"):
+        yield from (f"{sentence}." for sentence in sentences(identification.findings, kind))
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
     others = sentences(identification.findings, "other files")
     yield from others
-    for kind in ("assumed thrust", "assumed vehicle"):
+    for kind in ("rests", "assumed thrust", "assumed vehicle"):
         others += sentences(identification.findings, kind)
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."

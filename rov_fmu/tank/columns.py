@@ -222,6 +222,17 @@ def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:
     return bool(layout.mix) and {*names} <= {*layout.commands}
 
 
+def push_along(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
+    """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
+    rows = len(next(iter(values.values())))
+    if COMMAND in values:  # of a log of this axis alone
+        return values[COMMAND]
+    effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
+    total = sum(abs(effect) for _, effect in effects)
+    pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]
+    return np.sum(pushes, axis=0) if pushes else np.zeros(rows)
+
+
 def thruster_commands(layout: Layout, values: Mapping[str, Array]) -> tuple[list[str], Array]:
     """Return the names of the thrusters, and n x thrusters commands within ±1, from n commands of inputs or thrusters.
     The forces of a wrench have no such limit.

@@ -154,6 +154,9 @@ _FACTS = {
     "interruption": (
         "{files}: nothing is logged for {gaps}, so the commands are unknown there. What follows counts as another log"
     ),
+    "rests": (
+        "{files}: {left} s are left out, {rests}: what rests against something does not move by its thrust and drag"
+    ),
     "source": "{files}: {quantities} from {source}, {rate:.3g} Hz{words}",
     "source of commands": "{files}: the commands of the thrusters are those of {source}{others}",
     "source of wrench": "{files}: the forces and moments on the body are those of {source}{others}",

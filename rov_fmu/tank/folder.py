@@ -46,6 +46,7 @@ from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.listing import NOT_OPENED, Listing, has_usual_suffix, is_bag, list_files
 from rov_fmu.tank.readers.parsers import header_of, one_parser
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
+from rov_fmu.tank.rest import USUAL_HEIGHT, without_rests
 from rov_fmu.vehicle.quantity import Quantity
 from rov_fmu.vehicle.vehicle import VehicleFileError
 
@@ -159,6 +160,10 @@ class Folder:
         self.logs = [piece for log in self.logs for piece in uninterrupted(checked(log))]
         if self.layout and self.layout.has_wrench:
             self._relate_to_full_force()
+        if (layout := self.logged) and (description := self.rov_file.description):
+            own = description.base_quantities.get("height")
+            height = own.value if own else USUAL_HEIGHT
+            self.logs = [piece for log in self.logs for piece in without_rests(log, layout, height)]
         self.findings += [finding for log in self.logs for finding in log.findings]
 
     def _relate_to_full_force(self) -> None:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,24 +98,34 @@ def uninterrupted(log: Log) -> list[Log]:
     told = np.unique(np.concatenate([commands.rows, *(channel.samples[0] for channel in log.channels)]))
     silent = gaps(told, told)
     interruption = about(log.file, "interruption", gaps=gaps_in_words(silent, float(commands.rows[0])))
+    return without_spans(log, silent, interruption) if silent else [log]
+
+
+def without_spans(log: Log, spans: Sequence[tuple[float, float]], why: Finding, least: float = 0.0) -> list[Log]:
+    """Return the pieces of a log with commands beside some spans of time (s, ascending), the first one with a finding
+    that says why. Pieces that are not longer than `least`, s, are left out."""
+    commands = log.commands
+    assert commands
+    first = min(float(commands.rows[0]), *(float(c.time[0]) for c in log.channels if len(c.time)))
     pieces = list[Log]()
-    for start, end in pairwise([-np.inf, *(after for _, after in silent), np.inf]):
-        rows = commands.rows[(commands.rows >= start) & (commands.rows < end)]
+    edges = [-np.inf, *(edge for span in spans for edge in span), np.inf]
+    for start, end in zip(edges[::2], edges[1::2], strict=True):
+        rows = commands.rows[(commands.rows >= start) & (commands.rows <= end)]
         channels = [
             replace(channel, time=channel.time[at], values=channel.values[at])
             for channel in log.channels
-            if (at := (channel.time >= start) & (channel.time < end) & channel.there).any()
+            if (at := (channel.time >= start) & (channel.time <= end) & channel.there).any()
         ]
-        if len(rows):
+        if len(rows) and (not least or rows[-1] - rows[0] > least):
             piece = replace(
                 log,
-                file=f"{log.file} (from {start - told[0]:.4g} s)" if pieces else log.file,
+                file=f"{log.file} (from {start - first:.4g} s)" if start > -np.inf else log.file,
                 commands=Commands.of_rows(commands.thrusters, rows, commands.at(rows), commands.source),
                 channels=tuple(channels),
-                findings=() if pieces else (*log.findings, interruption),
+                findings=() if pieces else (*log.findings, why),
             )
             pieces.append(piece)
-    return pieces if silent else [log]
+    return pieces
 
 
 def gaps_in_words(found: Sequence[tuple[float, float]], begin: float) -> str:

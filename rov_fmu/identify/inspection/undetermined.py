@@ -10,12 +10,12 @@ from rov_fmu.identify.beginning import layout_of
 from rov_fmu.identify.findings import LOG_OUTPUTS, UNLOGGED, how_to_measure, how_to_record, is_unlogged, sentences
 from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words, thrusters_alike
-from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows, push_along
+from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows
 from rov_fmu.identify.result import without
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, listed
 from rov_fmu.io.numbers import percent
-from rov_fmu.tank.columns import COMMAND
+from rov_fmu.tank.columns import COMMAND, push_along
 from rov_fmu.tank.description import ROV_FILE, Description
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.inspection.headers import may_be_velocity

@@ -22,7 +22,7 @@ from rov_fmu.identify.result import least_error
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, gaps, held, in_rows
-from rov_fmu.tank.columns import COMMAND
+from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import LEAST_SAMPLES, Channel, Log
 from rov_fmu.tank.quality import gaps_in_words, jumps
@@ -404,17 +404,6 @@ def beside_lines(values: Array) -> float:
     """Return the share of the variance of equidistant values that straight lines between them do not have."""
     whole = float(np.var(values))
     return 1.0 - float(np.var(0.5 * (values[1:] + values[:-1]))) / whole if whole > 0.0 else 0.0
-
-
-def push_along(layout: Layout, axis: Axis, values: Mapping[str, Array]) -> Array:
-    """Return the command along an axis at each row, a fraction of that of all its thrusters at full command."""
-    rows = len(next(iter(values.values())))
-    if COMMAND in values:  # of a log of this axis alone
-        return values[COMMAND]
-    effects = [(thruster.name, thruster.effect(axis)) for thruster in layout.thrusters_along(axis)]
-    total = sum(abs(effect) for _, effect in effects)
-    pushes = [effect / total * values.get(name, np.zeros(rows)) for name, effect in effects]
-    return np.sum(pushes, axis=0) if pushes else np.zeros(rows)
 
 
 def shown_axes(log: Log, layout: Layout) -> list[Axis]:

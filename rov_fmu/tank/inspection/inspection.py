@@ -31,6 +31,7 @@ from rov_fmu.tank.readers.parsers import guarded, open_table
 from rov_fmu.tank.readers.tables import grown_rows, read_start
 from rov_fmu.tank.readers.tank_tables import read_rows
 from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, time_columns
+from rov_fmu.tank.rest import without_rests
 
 PARTS = 32
 """The number of parts of the time for which the course of a signal is told."""
@@ -131,8 +132,9 @@ def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tab
     else:
         names, _ = names_of(layout, tables)
         axis = None
-    logs = read_logs(path, layout or Layout((), (), ()), names, axis, is_part=True)
-    return [_of_log(path, log, unread, columns) for log in map(checked, logs)]
+    layout = layout or Layout((), (), ())
+    logs = [checked(log) for log in read_logs(path, layout, names, axis, is_part=True)]
+    return [_of_log(path, log, without_rests(log, layout)[0].findings, unread, columns) for log in logs]
 
 
 def _known_name(known: KnownColumns, header: str) -> str:
@@ -142,15 +144,17 @@ def _known_name(known: KnownColumns, header: str) -> str:
     return ""
 
 
-def _of_log(path: Path, log: Log, unread: Mapping[str, str], columns: Mapping[str, str]) -> Inspection:
-    """Return what a log contains; `unread` has the columns that are not recognised."""
+def _of_log(
+    path: Path, log: Log, findings: Sequence[Finding], unread: Mapping[str, str], columns: Mapping[str, str]
+) -> Inspection:
+    """Return what a log contains, with its findings; `unread` has the columns that are not recognised."""
     channels = tuple(
         _signal(channel.quantity.name, channel.quantity.unit, channel.time, channel.values)
         for channel in log.channels
         if not channel.unused
     )
     unread = {**unread, **log.unread}
-    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, log.findings, columns, log)
+    return Inspection(path, log.file, tuple(_commands(log)), channels, unread, tuple(findings), columns, log)
 
 
 def _of_table(path: Path, kind: str, renamed: Mapping[str, str], ranges: Mapping[str, str]) -> Inspection:
