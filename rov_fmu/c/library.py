@@ -6,7 +6,7 @@ import json
 import platform
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from contextlib import suppress
 from pathlib import Path
 from threading import Lock
@@ -41,7 +41,7 @@ _FILES = {
     FILTER_LANES_FILE: (VECTORS_HEADER, FILTER_FILE, FILTER_LANES_FILE),
 }
 """The files of each library; the last one is compiled."""
-_LOADED: dict[str, ctypes.CDLL] = {}
+_LOADED: dict[Hashable, ctypes.CDLL] = {}
 """The libraries that this process has loaded, by the file and the layout of the vehicle."""
 _LOADING = Lock()
 
@@ -56,10 +56,10 @@ def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:
 
     Raises BuildError when it cannot be compiled or loaded.
     """
-    return load_sources(f"{file.name} {vehicle.layout!r}", lambda: engine_sources(vehicle.layout, file))
+    return load_sources((file, vehicle.layout), lambda: engine_sources(vehicle.layout, file))
 
 
-def load_sources(key: str, sources_of: Callable[[], dict[str, str]]) -> ctypes.CDLL:
+def load_sources(key: Hashable, sources_of: Callable[[], dict[str, str]]) -> ctypes.CDLL:
     """Return the library of C files (file name to text), the last of which includes the others.
 
     This process keeps it under the key. Raises BuildError when it cannot be compiled or loaded.

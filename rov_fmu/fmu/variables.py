@@ -7,7 +7,8 @@ variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import isfinite
 from typing import Any
 
@@ -104,7 +105,21 @@ def _over_ground(layout: Layout, direction: str, current: str, terms: Mapping[st
 
 def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
     """Return all variables of the FMU of a vehicle, in the order of their value references."""
-    layout = vehicle.layout
+    coefficients = vehicle.layout.coefficients
+    return tuple(
+        replace(v, start=vehicle[v.name]) if v.name in coefficients else v for v in _variables_of(vehicle.layout)
+    )
+
+
+@lru_cache(maxsize=100)
+def units_of(layout: Layout) -> dict[str, str]:
+    """Return the unit of each variable that is no parameter, by its name."""
+    return {v.name: v.unit for v in _variables_of(layout) if v.causality != "parameter"}
+
+
+@lru_cache(maxsize=100)
+def _variables_of(layout: Layout) -> tuple[Variable, ...]:
+    """Return the variables of the vehicles with a layout, without the values of the coefficients."""
     result: dict[str, Variable] = {}
 
     def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> None:
@@ -137,8 +152,7 @@ def variables(vehicle: Vehicle) -> tuple[Variable, ...]:
         add(name, declaration, "local", "discrete", initial="calculated")
     for name, declaration in (layout.coefficients | layout.initial).items():
         variability = "tunable" if declaration.tunable else "fixed"
-        start = 0.0 if name in layout.initial else vehicle[name]
-        add(name, declaration, "parameter", variability, initial="exact", start=start)
+        add(name, declaration, "parameter", variability, initial="exact", start=0.0)
     return tuple(result[name] for name in layout.variables)
 
 

@@ -230,14 +230,13 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
-        from rov_fmu.fmu.variables import variables
+        from rov_fmu.fmu.variables import units_of
         from rov_fmu.interface.arguments import checked_record, checked_start
         from rov_fmu.interface.stepper import VehicleStepper
 
         check_coefficients(self.layout, self.coefficients)
         begin = {name: value.item() for name, value in checked_start(start, self.layout, many=False).items()}
-        names = [v.name for v in variables(self) if v.causality != "parameter"]
-        return VehicleStepper(self, begin, checked_record(record, self.layout, names))
+        return VehicleStepper(self, begin, checked_record(record, self.layout, units_of(self.layout)))
 
     def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
         """Return the time derivatives of the states by their names, in SI units.

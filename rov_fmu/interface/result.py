@@ -12,7 +12,7 @@ from rov_fmu.c.simulation import reasons, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.units import in_degrees, unit_of
-from rov_fmu.fmu.variables import variables
+from rov_fmu.fmu.variables import units_of
 from rov_fmu.interface.arguments import (
     Inputs,
     checked_inputs,
@@ -198,7 +198,7 @@ def simulated(
         **checked_start(start, layout, many=many),
         **checked_values("coefficients", coefficients, layout.coefficients, many=many),
     }
-    units = {v.name: v.unit for v in variables(vehicle) if v.causality != "parameter"}
+    units = units_of(layout)
     recorded = checked_record(record, layout, units)
     vehicles = number_of_vehicles(values)
     try:
