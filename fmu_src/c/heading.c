@@ -44,16 +44,16 @@ static real model_heading(const real at[], real near)
     return unwrapped(atan2(horizontal[1], horizontal[0]), near);
 }
 
-/* Follow the attitude from time 0 to `end`. Per unit of time, the vehicle turns by at most `turn`, and the direction beside the
+/* Follow the attitude from time 0, where the states are `start`, to `end`. Per unit of time, the vehicle turns by at most `turn`, and the direction beside the
  * nose by at most `swing`. In each part of this time, the direction moves by less than its distance from the vertical, so that
  * its heading is that of the same turn; and the vehicle turns by less than half a turn, so that its quaternion has the sign
  * that is nearer to the one before. */
-static void attitude_follow(rotation_at *at, const void *motion, real end, real turn, real swing, real state[N_STATES],
-                            real *heading)
+static void attitude_follow(rotation_at *at, const void *motion, const real start[N_SERIES], real end, real turn, real swing,
+                            real state[N_STATES], real *heading)
 {
     const real shortest = end / (double)MOST_PARTS;
     real y[N_SERIES], horizontal[2], t = 0.0;
-    at(motion, t, y);
+    memcpy(y, start, sizeof y);
     for (int n = 1; ANY(t < end); n++) {
         beside_nose(&y[Y_R_11], &y[Y_R_21], horizontal);
         const real distance = sqrt(horizontal[0] * horizontal[0] + horizontal[1] * horizontal[1]);
@@ -66,17 +66,27 @@ static void attitude_follow(rotation_at *at, const void *motion, real end, real 
     }
 }
 
+/* A piece of a step: its series, its length, and the changes of the states up to its end, which are those of the series there. */
+typedef struct {
+    const series *s;
+    real length;
+    const real *change;
+} piece;
+
 static void rotation_in_piece(const void *motion, real t, real y[N_SERIES])
 {
-    const series *const s = (const series *)motion;
+    const piece *const p = (const piece *)motion;
+    const bool is_end = ALL(t == p->length);
     for (int i = 0; i < N_ROTATION; i++) {
-        y[ROTATION[i]] = s->c[0][ROTATION[i]] + series_change(s, ROTATION[i], t);
+        const int k = ROTATION[i];
+        y[k] = p->s->c[0][k] + (is_end ? p->change[k] : series_change(p->s, k, t));
     }
 }
 
 /* Follow the attitude through a piece of a step. */
-static void attitude_after_piece(const series *s, real length, real state[N_STATES], real *heading)
+static void attitude_after_piece(const series *s, real length, const real change[N_SERIES], real state[N_STATES], real *heading)
 {
+    const piece whole = {s, length, change};
     real turn = 0.0, swing = 0.0;
     for (int i = FIRST_ROTATION; i < N_VELOCITIES; i++) {
         real size = 0.0; /* an upper bound of the angular velocity */
@@ -86,7 +96,7 @@ static void attitude_after_piece(const series *s, real length, real state[N_STAT
         turn += size * s->unit;
         swing += (i == ROLL ? 2.0 * BESIDE_NOSE[1] : 1.0) * size * s->unit;
     }
-    attitude_follow(rotation_in_piece, s, length, turn, swing, state, heading);
+    attitude_follow(rotation_in_piece, &whole, s->c[0], length, turn, swing, state, heading);
 }
 
 #if LANES == 1
@@ -119,11 +129,11 @@ static void attitude_after_circle(const circle *c, double angle, double state[N_
     }
     swing = sqrt(swing);
     memcpy(once, state, sizeof once);
-    attitude_follow(rotation_on_circle, c, TWO_PI, 1.0, swing, once, heading);
+    attitude_follow(rotation_on_circle, c, c->start, TWO_PI, 1.0, swing, once, heading);
     *heading = before + turns * (*heading - before);
     if (turns != 2.0 * floor(0.5 * turns)) { /* an odd number */
         memcpy(state, once, sizeof once);
     }
-    attitude_follow(rotation_on_circle, c, angle - turns * TWO_PI, 1.0, swing, state, heading);
+    attitude_follow(rotation_on_circle, c, c->start, angle - turns * TWO_PI, 1.0, swing, state, heading);
 }
 #endif

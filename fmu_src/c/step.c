@@ -46,24 +46,15 @@ typedef struct {
     uint64_t settled;              /* one bit for each component; it is set once the component has settled */
 } motion;
 
-/* Return the sum of the sizes of the states in a group. */
-static inline real group_size(const real x[N_SERIES], int group)
-{
-    real size = 0.0;
-    for (int i = 0; i < N_SERIES; i++) {
-        size += GROUP[i] == group ? fabs(x[i]) : 0.0;
-    }
-    return size;
-}
-
 /* Take the sizes of the states at the start of a piece into account. */
 INLINE void motion_measure(motion *m)
 {
+    real size[N_SERIES];
+    model_group_sizes(m->y, size);
     for (int i = 0; i < N_USED; i++) {
         if (GROUP[i] == i) {
-            const real size = group_size(m->y, i);
-            m->scale[i] = fmax(m->scale[i], size);
-            m->largest[i] = fmax(m->largest[i], size);
+            m->scale[i] = fmax(m->scale[i], size[i]);
+            m->largest[i] = fmax(m->largest[i], size[i]);
         }
     }
 }
@@ -151,7 +142,7 @@ INLINE void motion_find_moving(const motion *m, series *s)
 /* Begin a series at the current states: compute its first two coefficients, the directions, and which components move. */
 INLINE void motion_begin(motion *m, real unit, series *s)
 {
-    real rate[N_SERIES];
+    real rate[N_SERIES], size[N_SERIES];
     mask turned = NO;
     s->unit = unit;
     for (int i = 0; i < N_MONITORED; i++) {
@@ -164,8 +155,9 @@ INLINE void motion_begin(motion *m, real unit, series *s)
         s->c[1][i] = unit * rate[i];
     }
     motion_find_moving(m, s);
+    model_group_sizes(s->c[1], size);
     for (int i = 0; i < N_SERIES; i++) {
-        s->size[i] = m->scale[GROUP[i]] + group_size(s->c[1], GROUP[i]);
+        s->size[i] = m->scale[GROUP[i]] + size[GROUP[i]];
     }
     for (int i = 0; i < N_MONITORED; i++) {
         const mask back = m->y[i] == 0.0 && s->c[1][i] < 0.0;
@@ -287,14 +279,14 @@ INLINE void motion_start(motion *m, const real at[], const model_numbers *n, rea
 INLINE mask motion_pass(motion *m, const real at[], const series *s, real length, real reach, real change[N_SERIES])
 {
     (void)at;
-#if HAS_ATTITUDE
-    attitude_after_piece(s, length, m->state, &m->heading);
-#endif
     if (ALL(length == 1.0)) { /* with a constant, the compiler leaves out the multiplications */
         motion_move(m, s, 1.0, change);
     } else {
         motion_move(m, s, length, change);
     }
+#if HAS_ATTITUDE
+    attitude_after_piece(s, length, change, m->state, &m->heading);
+#endif
     for (int i = 0; i < N_USED; i++) {
         m->scale[i] *= 0.25;
     }

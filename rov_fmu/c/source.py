@@ -7,7 +7,7 @@ from itertools import groupby, takewhile
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.alone import response_formulas
-from rov_fmu.equation.attitude import QUATERNION, TURN, start_formulas
+from rov_fmu.equation.attitude import QUATERNION, TURN, entry, start_formulas
 from rov_fmu.equation.catalogue import rate_name
 from rov_fmu.equation.expression import (
     PYTHON,
@@ -24,6 +24,7 @@ from rov_fmu.equation.expression import (
 from rov_fmu.equation.forces import AT_SURFACE
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
+from rov_fmu.io.groups import grouped
 
 _Run = tuple[str, str, int]
 """The products of a state with neighbouring ones: that state, the first neighbour, and their number. For squares, the
@@ -261,6 +262,18 @@ class EquationSource:
                     return always
                 partners |= sum(1 << self.equation.states.index(other) for other in others)
         return partners
+
+    @cached_property
+    def groups(self) -> dict[str, list[str]]:
+        """The states whose rounding errors are compared with their common size, by the first of them.
+
+        They are the cosine and the sine of the heading, and the horizontal position; with an attitude, each row of the
+        rotation matrix, and the position. With a surface, the depth is a group of its own.
+        """
+        has_depth = self.layout.has_attitude and not self.layout.surface
+        first = {"sin_psi": "cos_psi", "y": "x"} | ({"z": "x"} if has_depth else {})
+        first |= {entry(row, column): entry(row, 1) for row in (1, 2, 3) for column in (1, 2, 3)}
+        return grouped((first.get(name, name), name) for name in self.equation.states)
 
     # ---- Derivatives of the vehicle's states ----
 
