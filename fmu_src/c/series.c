@@ -43,49 +43,63 @@ static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.
                                           1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
                                           1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
 
-/* Compute coefficient m > 0 of the products of state a with `count` states, from b on. Blocks that do not move are skipped. */
-INLINE void series_products(const real c[ORDER + 1][N_SERIES], unsigned blocks, int a, int b, int count, int m,
-                            real product[])
-{
-    const bool first_moves = blocks >> BLOCK_OF[a] & 1U, second_moves = blocks >> BLOCK_OF[b] & 1U;
-    for (int i = 0; i < count; i++) {
-        product[i] = 0.0;
-    }
-    if (first_moves && second_moves) {
-        for (int j = m - 1; j > 0; j--) {
-            for (int i = 0; i < count; i++) {
-                product[i] += c[j][a] * c[m - j][b + i];
-            }
-        }
-    }
-    if (second_moves) { /* coefficient m was computed last, so it is needed last */
-        for (int i = 0; i < count; i++) {
-            product[i] += c[0][a] * c[m][b + i];
-        }
-    }
-    if (first_moves) {
-        for (int i = 0; i < count; i++) {
-            product[i] += c[m][a] * c[0][b + i];
-        }
-    }
-}
+/* Two numbers that a processor adds and multiplies at once. Other compilers do it one after the other, to the same bits. */
+#if LANES == 1 && HAS_ATTITUDE && defined __GNUC__
+typedef double pair __attribute__((vector_size(16)));
 
-/* Compute coefficient m > 0 of the squares of `count` states, from a on. */
-INLINE void series_squares(real c[ORDER + 1][N_SERIES], int a, int count, int m, real square[])
+INLINE pair pair_of(const double x[], int a, int b)
 {
-    for (int i = 0; i < count; i++) {
-        square[i] = 0.0;
+    pair both = {x[a], x[b]};
+    if (b == a + 1) {
+        memcpy(&both, x + a, sizeof both);
     }
-    for (int j = (m - 1) / 2; j > 0; j--) {
-        for (int i = 0; i < count; i++) {
-            square[i] += c[j][a + i] * c[m - j][a + i];
-        }
-    }
-    for (int i = 0; i < count; i++) {
-        square[i] = 2.0 * (square[i] + c[0][a + i] * c[m][a + i]);
-        square[i] += m % 2 == 0 ? c[m / 2][a + i] * c[m / 2][a + i] : 0.0;
-    }
+    return both;
 }
+#define SUM_TWO(OP, k, a, b, a_2, b_2) two[k] OP pair_of(x, a, a_2) * pair_of(y, b, b_2);
+#define TWICE_TWO(OP, k, a, b, a_2, b_2) two[k] OP two[k];
+#else
+typedef real pair[2];
+#define SUM_TWO(OP, k, a, b, a_2, b_2) two[k][0] OP x[a] * y[b]; two[k][1] OP x[a_2] * y[b_2];
+#define TWICE_TWO(OP, k, a, b, a_2, b_2) two[k][0] OP two[k][0]; two[k][1] OP two[k][1];
+#endif
+#define SUM_ONE(OP, k, a, b) one[k] OP x[a] * y[b];
+#define TWICE_ONE(OP, k, a, b) one[k] OP one[k];
+
+/* Compute coefficient m > 0 of the products of equation.h: the sums of the products of coefficient j of the first factors, x, with
+ * coefficient m - j of the second ones, y. PRODUCTS adds one product to each sum. Coefficient m was computed last, so it is
+ * needed last. `seconds` has the bits of the blocks of the second factors; while none of these moves, nothing else is left. */
+#define SERIES_PRODUCTS(seconds)                     \
+    {                                                \
+        const real *x = c[m - 1], *y = c[1];         \
+        if (blocks & (seconds)) {                    \
+            PRODUCTS(SUM, =)                         \
+            for (int j = m - 2; j >= 0; j--) {       \
+                x = c[j], y = c[m - j];              \
+                PRODUCTS(SUM, +=)                    \
+            }                                        \
+            x = c[m], y = c[0];                      \
+            PRODUCTS(SUM, +=)                        \
+        } else {                                     \
+            x = c[m], y = c[0];                      \
+            PRODUCTS(SUM, =)                         \
+        }                                            \
+    }
+
+/* The same for squares, in which all products but the middle one occur twice. */
+#define SERIES_SQUARES                               \
+    {                                                \
+        const real *x = c[(m - 1) / 2], *y = c[m - (m - 1) / 2]; \
+        PRODUCTS(SUM, =)                             \
+        for (int j = (m - 1) / 2 - 1; j >= 0; j--) { \
+            x = c[j], y = c[m - j];                  \
+            PRODUCTS(SUM, +=)                        \
+        }                                            \
+        PRODUCTS(TWICE, +=)                          \
+        if (m % 2 == 0) {                            \
+            x = y = c[m / 2];                        \
+            PRODUCTS(SUM, +=)                        \
+        }                                            \
+    }
 
 /* The functions of equation.h: SERIES_BLOCK computes coefficient m + 1 of one block of states, SERIES_TERMS of all states. GROW
  * calls a block, or sets its coefficients to 0 where the block does not move. */

@@ -1,11 +1,12 @@
 """The equation of motion of a vehicle in C: the files model.h and equation.h, generated from its table of terms."""
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from itertools import groupby, takewhile
+from itertools import groupby
 
 from rov_fmu.c.compile import C_SOURCES
+from rov_fmu.c.products import Products
 from rov_fmu.equation.alone import response_formulas
 from rov_fmu.equation.attitude import QUATERNION, TURN, entry, start_formulas
 from rov_fmu.equation.catalogue import rate_name
@@ -25,10 +26,6 @@ from rov_fmu.equation.forces import AT_SURFACE
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
 from rov_fmu.io.groups import grouped
-
-_Run = tuple[str, str, int]
-"""The products of a state with neighbouring ones: that state, the first neighbour, and their number. For squares, the
-first item is empty."""
 
 
 class EquationSource:
@@ -192,36 +189,10 @@ class EquationSource:
         """The index of the block of each state."""
         return {name: i for i, block in enumerate(self.blocks) for name in block}
 
-    def products(self, block: Sequence[str], above: bool = False) -> tuple[list[_Run], dict[tuple[str, ...], str]]:
-        """Return the products of a block in runs, and the C expression of each product."""
-        states = self.equation.states
-        pairs = {term.factors for name in block for term in self.terms(name, above) if len(term.factors) == 2}
-        wanted = {("", a) if a == b else (a, b) for a, b in pairs}
-        runs: list[_Run] = []
-        places: dict[tuple[str, ...], str] = {}
-        while wanted:
-            first, second, length = self._longest_run(wanted)
-            for lane in range(length):
-                other = states[states.index(second) + lane]
-                places[first or other, other] = places[other, first or other] = f"p{len(runs)}[{lane}]"
-                wanted -= {(first, other), (other, first)}
-            runs.append((first, second, length))
-        return runs, places
-
-    def _longest_run(self, wanted: Collection[tuple[str, str]]) -> _Run:
-        """Return the longest run among some products; of several, the first in the order of the states."""
-        states = self.equation.states
-        candidates = {*wanted, *((b, a) for a, b in wanted if a)}
-
-        def length(pair: tuple[str, str]) -> int:
-            """Return the number of neighbours from the second state on, of the same block, with which to multiply."""
-            first, second = pair
-            block = self.block_of[second]
-            neighbours = states[states.index(second) :]
-            return len([*takewhile(lambda y: (first, y) in candidates and self.block_of[y] == block, neighbours)])
-
-        best = max(sorted(candidates, key=lambda pair: (pair[0], states.index(pair[1]))), key=length)
-        return *best, length(best)
+    def products(self, block: Sequence[str], above: bool = False) -> Products:
+        """Return the products of two states in the rates of a block."""
+        pairs = (term.factors for name in block for term in self.terms(name, above) if len(term.factors) == 2)
+        return Products(self.equation.states, self.block_of, pairs)
 
     def next_term(self, name: str, places: Mapping[tuple[str, ...], str], above: bool = False) -> str:
         """Write coefficient m > 0 of the rate of a state. `places` are the C expressions of the products."""
