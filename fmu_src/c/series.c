@@ -4,8 +4,6 @@
  * of high-order Taylor methods, 2005). */
 #include <float.h>
 #include <stdbool.h>
-#include <stdint.h>
-#include <string.h>
 
 #include "real.h"
 
@@ -177,26 +175,27 @@ static real series_change(const series *s, int i, real t)
     return change;
 }
 
-/* Return true when the sizes of the coefficients prove that no velocity reverses before t = 1. */
-INLINE mask series_keeps_directions(const series *s)
+/* Return true when the sizes of the coefficients prove that no velocity reverses before t = length. */
+INLINE mask series_keeps_directions(const series *s, real length)
 {
     real others[N_MONITORED];
     mask keeps = YES;
     memset(others, 0, sizeof others);
     for (int n = s->order; n > 1; n--) {
         for (int i = 0; i < N_MONITORED; i++) {
-            others[i] += fabs(s->c[n][i]);
+            others[i] = others[i] * length + fabs(s->c[n][i]);
         }
     }
     for (int i = 0; i < N_MONITORED; i++) {
         const real c0 = s->c[0][i], c1 = s->c[1][i];
         const mask against = (c0 > 0.0 && c1 < 0.0) || (c0 < 0.0 && c1 > 0.0); /* a product would underflow */
-        keeps &= (against ? fabs(c0) - fabs(c1) : fabs(c0) + fabs(c1)) >= others[i];
+        const real least = against ? fabs(c0) - length * fabs(c1) : fabs(c0) + length * fabs(c1);
+        keeps &= least >= others[i] * length * length;
     }
     return keeps;
 }
 
-#if LANES == 1 /* one vehicle at a time: long series, and reversals */
+#if LANES == 1
 /* Return the order of the first coefficient of state i that is not 0, or s->order + 1 when all are 0. */
 static int series_first(const series *s, int i)
 {
@@ -206,55 +205,51 @@ static int series_first(const series *s, int i)
     }
     return first;
 }
-
-/* Return the exponent of the largest power of two that is not above x > 0. Subnormal numbers are treated as 0. */
-INLINE int exponent_of(double x)
-{
-    uint64_t bits;
-    memcpy(&bits, &x, sizeof bits);
-    return (int)(bits >> 52 & 0x7ff) - 1023;
-}
+#endif
 
 /* Return the logarithm to base 2 of the largest t at which the last three terms are still within their limits, relative to
  * `size` t^first. */
-static double series_bound(const series *s, int i, int first, double size)
+INLINE real series_bound(const series *s, int i, int first, real size)
 {
-    const double a = fabs(s->c[ORDER - 1][i]), b = fabs(s->c[ORDER][i]);
-    const int before = exponent_of(SMALL_BEFORE[ORDER - 4] * size / a), last = exponent_of(SMALL_LAST[ORDER - 4] * size / b);
-    const int third = exponent_of(6.0 * SMALL_BEFORE[ORDER - 4] * size / fabs(s->c[ORDER - 2][i]));
-    const int decrease = exponent_of(DBL_EPSILON * size / b * (a / b)), rounding = exponent_of(2.0 * DBL_EPSILON * size / b);
-    const double least = fmin((double)before / (ORDER - 1 - first), (double)last / (ORDER - first));
-    return fmin(fmin(least, (double)third / (ORDER - 2 - first)),
-                fmax((double)decrease / (ORDER + 1 - first), (double)rounding / (ORDER - first)));
+    const real a = fabs(s->c[ORDER - 1][i]), b = fabs(s->c[ORDER][i]);
+    const real before = exponent_of(SMALL_BEFORE[ORDER - 4] * size / a), last = exponent_of(SMALL_LAST[ORDER - 4] * size / b);
+    const real third = exponent_of(6.0 * SMALL_BEFORE[ORDER - 4] * size / fabs(s->c[ORDER - 2][i]));
+    const real decrease = exponent_of(DBL_EPSILON * size / b * (a / b)), rounding = exponent_of(2.0 * DBL_EPSILON * size / b);
+    const real least = fmin(PART(before, ORDER - 1 - first), PART(last, ORDER - first));
+    return fmin(fmin(least, PART(third, ORDER - 2 - first)),
+                fmax(PART(decrease, ORDER + 1 - first), PART(rounding, ORDER - first)));
 }
 
 /* Return the largest t, at most 1, up to which a series of order ORDER may be used. Return 0 when its unit of time is so long
  * that coefficients overflow or quotients of them underflow. */
-static double series_reach(const series *s, const double scale[N_SERIES])
+INLINE real series_reach(const series *s, const real scale[N_SERIES])
 {
-    double reach = 0.0; /* its logarithm to base 2 */
+    real reach = 0.0; /* its logarithm to base 2 */
+    mask fails = NO;
     for (int i = 0; i < N_USED; i++) {
-        const double sum = fabs(s->c[ORDER][i]) + fabs(s->c[ORDER - 1][i]) + fabs(s->c[ORDER - 2][i]);
-        if (!(sum <= DBL_MAX)) {
-            return 0.0;
-        }
-        if (sum == 0.0) {
+        const real sum = fabs(s->c[ORDER][i]) + fabs(s->c[ORDER - 1][i]) + fabs(s->c[ORDER - 2][i]);
+        fails |= !(sum <= DBL_MAX);
+        if (!ANY(sum != 0.0)) {
             continue;
         }
         /* relative to the size of the state, or to its first coefficient, whichever allows the larger t */
-        double own = series_bound(s, i, 0, scale[GROUP[i]]);
+        real own = series_bound(s, i, 0, scale[GROUP[i]]);
+#if LANES == 1
         const int first = s->c[0][i] != 0.0 ? 1 : series_first(s, i);
-        if (own < reach && first < ORDER - 2) {
+#else
+        const int first = 1;
+#endif
+        const mask nearer = own < reach;
+        if (ANY(nearer) && first < ORDER - 2) {
             own = fmax(own, series_bound(s, i, first, fabs(s->c[first][i])));
         }
-        reach = fmin(reach, own);
+        reach = sum == 0.0 ? reach : fmin(reach, own);
     }
-    if (reach < -50.0) { /* 2^-53 to the power ORDER is near the smallest double, so a quotient may have underflowed */
-        return 0.0;
-    }
-    return pow(2.0, reach);
+    fails |= reach < -50.0; /* 2^-53 to the power ORDER is near the smallest double, so a quotient may have underflowed */
+    return fails ? 0.0 : power_of_two(fmax(reach, -50.0));
 }
 
+#if LANES == 1 /* one vehicle at a time: reversals */
 /* Return the time at which a state is 0, by Newton's method. Its slope must stay within a quarter of the first slope, so there
  * is only one such time. */
 static double series_root(const series *s, int i)

@@ -464,7 +464,7 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         }
         double length = reach;
         int reversed = NONE;
-        if (reach < 1.0 || !series_keeps_directions(&s)) {
+        if (reach < 1.0 || !series_keeps_directions(&s, 1.0)) {
             reversed = series_cut(&s, &length);
         }
         const bool ends = motion_pass(&m, at, &s, length, reach, change);

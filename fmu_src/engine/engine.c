@@ -91,9 +91,9 @@ void single_calculate(single *v)
     model_calculate(v->at, &((whole *)v)->numbers, v->heading);
 }
 
-/* Return the length of a piece of a vehicle in a lane, from the coefficients of its series. *reach is 1 when the series may be used up
- * to t = 1. Otherwise it becomes the largest usable t, or 0 when the series overflows. */
-double single_length(const double c[], const double scale[], int order, double *reach, int *reversed)
+/* Return the length, at most `reach`, of a piece of a vehicle in a lane, from the coefficients of its series. *reversed becomes the
+ * velocity that reverses there, or NONE. */
+double single_cut(const double c[], int order, double reach, int *reversed)
 {
     series s;
     s.order = order;
@@ -101,12 +101,8 @@ double single_length(const double c[], const double scale[], int order, double *
         s.pace[i] = 1.0;
     }
     memcpy(s.c, c, (size_t)(order + 1) * sizeof s.c[0]);
-    if (*reach < 1.0) {
-        *reach = series_reach(&s, scale);
-    }
-    double length = *reach;
-    *reversed = length > 0.0 ? series_cut(&s, &length) : NONE;
-    return length;
+    *reversed = series_cut(&s, &reach);
+    return reach;
 }
 
 /* Give a vehicle the inputs of the step that begins at a time. */

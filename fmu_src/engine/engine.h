@@ -61,7 +61,7 @@ EXPORT bool single_step(single *v, double t, double h);
 EXPORT void single_calculate(single *v);
 bool single_waits(const single *v);
 void single_begin_current(single *v);
-double single_length(const double c[], const double scale[], int order, double *reach, int *reversed);
+double single_cut(const double c[], int order, double reach, int *reversed);
 
 /* Return one of several vehicles whose memory lies side by side. */
 static inline single *single_of(void *vehicles, ptrdiff_t n)

@@ -152,31 +152,29 @@ static int order_in_lane(const series *s, int i, bool whole)
 static mask take_piece(block *b, mask started, mask *left)
 {
     motion *const m = &b->m;
-    real change[N_SERIES], length = 1.0, reach = 1.0;
-    double c[(ORDER + 1) * N_SERIES], scale[N_SERIES];
+    real change[N_SERIES];
+    double c[(ORDER + 1) * N_SERIES];
     int reversed[LANES];
     series s;
     motion_measure(m);
     motion_begin(m, motion_unit(m), &s);
     mask under_way = started & ~motion_waits(m, &s);
     mask whole = motion_grow_short(m, &s, ~under_way);
+    real reach = 1.0;
     if (!ALL(whole | ~under_way)) {
         whole = motion_grow_long(m, &s, whole, ~under_way);
+        reach = whole ? 1.0 : series_reach(&s, m->scale);
     }
-    const mask plain = whole & series_keeps_directions(&s);
+    real length = reach;
+    const mask keeps = series_keeps_directions(&s, (1.0 + 1e-14) * reach); /* the powers of a reach below 1 are rounded */
     for (int i = 0; i < LANES; i++) {
         reversed[i] = NONE;
-        if (LANE(under_way, i) & ~LANE(plain, i)) {
+        LANE(under_way, i) &= LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
+        if (LANE(under_way, i) & ~LANE(keeps, i)) {
             for (int k = 0; k < (s.order + 1) * N_SERIES; k++) {
                 c[k] = LANE(s.c[0][k], i);
             }
-            for (int k = 0; k < N_SERIES; k++) {
-                scale[k] = LANE(m->scale[k], i);
-            }
-            LANE(reach, i) = LANE(whole, i) ? 1.0 : 0.0;
-            const int order = order_in_lane(&s, i, LANE(whole, i));
-            LANE(length, i) = single_length(c, scale, order, &LANE(reach, i), &reversed[i]);
-            LANE(under_way, i) = LANE(reach, i) > 0.0 && b->lanes[i].pieces < MOST_TOGETHER ? YES : NO;
+            LANE(length, i) = single_cut(c, order_in_lane(&s, i, LANE(whole, i)), LANE(reach, i), &reversed[i]);
         }
     }
     const mask ends = under_way & motion_pass(m, b->at, &s, under_way ? length : 0.0, reach, change);
