@@ -27,7 +27,18 @@ from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
-from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, THRUST_EFFECTS, a_vehicle, passed, with_rotors
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    OUTSIDE,
+    SIX,
+    THRUST_EFFECTS,
+    a_vehicle,
+    in_waves,
+    passed,
+    surfaced,
+    with_rotors,
+)
 
 # Containers often forbid bytecode. Each worker then rewrites all tests, and each command compiles its modules, anew.
 sys.dont_write_bytecode = False
@@ -226,6 +237,7 @@ everything_dir, everything3_dir = (
 thrust_dir, thrust3_dir = (_folder_of(f"thrust{fmi}", lambda: load_vehicle(THRUST_EFFECTS), fmi) for fmi in (2, 3))
 rotors_dir, rotors3_dir = (_folder_of(f"rotors{fmi}", lambda: a_vehicle(with_rotors(SIX)), fmi) for fmi in (2, 3))
 passed_dir, passed3_dir = (_folder_of(f"passed{fmi}", lambda: a_vehicle(passed(HEAVY)), fmi) for fmi in (2, 3))
+wavy_dir, wavy3_dir = (_folder_of(f"wavy{fmi}", lambda: a_vehicle(in_waves(surfaced(SIX))), fmi) for fmi in (2, 3))
 six_dir, outside3_dir = _folder_of("six", lambda: a_vehicle(SIX), 2), _folder_of("outside", lambda: OUTSIDE, 3)
 
 

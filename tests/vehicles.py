@@ -281,6 +281,11 @@ def surfaced(rov: _Vehicle, height: float = 0.25) -> _Vehicle:
     return replace(rov, layout=replace(rov.layout, surface=True), coefficients={**rov.coefficients, "height": height})
 
 
+def in_waves(rov: _Vehicle) -> _Vehicle:
+    """Return a vehicle for which the acceleration and the elevation of the water are inputs."""
+    return replace(rov, layout=replace(rov.layout, waves=True))
+
+
 def extended(rov: Vehicle, **values: float) -> Vehicle:
     """Return a vehicle with other or additional coefficients."""
     return rov.with_(rov.layout.extended(values), **values)

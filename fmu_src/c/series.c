@@ -118,7 +118,7 @@ typedef real pair[2];
 
 #ifdef HAS_SURFACE /* the last monitored states are no velocities */
 enum { N_VELOCITIES = N_MONITORED - 2 };
-#define IS_DEPTH(i) ((i) == Y_z || (i) == Y_z_out)
+#define IS_DEPTH(i) ((i) >= N_VELOCITIES && (i) < N_MONITORED)
 #else
 enum { N_VELOCITIES = N_MONITORED };
 #define IS_DEPTH(i) false

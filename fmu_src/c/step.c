@@ -19,7 +19,7 @@
  * loads and velocities, time hardly passes, and the step is refused soon. */
 #define MOST_AT_ONCE 1000
 
-#if defined HAS_POINTS && LANES == 1
+#if defined HAS_EARTH_LOADS && LANES == 1
 #define STRUCTURE_OF(m) ((m)->loaded ? &STRUCTURE : &FREE_STRUCTURE)
 #else
 #define STRUCTURE_OF(m) (&STRUCTURE)
@@ -40,8 +40,8 @@ typedef struct {
     real unit;                     /* the longest unit of time for the next series */
     mask reverse[N_MONITORED];     /* 1 for each velocity whose coefficients are those of the negative direction */
     const model_numbers *n;
-#if defined HAS_POINTS && LANES == 1
-    bool loaded;                   /* true when a force acts at a point, so that all depends on the attitude */
+#if defined HAS_EARTH_LOADS && LANES == 1
+    bool loaded;                   /* true when a load in the earth frame acts, so that all depends on the attitude */
 #endif
     uint64_t settled;              /* one bit for each component; it is set once the component has settled */
 } motion;
@@ -268,7 +268,7 @@ INLINE void motion_start(motion *m, const real at[], const model_numbers *n, rea
     m->n = n;
     m->length = m->rest = m->unit = h;
     m->heading = heading;
-#if defined HAS_POINTS && LANES == 1
+#if defined HAS_EARTH_LOADS && LANES == 1
     m->loaded = model_is_loaded(at);
 #endif
     memcpy(m->state, at + FIRST_STATE, sizeof m->state);

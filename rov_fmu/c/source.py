@@ -22,7 +22,7 @@ from rov_fmu.equation.expression import (
     total,
     written,
 )
-from rov_fmu.equation.forces import AT_SURFACE
+from rov_fmu.equation.forces import AT_SURFACE, above
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import Equation, Term, equation_of, rate_formula
 from rov_fmu.io.groups import grouped
@@ -47,10 +47,10 @@ class EquationSource:
         return {name: place for name, place in self.layout.places.items() if name not in rates}
 
     @cached_property
-    def without_points(self) -> "EquationSource":
-        """The parts of the equation while no force acts at a point."""
+    def unloaded(self) -> "EquationSource":
+        """The parts of the equation while the loads in the earth frame are 0."""
         source = EquationSource(self.layout)
-        source.equation = self.equation.without_points
+        source.equation = self.equation.unloaded
         return source
 
     @cached_property
@@ -155,6 +155,11 @@ class EquationSource:
         own = {name: self.terms(name, above=True) for name in names or self.equation.states}
         return {name: self.by_states(rate_formula(terms)) for name, terms in own.items() if terms}
 
+    @property
+    def beyond(self) -> str:
+        """The coefficient that is not 0 above the surface."""
+        return self.equation.names("beyond", next(iter(above(self.layout)))).identifier
+
     def by_states(self, formula: Expression) -> str:
         """Write a formula in C in which every state is taken from y, and not from `at`."""
         known = {**self._in_c, **{state: f"y[Y_{state}]" for state in self.equation.states}}
@@ -239,9 +244,9 @@ class EquationSource:
         """The states whose rounding errors are compared with their common size, by the first of them.
 
         They are the cosine and the sine of the heading, and the horizontal position; with an attitude, each row of the
-        rotation matrix, and the position. With a surface, the depth is a group of its own.
+        rotation matrix, and the position. A depth that is in a term is a group of its own.
         """
-        has_depth = self.layout.has_attitude and not self.layout.surface
+        has_depth = self.layout.has_attitude and "z" not in self.equation.used
         first = {"sin_psi": "cos_psi", "y": "x"} | ({"z": "x"} if has_depth else {})
         first |= {entry(row, column): entry(row, 1) for row in (1, 2, 3) for column in (1, 2, 3)}
         return grouped((first.get(name, name), name) for name in self.equation.states)

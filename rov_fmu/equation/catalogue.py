@@ -259,6 +259,9 @@ GRAVITY = 9.80665
 """The standard acceleration of gravity, m/s2."""
 OUT_OF_WATER = "z_out"
 """The state z + H of the table of terms, which is negative while a vehicle is out of the water."""
+BELOW_SURFACE = "z_below"
+"""The depth below a surface that moves, z + elevation: a state of the table of terms, which then has z + elevation + H
+as OUT_OF_WATER."""
 CROSS = {
     "m_a": Declaration("{inertia}", "Added mass m_a of {axes}", -1e6, 1e6),
     "b_d": Declaration("{load}.s/{length}", "Linear damping b_d in {axis} by {other}", -1e6, 1e6),
@@ -402,6 +405,14 @@ CURRENT = {
     "V_E": Declaration("m/s", "Velocity of a steady horizontal current, eastward"),
 }
 CURRENT_DOWN = {"V_D": Declaration("m/s", "Velocity of a steady current, downward")}
+WATER_ACCELERATION = {
+    f"A_{direction}": Declaration("m/s2", f"Acceleration of the water (material derivative), {words}")
+    for direction, words in (("N", "northward"), ("E", "eastward"), ("D", "downward"))
+}
+ELEVATION = {
+    "elevation": Declaration("m", "Elevation of the water surface above z = 0 at the vehicle, positive upward")
+}
+"""Inputs of a vehicle that moves in waves, with those of the current."""
 
 
 def over_ground_declaration(letter: str, words: str) -> Declaration:

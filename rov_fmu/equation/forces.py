@@ -5,7 +5,7 @@ equations on the page of an FMU follow from these declarations. So does what oth
 lists as left out, from the effects.
 """
 
-from collections.abc import Callable, Container, Iterator
+from collections.abc import Callable, Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -13,6 +13,8 @@ from itertools import chain
 from .attitude import ROTATION, TURN, entry
 from .catalogue import (
     AXES,
+    BELOW_SURFACE,
+    GRAVITY,
     HEADING,
     HEAVE,
     OUT_OF_WATER,
@@ -55,12 +57,15 @@ DEAD_TIME = Effect("dead time", "the dead time (T_d)", "delay")
 ADVANCE = Effect("advance", "the loss of thrust by the speed of advance (d)", "loss of thrust with speed")
 STEERING = Effect("steering", "the fins")
 POINTS = Effect("points", "the forces at points")
+WAVES = Effect("waves", "the acceleration of the water")
 AT_SURFACE = Effect("surface", "the surface, above which buoyancy and thrust fade out")
 EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
 
-STATES = frozenset([*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION, OUT_OF_WATER])
+STATES = frozenset(
+    [*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION, BELOW_SURFACE, OUT_OF_WATER]
+)
 """The states of the table of terms that a force may contain."""
 
 
@@ -92,6 +97,9 @@ class Force:
             sign = -sign if rest.op == "neg" else sign
             factors = [*rest.args[1:], *factors]
             rest = rest.args[0]
+        for n, x in enumerate(factors):
+            if isinstance(x, Operation) and x.op == "neg" and _state(x.args[0]):
+                sign, factors[n] = -sign, x.args[0]
         return sign, (rest, *factors)
 
     @cached_property
@@ -137,6 +145,8 @@ def forces_of(layout: Layout, names: Names) -> Iterator[Force]:
     yield from _loads(layout, names)
     yield from chain(_drag(layout), _restoring(layout, names), advance(layout, names), _steering(layout, names))
     yield from _at_points(layout)
+    if layout.waves:
+        yield from _waves(layout, names)
     if layout.surface:
         yield from _surface(layout, names)
 
@@ -228,18 +238,52 @@ def _restoring(layout: Layout, names: Names) -> Iterator[Force]:
 
     The third row of the rotation matrix is k, which points down.
     """
-    if not (layout.restoring and layout.has_attitude):
-        return
-    x, y, z = (Name(entry(3, n)) for n in (1, 2, 3))
+    if layout.restoring and layout.has_attitude:
+        k = [Name(entry(3, n)) for n in (1, 2, 3)]
+        weight, arm = _net_weight(layout, names)
+        yield from (
+            Force(RESTORING, v, formula) for v, formula in _load_along(k, weight, arm) if v in layout.by_velocity
+        )
+
+
+def _net_weight(layout: Layout, names: Names) -> tuple[Expression, dict[str, Expression]]:
+    """Return W - B and the coordinates of W r_G - B r_B that a vehicle has. Without W and B, W - B is the load F_0."""
+    if not layout.restoring:
+        heave = layout.by_name.get(HEAVE.name)
+        return Name(heave.coefficient("F_0")) if heave and "F_0" in heave.keys else ZERO, {}
+    has = [x for x in "xyz" if {f"{x}_G", f"{x}_B"} & set(layout.restoring)]
+    return names("net_weight"), {x: names("righting", x) for x in has}
+
+
+def _load_along(
+    k: Sequence[Expression], force: Expression, arm: Mapping[str, Expression]
+) -> Iterator[tuple[str, Expression]]:
+    """Yield a force along a direction k of the body, force k, and its moment, arm x k, by the velocities of their axes.
+
+    `arm` has the coordinates of the force times its lever, N.m.
+    """
+    x, y, z = k
+    yield from ((v, force * along) for v, along in zip("uvw", k, strict=True))
     arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
-    for v in layout.by_velocity:
-        if v in "uvw":
-            yield Force(RESTORING, v, names("net_weight") * (x, y, z)["uvw".index(v)])  # (W - B) k
-            continue
-        for sign, (coordinate, direction) in zip((1, -1), arms[v], strict=True):
-            if {f"{coordinate}_G", f"{coordinate}_B"} & set(layout.restoring):
-                moment = names("righting", coordinate) * direction
-                yield Force(RESTORING, v, sign * moment)  # (W r_G - B r_B) x k
+    for v, pairs in arms.items():
+        for sign, (coordinate, direction) in zip((1, -1), pairs, strict=True):
+            if coordinate in arm:
+                yield v, sign * (arm[coordinate] * direction)
+
+
+def _waves(layout: Layout, names: Names) -> Iterator[Force]:
+    """Yield (m_d - m) R^T A and (m_d r_B - m r_G) x R^T A, what is left of the water's acceleration A.
+
+    In the equation of a small body, M nu' = tau(nu_r) + (m_d + M_A) R^T A with the displaced mass m_d, the current that
+    carries the vehicle has the rest, (m + M_A) R^T A (Auton, Hunt and Prud'homme 1988, doi:10.1017/S0022112088003246).
+    These are the forces of weight and buoyancy with -A/g in the place of the vertical k.
+    """
+    weight, arm = _net_weight(layout, names)
+    for direction, row in zip("NED", rotation(layout), strict=True):
+        share = Name(f"A_{direction}") * (-1.0 / GRAVITY)
+        for v, formula in _load_along(row, weight, arm):
+            if v in layout.by_velocity and formula.names:
+                yield Force(WAVES, v, formula * share)
 
 
 def advance(
@@ -264,14 +308,19 @@ def advance(
                 yield Force(ADVANCE, axis.velocity, -(lost * Name(other.velocity)))  # T_|n|v |n| v_a
 
 
-ABOVE = {"z": 1, OUT_OF_WATER: -1}
-"""The states that are negative above the surface, with the sign of the force that each adds there, times its size / H.
+def above(layout: Layout) -> dict[str, int]:
+    """Return the states that are negative above the surface, with the sign of the force that each adds there.
 
-The share of buoyancy and thrust that is left is 1 below, 1 + z/H up to the height H, and 0 above it."""
+    The force is that below the surface, times the size of the state / H.
+
+    The share of buoyancy and thrust that is left is 1 below, 1 + z/H up to the height H, and 0 above it. Where the
+    surface moves, z counts from it.
+    """
+    return {BELOW_SURFACE if layout.waves else "z": 1, OUT_OF_WATER: -1} if layout.surface else {}
 
 
 def _surface(layout: Layout, names: Names) -> Iterator[Force]:
-    """Yield the buoyancy and the thrust, once for each state of ABOVE. The table divides them by H."""
+    """Yield the buoyancy and the thrust, once for each state of `above`. The table divides them by H."""
     lifting: list[tuple[str, Expression]] = []
     for axis in layout.bare_axes:
         if thrust := _total_thrust(layout, axis, names):
@@ -279,7 +328,7 @@ def _surface(layout: Layout, names: Names) -> Iterator[Force]:
     lifting += [(force.axis, force.formula) for force in advance(layout, names)]
     lifting += [(v, force) for v, force in _buoyancy(layout, names) if v in layout.by_velocity]
     for v, force in lifting:
-        yield from (Force(AT_SURFACE, v, product(force, directed(x, 0.0, 1.0), x)) for x in map(Name, ABOVE))
+        yield from (Force(AT_SURFACE, v, product(force, directed(x, 0.0, 1.0), x)) for x in map(Name, above(layout)))
 
 
 def _buoyancy(layout: Layout, names: Names) -> Iterator[tuple[str, Expression]]:
@@ -291,13 +340,9 @@ def _buoyancy(layout: Layout, names: Names) -> Iterator[tuple[str, Expression]]:
     if not layout.has_attitude:
         yield HEAVE.velocity, -B
         return
-    x, y, z = (Name(entry(3, n)) for n in (1, 2, 3))
-    yield from ((v, -(B * along)) for v, along in zip("uvw", (x, y, z), strict=True))
-    arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
-    for v, pairs in arms.items():
-        for sign, (coordinate, direction) in zip((-1, 1), pairs, strict=True):
-            if f"{coordinate}_B" in layout.restoring:
-                yield v, sign * (B * Name(f"{coordinate}_B") * direction)
+    arm = {x: B * Name(f"{x}_B") for x in "xyz" if f"{x}_B" in layout.restoring}
+    k = [Name(entry(3, n)) for n in (1, 2, 3)]
+    yield from ((v, -formula) for v, formula in _load_along(k, B, arm))
 
 
 def _steering(layout: Layout, names: Names) -> Iterator[Force]:

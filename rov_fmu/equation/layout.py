@@ -28,6 +28,7 @@ from .catalogue import (
     CURRENT_DOWN,
     CURVE,
     EARTH,
+    ELEVATION,
     FIN,
     HEADING,
     HEAVE,
@@ -42,6 +43,7 @@ from .catalogue import (
     SWAY,
     THRUSTER,
     TUNING,
+    WATER_ACCELERATION,
     YAW,
     Axis,
     Declaration,
@@ -132,6 +134,8 @@ class Layout:
     current_passes: bool = False
     """True when the vehicle keeps its velocity over ground where the current changes, in place of that through the
     water."""
+    waves: bool = False
+    """True when the acceleration and the elevation of the water are inputs, and the water also moves up and down."""
     identified: tuple[Range, ...] = ()
     """The ranges over which the vehicle was identified. With them, it has the output `outside`."""
 
@@ -378,12 +382,25 @@ class Layout:
         """The inputs: commands, loads from outside, current, voltage."""
         inputs = dict(self.commands)
         inputs |= {axis.external: load_declaration(axis) for axis in self.bare_axes}
-        if self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE)):
-            inputs |= CURRENT | (CURRENT_DOWN if self.has_attitude else {})
+        moves_horizontally = self.has(SURGE, SWAY) or (self.has_attitude and self.has(HEAVE))
+        if moves_horizontally:
+            inputs |= CURRENT
+        if (moves_horizontally and self.has_attitude) or (self.waves and self.has(HEAVE)):
+            inputs |= CURRENT_DOWN
         if self.voltage is not None:
             lows, highs = zip(*(self.voltage_ranges or [(0.0, inf)]), strict=True)
             inputs["voltage"] = voltage_declaration(min(lows), max(highs), self.voltage)
-        return inputs | self.forces_at_points
+        return inputs | self.acceleration | (ELEVATION if self.waves and self.surface else {}) | self.forces_at_points
+
+    @cached_property
+    def acceleration(self) -> dict[str, Declaration]:
+        """The acceleration of the water, for a vehicle in waves."""
+        return WATER_ACCELERATION if self.waves else {}
+
+    @cached_property
+    def in_earth_frame(self) -> dict[str, Declaration]:
+        """The loads whose directions are those of the earth. While one is not 0, all depends on the attitude."""
+        return self.acceleration | self.forces_at_points
 
     @cached_property
     def forces_at_points(self) -> dict[str, Declaration]:

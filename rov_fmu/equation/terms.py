@@ -39,6 +39,7 @@ from .attitude import (
     rotation_terms,
 )
 from .catalogue import (
+    BELOW_SURFACE,
     EARTH,
     GRAVITY,
     HEAVE,
@@ -51,7 +52,7 @@ from .catalogue import (
     over_ground_name,
 )
 from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
-from .forces import ABOVE, AT_SURFACE, COUPLING, POINTS, Effect, Force, advance, forces_of, rotation, thrusts
+from .forces import AT_SURFACE, COUPLING, POINTS, WAVES, Effect, Force, above, advance, forces_of, rotation, thrusts
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, Curve, Range, Table
@@ -119,9 +120,10 @@ class Equation:
         return tuple(self.rows)
 
     @cached_property
-    def without_points(self) -> "Equation":
-        """The equation while no force acts at a point. Fewer of its states depend on each other."""
-        rows = {name: tuple(term for term in terms if term.effect is not POINTS) for name, terms in self.rows.items()}
+    def unloaded(self) -> "Equation":
+        """The equation while all inputs in the earth frame are 0. Fewer of its states depend on each other."""
+        earth = POINTS, WAVES
+        rows = {name: tuple(term for term in terms if term.effect not in earth) for name, terms in self.rows.items()}
         return replace(self, rows=rows)
 
     @cached_property
@@ -202,12 +204,14 @@ class Equation:
 
         It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
         """
-        return {name: formula for name, formula in self.starts.items() if name not in formula.names | {OUT_OF_WATER}}
+        return {
+            name: formula for name, formula in self.starts.items() if name not in formula.names | self.shifted.keys()
+        }
 
     @cached_property
     def shifted(self) -> dict[str, Expression]:
-        """The formula of the state that follows from the depth of a vehicle with a surface."""
-        return {OUT_OF_WATER: self.starts[OUT_OF_WATER]} if OUT_OF_WATER in self.starts else {}
+        """The formulas of the states that follow from the depth of a vehicle with a surface."""
+        return {name: self.starts[name] for name in (BELOW_SURFACE, OUT_OF_WATER) if name in self.starts}
 
     @cached_property
     def program(self) -> dict[str, Expression]:
@@ -252,11 +256,12 @@ def equation_of(layout: Layout) -> Equation:
     rotation, quaternion, angles = (
         (rotation_formulas(), quaternion_formulas(), angle_formulas()) if layout.has_attitude else ({}, {}, {})
     )
-    table = _Table(layout, Names([*layout.places, *rotation, *quaternion, OUT_OF_WATER]))
+    table = _Table(layout, Names([*layout.places, *rotation, *quaternion, BELOW_SURFACE, OUT_OF_WATER]))
     rows: Rows = {v: table.motion(v) for v in layout.velocities}
     pose = table.pose()
-    if layout.surface:  # the forces contain the depth, and change where it is 0 and where it is -H
-        rows |= {"z": pose["z"], OUT_OF_WATER: pose.pop("z")}
+    if layout.surface:
+        rows |= dict.fromkeys(above(layout), pose["z"])  # the forces change where these states are 0
+    pose = {name: terms for name, terms in pose.items() if name not in rows}
     attitude = _attitude(layout)
     if layout.restoring and attitude:  # the restoring forces contain the third row
         rows |= {entry(3, n): attitude.pop(entry(3, n)) for n in (1, 2, 3)}
@@ -269,7 +274,10 @@ def equation_of(layout: Layout) -> Equation:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
     starts |= rotation | _after_current(layout, rows)
     if layout.surface:
-        starts[OUT_OF_WATER] = Name("z") + Name("height")
+        depth: Expression = Name("z")
+        if layout.waves:
+            depth = starts[BELOW_SURFACE] = depth + Name("elevation")
+        starts[OUT_OF_WATER] = depth + Name("height")
     return Equation(
         table.parameters,
         table.directed,
@@ -380,7 +388,7 @@ class _Table:
                 if changes:
                     name = self._named(total(changes), kind, v, curve.name)
                     yield Term(name, (arrived,) * power)
-                    for state in ABOVE if self.layout.surface else ():
+                    for state in above(self.layout):
                         yield Term(self._above(Name(state)) * name, (arrived, state), AT_SURFACE)
             rising = advance(self.layout, self.names, curve, of_rotor("loss_rise")) if curve.has_rotors else ()
             along = [(force.factors[0], force.along(inverse[force.axis])) for force in rising if force.axis in inverse]
@@ -420,7 +428,7 @@ class _Table:
         """Return a coefficient that is 1/H with its sign while a state is negative, and 0 otherwise."""
         side = self.names("beyond", state.identifier)
         self.directed[side.identifier] = Operation(
-            "directed", (state, ZERO, ABOVE[state.identifier] * self.names("per_height"))
+            "directed", (state, ZERO, above(self.layout)[state.identifier] * self.names("per_height"))
         )
         return side
 

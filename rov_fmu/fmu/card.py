@@ -154,9 +154,11 @@ def _left_out(layout: Layout) -> Iterator[str]:
     at = "at a point" if layout.points else "as a load"
     yield f"A tether: it acts only if its force is connected {at}."
     surface = "The drag of what is out of the water, bottom" if layout.surface else "Surface, bottom"
-    yield f"{surface}, walls and waves.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
+    waves = "walls, and waves that the body changes" if layout.waves else "walls and waves"
+    yield f"{surface}, {waves}.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
     level = "" if layout.has_attitude else ", horizontal"
-    yield f"A current is steady{level} and everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
+    moving = "The velocity of the water is" if layout.waves else f"A current is steady{level} and"
+    yield f"{moving} everywhere the same." if "V_N" in layout.inputs else "The water is at rest."
 
 
 def _left_out_of_motion(layout: Layout) -> Iterator[str]:

@@ -7,7 +7,7 @@ terminalKind: the standard defines none, and our own kind would only prevent con
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from rov_fmu.equation.catalogue import CURRENT, CURRENT_DOWN
+from rov_fmu.equation.catalogue import CURRENT, CURRENT_DOWN, ELEVATION, WATER_ACCELERATION
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Point
 from rov_fmu.equation.words import point_declarations, point_words
@@ -46,6 +46,7 @@ def terminals(layout: Layout) -> list[Terminal]:
     battery = ("voltage",) if layout.voltage is not None else ()
     loads = tuple(axis.external for axis in layout.bare_axes)
     current = tuple(name for name in CURRENT | CURRENT_DOWN if name in layout.inputs)
+    waves = tuple(name for name in WATER_ACCELERATION | ELEVATION if name in layout.inputs)
     thrust = tuple(layout.lagging | layout.thrust)
     water, turned = ("north, east and down", "quaternion") if layout.has_attitude else ("north and east", "heading")
     actuators = "thrusters and fins" if layout.fins else "thrusters"
@@ -56,6 +57,7 @@ def terminals(layout: Layout) -> list[Terminal]:
         Terminal("battery", "input", "bus", "Voltage of the battery", battery),
         Terminal("load", "input", "bus", "Forces and torque from outside, body frame", loads),
         Terminal("current", "input", "bus", f"Velocity of the water, {water}", current),
+        Terminal("waves", "input", "bus", "Acceleration of the water, and elevation of its surface", waves),
         Terminal("body_velocity", "output", "plug", "Velocity through the water, body frame", tuple(layout.velocities)),
         Terminal("velocity", "output", "plug", "Velocity over ground, north, east and down", over_ground),
         Terminal("pose", "output", "plug", f"Position north, east, down, and {turned}", tuple(layout.pose)),

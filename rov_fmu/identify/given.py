@@ -132,10 +132,10 @@ def _kept_from_base(folder: Folder, description: Description, logged: Collection
 
 
 def _without_unknown_options(layout: Layout, known: Collection[str]) -> Layout:
-    """Drop the coefficients that a vehicle need not have, unless they are known, and the surface: many logs have no
-    depth, or count it from elsewhere, and would be taken to be in the air."""
+    """Drop the coefficients that a vehicle need not have, unless they are known, and the surface with its waves: many
+    logs have no depth, or count it from elsewhere, and would be taken to be in the air."""
     kinds = AXIS | CURVE
-    deep = replace(layout, surface=False)
+    deep = replace(layout, surface=False, waves=False)
     return deep.with_keys(lambda part, key: key in part.keys and (kinds[key].needed or part.name_of(key) in known))
 
 

@@ -316,6 +316,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,
         mix=own.mix,
+        waves=tests.description.layout.waves,
     )
     surfaced = replace(written, surface=tests.description.layout.surface)
     return written if any(check_surface(surfaced)) else surfaced

@@ -369,7 +369,7 @@ def _hardware_mistakes(file: RovTables, lost: set[str], data: Toml) -> Iterator[
     """Yield a line for every mistake in the hardware tables."""
     present = [name for name in _HARDWARE_TABLES if name in data]
     unused = [f"curves.{name}.electric_current" for name, curve in file.curves.items() if curve.electric_current]
-    unused += [name for name in ("surface", "current") if name in data]
+    unused += [name for name in ("surface", "current", "waves") if name in data]
     reason = "identification does not use it. Add it to the identified vehicle file instead"
     yield from (key_line(place, reason) for place in unused)
     if "base" in data:

@@ -19,6 +19,7 @@ from rov_fmu.equation.catalogue import (
     REVERSE,
     ROLL,
     SURGE,
+    SWAY,
     YAW,
     Axis,
     Declaration,
@@ -68,6 +69,7 @@ def check_parts(parts: File, lost: set[str], data: Toml) -> Iterator[str]:
     wrong_coupling = [*_check_coupling(parts, layout)]
     yield from wrong_coupling
     yield from check_surface(layout)
+    yield from _check_waves(layout)
     if not (wrong_names or wrong_fins or wrong_coupling or lost & {"curves", "arm", "body"}):
         yield from check_distinct_names(layout)
         yield from _check_named_coefficients(parts, layout, lost)
@@ -98,6 +100,15 @@ def check_surface(layout: Layout) -> Iterator[str]:
     for curve in (curve for curve in layout.curves if layout.surface and curve.has_rotors):
         reason = "must be 'force' with a surface, where thrust by the speed of a rotor is no quadratic"
         yield key_line(f"curves.{curve.name}.lag", reason, curve.lag)
+
+
+def _check_waves(layout: Layout) -> Iterator[str]:
+    """Check that the water's acceleration moves a vehicle in waves, and that its current carries it."""
+    if layout.waves and not layout.has(SURGE, SWAY, HEAVE):
+        yield key_line("waves", "the vehicle does not move along an axis, so that no wave moves it", True)
+    if layout.waves and layout.current_passes:
+        reason = 'must be false with current = "passes", which would lose what the water\'s acceleration does'
+        yield key_line("waves", reason, True)
 
 
 def _check_named_coefficients(parts: File, layout: Layout, lost: set[str]) -> Iterator[str]:

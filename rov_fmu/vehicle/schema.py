@@ -487,6 +487,8 @@ class Tables(Strict):
     current: Passing = "carries"
     """What a current that changes does with the vehicle: `"carries"`, so that it keeps its velocity through the water,
     or `"passes"`, so that it keeps its velocity over ground. The FMU is then for Co-Simulation alone."""
+    waves: bool = False
+    """True for inputs of waves: the water's vertical velocity, its acceleration, and with [surface] its elevation."""
     axes: Axes | None = None
     cross: dict[CrossSymbol, Quantity] = Field(default={}, max_length=_MOST_COEFFICIENTS)
     """Added mass, damping and lift that couple axes."""
@@ -518,6 +520,7 @@ class Tables(Strict):
             points=tuple(point.for_model() for point in self.point),
             surface=self.surface is not None,
             current_passes=self.current == "passes",
+            waves=self.waves,
         )
 
     def quantities(self, of: Layout) -> dict[str, Quantity | None]:

@@ -40,6 +40,8 @@ def vehicle_text(vehicle: Vehicle, folder: Path = Path()) -> str:
     document["format"] = FORMAT
     if vehicle.layout.current_passes:
         document["current"] = "passes"
+    if vehicle.layout.waves:
+        document["waves"] = True
     for name, table in _tables(vehicle).items():
         if table:
             document[name] = _item(table, folder, _DEPTHS.get(name, 1))

@@ -10,7 +10,7 @@ rov_fmu/equation/ is used.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -71,6 +71,10 @@ class Body:
     """n: True for a thruster whose rotor lags in speed, so that the speed is its state."""
     points: Sequence[tuple[Array, Array]] = ()
     """Positions in the body frame at which forces act, m, and the forces in the earth frame, N."""
+    displaced: tuple[Number, Array] = (0, np.zeros(3))
+    """The mass of the displaced water less that of the vehicle, kg, and the same of mass times centre, kg m."""
+    acceleration: Array = field(default_factory=lambda: np.zeros(3))
+    """The acceleration of the water, north, east and down, m/s2."""
 
     @cached_property
     def places(self) -> list[int]:
@@ -166,6 +170,8 @@ def forces(body: Body, nu: Array, R: Array, lagging: Array, signs: Array | None 
     tau: Array = body.load - damping + fins + thrust + body.righting @ R[2]
     for at, F in body.points:
         tau += np.concatenate([R.T @ F, skew(at) @ (R.T @ F)])
+    mass, moment = body.displaced
+    tau += np.concatenate([mass * (R.T @ body.acceleration), skew(moment) @ (R.T @ body.acceleration)])
     for (i, j, k), factor in body.bilinear.items():
         tau[i] += factor * nu[j] * nu[k]
     return tau

@@ -55,6 +55,8 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         else:
             lift[i, j, VELOCITIES.index(others[1])] = value
     beta, thrusters = six("beta", 1.0), _thrusters(rov, inputs, number)
+    net, g = get("W") - get("B") if "W" in held else get("F_0_w"), number(mp.mpf("9.80665"))
+    displaced = -net / g, (get("B") * buoyancy - get("W") * gravity) / g
     rotors, has_rotor = _rotors(rov, inputs, number)
     return Body(
         "".join(layout.velocities),
@@ -76,6 +78,8 @@ def body(rov: Vehicle, inputs: Values, number: Callable[[Number], Number] = floa
         rotors,
         has_rotor,
         [(at, np.array([get(f"F_{direction}_{name}") for direction in "NED"])) for name, at in _points(rov, get)],
+        displaced,
+        np.array([get(name) for name in ("A_N", "A_E", "A_D")]),
     )
 
 

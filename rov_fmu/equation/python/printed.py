@@ -48,7 +48,7 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    alike = ("uvwpqr", ("x", "y", *(() if layout.surface else "z"), "psi"), ROTATION, quaternion)
+    alike = ("uvwpqr", ("x", "y", *(() if "z" in equation.used else "z"), "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
     shifted = (f'    v.setdefault("{name}", {written(x, PYTHON, _value)})\n' for name, x in equation.shifted.items())

@@ -11,7 +11,7 @@ from rov_fmu.equation.forces import STATES, Effect, Force, forces_of
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.vehicle.vehicle import Vehicle
-from tests.vehicles import FINNED, OUTSIDE, SIX, VEHICLES, surfaced
+from tests.vehicles import FINNED, OUTSIDE, SIX, VEHICLES, in_waves, surfaced
 
 CUBIC = Effect("cubic", "cubic drag")
 a, b, u, v = map(Name, "abuv")
@@ -35,7 +35,7 @@ def test_a_force_is_its_coefficient_for_each_direction_times_its_states(rov: Veh
 
 def test_the_states_of_forces_are_those_of_the_table() -> None:
     in_tables = set[str]()
-    for rov in (*VEHICLES.values(), SIX, FINNED, surfaced(SIX)):
+    for rov in (*VEHICLES.values(), SIX, FINNED, surfaced(SIX), in_waves(surfaced(SIX))):
         equation = equation_of(rov.layout)
         in_tables |= {*equation.states} - {lag.arrived for lag in equation.lags}
     assert in_tables == STATES

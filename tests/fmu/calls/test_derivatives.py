@@ -25,7 +25,19 @@ from tests.fmi import (
 from tests.fmu.calls.conftest import WRAPPERS, modes_of
 from tests.fmu.results.test_outside import TILTED, excess
 from tests.often import often, spread
-from tests.vehicles import EVERYTHING, HEAVY, OUTSIDE, SIX, VIDEORAY, State, Values, at_rest, with_rotors
+from tests.vehicles import (
+    EVERYTHING,
+    HEAVY,
+    OUTSIDE,
+    SIX,
+    VIDEORAY,
+    State,
+    Values,
+    at_rest,
+    in_waves,
+    surfaced,
+    with_rotors,
+)
 from verification.references import rigid_vehicle
 
 ROVS = {
@@ -38,6 +50,7 @@ ROVS = {
     "outside3_dir": OUTSIDE,
     "rotors_dir": with_rotors(SIX),
     "rotors3_dir": with_rotors(SIX),
+    "wavy3_dir": in_waves(surfaced(SIX)),
 }
 
 
