@@ -201,6 +201,20 @@ def test_nothing_is_asked_of_a_log_without_slip(axis: Axis, tmp_path: Path) -> N
     assert not asked(tmp_path, recordings(axis)[0], rov=KNOWN)
 
 
+@pytest.mark.parametrize(("noise", "is_doubted"), [(0.0005, True), (0.02, False)])
+def test_a_unit_is_doubted_only_where_the_motion_is_many_times_the_noise(
+    noise: float, is_doubted: bool, tmp_path: Path
+) -> None:
+    """Depths a tenth of the true ones; their sign is doubted in both cases."""
+    small = replace(recordings(HEAVE)[0], values=0.1 * recordings(HEAVE)[0].values)
+    small = replace(small, values=small.values + np.random.default_rng(1).normal(0.0, noise, len(small.values)))
+    tests = load_tests(folder_of(write_folder(tmp_path, [small]), KNOWN, FORCES))
+    objective = Objective.of_known(*begin(tests), thinned=True)
+    (match,) = module._matches(objective, 0, objective.table.known.guessed)
+    assert (0.1 in match.scales) == is_doubted
+    assert {*match.ratios} <= {1.0, -1.0} or is_doubted
+
+
 @pytest.mark.parametrize(("ratio", "is_suspected"), [(0.91, False), (0.6, True)])
 def test_knots_are_suspected_only_where_an_inertia_is_below_the_mass_by_more_than_weighing_tells(
     ratio: float, is_suspected: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

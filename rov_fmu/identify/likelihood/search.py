@@ -82,7 +82,8 @@ class Misfit:
     ratio: float = 0.0
     """R: relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells it."""
     lack: float = 0.0
-    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves."""
+    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves. The motion
+    is that of the log in which the axis moves most: one in which it hardly moves tells little of a scale."""
 
     def or_larger(self, other: "Misfit") -> "Misfit":
         """Return the larger one of each number."""
@@ -101,6 +102,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     predictions over 10 s there, too, as long as the log has no short force, which stands for these commands.
     """
     found: dict[Axis, Misfit] = {}
+    errors_of = dict[tuple[Axis, bool], list[tuple[float, float]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         begin = SETTLING + _late(record)
         usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
@@ -121,8 +123,13 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         for m, at, noise, change in zip(sampled.measured, masks, least, motion, strict=True):
             if at.sum() >= 10:
                 R = rms(errors[at])
-                lack = noise / change * sqrt(max(R**2 - 1.0, 0.0)) if is_motion and moves(noise, change) else 0.0
-                found[m.sensor.axis] = Misfit(R, lack).or_larger(found.get(m.sensor.axis, Misfit()))
+                found[m.sensor.axis] = Misfit(R).or_larger(found.get(m.sensor.axis, Misfit()))
+                if is_motion and moves(noise, change):
+                    both = noise * sqrt(max(R**2 - 1.0, 0.0)), change
+                    errors_of.setdefault((m.sensor.axis, m.sensor.is_velocity), []).append(both)
+    for (axis, _), some in errors_of.items():
+        most, motion = np.max(some, axis=0).tolist()
+        found[axis] = found[axis].or_larger(Misfit(0.0, most / motion))
     return found
 
 

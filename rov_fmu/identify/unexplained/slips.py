@@ -36,7 +36,7 @@ from rov_fmu.identify.likelihood.hypotheses import Starts, apart, applied
 from rov_fmu.identify.likelihood.kinds import INERTIA
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
-from rov_fmu.identify.likelihood.records import SampledChannel, changes
+from rov_fmu.identify.likelihood.records import AHEAD, SampledChannel, changes, unchanged
 from rov_fmu.identify.likelihood.search import structure, worst
 from rov_fmu.identify.likelihood.solve import (
     ENOUGH,
@@ -81,6 +81,9 @@ unexplained than another one does: a heading that is scaled and then wrapped may
 _DENSITY, _MOVING, _TURNING, _SLOWEST, _USUAL = 1000.0, 1.5, 6.0, 0.1, log(8.0)
 """The density of water, and the usual drag of vehicles of the volume V = m/rho: 1.5 rho V^(2/3) v^2 / 2, and about an
 axis 6 I r^2 / 2, both within a factor of 8. The drag becomes linear below 0.1 m/s or rad/s."""
+_EXCITED = 10.0
+"""A unit is doubted only where the motion over 10 s is so many times the noise: 35 to 300 in most logs, and 5 where the
+depth hardly moved and was doubted wrongly."""
 _UNHEEDED = 1e6
 """The factor of a sensor's noise with which it corrects nothing."""
 
@@ -290,8 +293,9 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
         at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
         channel = next(c for c in sampled.log.channels if not c.unused and (c.quantity, c.source) == used)
         time, raw = channel.samples
-        likenesses = {}
-        for scale in (1.0, -1.0, *(_ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS)):
+        units = _ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS
+        motion, likenesses = unchanged(m.channel.time, m.channel.values, AHEAD), {}
+        for scale in (1.0, -1.0, *(units if motion > _EXCITED * m.noise else ())):
             values = np.unwrap(raw / scale) if channel.quantity.wraps else raw / scale
             likenesses[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
         most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in likenesses.values())

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, YAW
-from rov_fmu.identify.beginning import load_tests
+from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, unseen_variance
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
@@ -21,6 +21,7 @@ from rov_fmu.identify.likelihood.search import structure, worst
 from rov_fmu.identify.likelihood.solve import minimise
 from rov_fmu.identify.result import score_of
 from tests.folders import DOWN, SPEED, folder_of, pulled
+from tests.identify.conftest import SHORT, with_logs
 from tests.vehicles import VIDEORAY
 
 
@@ -96,6 +97,22 @@ def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:
     ratios = structure(fit.objective, fit.best)
     assert {*ratios} == {HEAVE, YAW}
     assert worst(ratios) < 1.3
+
+
+def test_a_log_in_which_an_axis_hardly_moves_tells_little_of_what_the_structure_lacks(tmp_path: Path) -> None:
+    """Both logs have errors of a load that the vehicle lacks; only the first one moves far."""
+    weak = tuple((0.4 * command, seconds) for command, seconds in SHORT)
+    objective = Objective.of_known(*begin(with_logs(tmp_path, (HEAVE, "a", SHORT), (HEAVE, "b", weak))))
+    z = objective.mean.copy()
+    index = objective.table.index("load", "heave")
+    assert index is not None
+    z[index] += 3.0
+    lacks = []
+    for logs in (objective.logs, objective.logs[:1], objective.logs[1:]):
+        own = Objective(objective.table, logs, objective.rows)
+        lacks.append(structure(own, minimise(own, z, most=0))[HEAVE].lack)
+    both, far, near = lacks
+    assert far * 0.999 <= both < 0.5 * near, lacks
 
 
 @pytest.mark.parametrize(
