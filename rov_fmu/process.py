@@ -10,8 +10,10 @@ from collections.abc import Callable, Mapping
 from contextlib import suppress
 from queue import Empty, SimpleQueue
 from threading import Thread
+from traceback import format_exception
 
 _INTERRUPTED = "interrupted, no file is half-written"
+_DEFECT = "this is a defect of the program, and not of your files: please report it, with all the lines above"
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _POLL = 0.5
 """The longest wait of the main thread in seconds; on Windows, a signal does not end a wait."""
@@ -22,6 +24,9 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
 
     The code is 0 if the action succeeds, 130 if it is interrupted, 1 if nobody reads the output, and otherwise the one
     that `codes` has for the exception. `codes` includes OSError; the messages of the others are printed unchanged.
+
+    Another exception is a defect of the program and not a mistake of the user: its traceback is printed with a request
+    to report it, and the code is 1.
     """
     from click import Abort, ClickException
 
@@ -50,6 +55,10 @@ def exit_code(program: str, action: Callable[[], None], codes: Mapping[type[Exce
     except tuple(codes) as error:
         text = one_line(error.format_message()) if isinstance(error, ClickException) else str(error)
         return _print_error(program, text, next(code for kind, code in codes.items() if isinstance(error, kind)))
+    except ModuleNotFoundError:  # an installation that is not complete
+        raise
+    except Exception as error:
+        return _print_error(program, f"{''.join(format_exception(error))}{_DEFECT}", 1)
     return 0
 
 

@@ -25,11 +25,10 @@ from pathlib import Path
 from fat_macho import FatWriter
 from platformdirs import user_cache_path
 
-from rov_fmu.c.own_files import own_folder
 from rov_fmu.io.child_process import cause, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
 from rov_fmu.io.messages import MOST, RovError, listed
-from rov_fmu.io.paths import FMU_SRC
+from rov_fmu.io.paths import FMU_SRC, own_folder
 
 C_SOURCES = FMU_SRC / "c"
 UNITY_FILE = "fmu.c"

@@ -26,12 +26,12 @@ from rov_fmu.c.compile import (
     engine_flags,
     host_platform,
 )
-from rov_fmu.c.own_files import is_own_file, own_folder
 from rov_fmu.c.prebuilt import prebuilt
 from rov_fmu.c.source import sources
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.output import Output, write_whole
+from rov_fmu.io.output import Output, put_whole
+from rov_fmu.io.paths import is_own_file, own_folder
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _FILES = {
@@ -116,7 +116,7 @@ def _write(folder: Path, key: str, content: bytes) -> Path:
     path = folder / _name(key, content)
     if path.is_symlink() or (path.exists() and not is_own_file(path)):
         path.unlink()
-    write_whole(Output(path, content), force=True)
+    put_whole(Output(path, content))
     path.chmod(0o600)  # whatever the umask is
     return path
 

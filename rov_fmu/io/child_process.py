@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
 from time import monotonic
+from traceback import format_exception
 from typing import IO, Any, Literal
 
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
@@ -166,12 +167,12 @@ class ChildProcess:
             how = cause(self._process.wait())
             self.close()
             raise ChildError(f"ended its process: {how}")
-        result, error, exceeded = answer
+        result, error, exceeded, there = answer
         if exceeded:
             self.close()
             raise LimitError(exceeded, limits)
         if error:
-            raise error
+            raise error from RuntimeError(f"in the child process:\n{there}")
         return result
 
 
@@ -235,7 +236,7 @@ def _serve() -> None:
     nowhere = os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 1)  # an FMU or a parser may print
     os.dup2(nowhere, 2)
-    _send(answers, (None, None, None))
+    _send(answers, (None, None, None, ""))
     target: Any = None
     while True:
         too_large.clear()
@@ -244,10 +245,11 @@ def _serve() -> None:
                 result = function(*arguments)
                 if target is None:
                     target, result = result, None
-                answer = pickle.dumps((result, None, None), pickle.HIGHEST_PROTOCOL)
+                answer = pickle.dumps((result, None, None, ""), pickle.HIGHEST_PROTOCOL)
         except Exception as error:
             exceeded = _exceeded(error, limits) or ("disk" if too_large else None)
-            answer = pickle.dumps((None, None if exceeded else _portable(error), exceeded))
+            there = "".join(format_exception(error))
+            answer = pickle.dumps((None, None if exceeded else _portable(error), exceeded, there))
         result = None
         answers.write(answer)
         answers.flush()

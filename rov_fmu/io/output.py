@@ -6,7 +6,7 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -14,6 +14,7 @@ from pathlib import Path
 from rov_fmu.io.file_kinds import check_written
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 from rov_fmu.io.messages import FileError, RovError
+from rov_fmu.io.paths import own_folder
 from rov_fmu.io.reading import open_file, read_text
 
 
@@ -96,13 +97,22 @@ def write_whole(
     target stays. Raises WriteError about a path that cannot be written, and whatever a check raises.
     """
     replaced = check_targets([(output.path, "") for output in outputs], force=force, is_ours=is_ours)
+    put_whole(*outputs)
+    _remember(outputs)
+    return replaced
+
+
+def put_whole(*outputs: Output) -> None:
+    """Write all files of a folder of this program's own, whatever is there, or none of them.
+
+    Raises WriteError, and whatever a check raises.
+    """
     with ExitStack() as drafts:
         ready = [(output.path, _draft(output, drafts)) for output in outputs]
         with UNINTERRUPTED:
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
-    return replaced
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:
@@ -143,9 +153,14 @@ def _errors_about(path: Path) -> Iterator[None]:
 
 # ---- Whose file it is ------------------------------------------------------------------------------------------------
 #
-# A file may be replaced if it proves that this program wrote it and that nobody has changed it since: by a digest in
-# its first line, or as an FMU does by the digests of its parts. Other files are replaced with `force` alone.
+# A file may be replaced if this program wrote it and nobody has changed it since. It proves this itself, by a digest in
+# its first line, or as an FMU does by the digests of its parts. Any other file, such as a table or a picture, is in the
+# list of what this program wrote on this machine. All others are replaced with `force` alone.
 
+_WRITTEN = "written"
+"""The list in the user's cache folder: a line for each file, the digest of its path and its content."""
+_LONGEST_LIST = 1_000_000
+"""The size of the list, in bytes, above which its older half is forgotten."""
 _SEAL = re.compile(r"(?:#|<!--) rov-fmu(?: \w+)? wrote this file\. SHA-256 of the lines below: (\w{64})(?: -->)?")
 _XML = re.compile(r"<\?xml[^\n]*\n")
 """The line that must be the first one of a file in XML. The seal stands below it."""
@@ -171,7 +186,7 @@ def _replaced(path: Path, is_ours: Callable[[Path], bool], *, force: bool) -> st
         return "a link"
     if not path.exists():
         return ""
-    foreign = "" if (reason := _foreign(path)) and is_ours(path) else reason
+    foreign = "" if (reason := _foreign(path)) and (is_ours(path) or _is_remembered(path)) else reason
     if foreign and not force:
         raise WriteError(errno.EEXIST, f"the file there {foreign}; --force replaces it", str(path))
     return f"a file that {foreign}" if foreign else "the result of an earlier run"
@@ -188,6 +203,37 @@ def _foreign(path: Path) -> str:
         return "" if seal[1] == _digest(below) else "has changed since rov-fmu wrote it"
     except FileError as error:
         return str(error).removeprefix(f"{path}: ")
+
+
+def _line(path: Path, content: bytes) -> str:
+    """Return the line about a file in the list of what was written."""
+    return hashlib.sha256(f"{os.path.realpath(path)}\0".encode(errors="surrogatepass") + content).hexdigest()
+
+
+def _list() -> Path:
+    """Return the list of what was written. Raises OSError if another user could change it."""
+    from platformdirs import user_cache_path  # imported here, because few commands need it
+
+    return own_folder(user_cache_path("rov-fmu", appauthor=False)) / _WRITTEN
+
+
+def _remember(outputs: Iterable[Output]) -> None:
+    """Add files to the list. Without a cache folder, they are replaced with `force` alone."""
+    with suppress(OSError):
+        path, lines = _list(), "".join(f"{_line(output.path, output.content)}\n" for output in outputs)
+        if path.exists() and path.stat().st_size > _LONGEST_LIST:
+            before = path.read_text("ascii").splitlines(keepends=True)
+            put_whole(Output(path, "".join([*before[len(before) // 2 :], lines]).encode()))
+            return
+        with path.open("a", encoding="ascii") as file:
+            file.write(lines)
+
+
+def _is_remembered(path: Path) -> bool:
+    """Return True for a file that is as this program wrote it, by the list."""
+    with suppress(OSError):
+        return _line(path, path.read_bytes()) in _list().read_text("ascii").split()
+    return False
 
 
 def _digest(text: str) -> str:

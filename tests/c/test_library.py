@@ -15,7 +15,7 @@ from rov_fmu.c import compile as compile_module
 from rov_fmu.c import library
 from rov_fmu.c.compile import BuildError, compile_engine
 from rov_fmu.c.library import load_library
-from rov_fmu.c.own_files import is_own_file
+from rov_fmu.io.paths import is_own_file
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE
 from tests.vehicles import VEHICLES

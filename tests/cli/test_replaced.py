@@ -51,6 +51,30 @@ def _unsealed(ours: bytes) -> bytes:
     return b"".join(line for line in ours.splitlines(keepends=True) if b"SHA-256" not in line)
 
 
+def test_a_table_is_known_by_its_place_and_its_content(tmp_path: Path) -> None:
+    path, other = tmp_path / "a.csv", tmp_path / "b.csv"
+    for content in (b"t\n0\n", b"t\n1\n"):
+        write_whole(Output(path, content))
+        assert _check(path) == "the result of an earlier run"
+    other.write_bytes(b"t\n1\n")
+    path.write_bytes(b"t\n2\n")
+    for foreign in (path, other):
+        with pytest.raises(WriteError, match=FOREIGN):
+            _check(foreign)
+
+
+def test_the_list_of_what_was_written_forgets_the_oldest_half(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("platformdirs.user_cache_path", lambda *_, **__: tmp_path / "cache")
+    monkeypatch.setattr("rov_fmu.io.output._LONGEST_LIST", 65 * 9)
+    paths = [tmp_path / f"{n}.csv" for n in range(11)]
+    for path in paths:
+        write_whole(Output(path, b"x"))
+    for path in paths[:5]:
+        with pytest.raises(WriteError, match=FOREIGN):
+            _check(path)
+    assert {*map(_check, paths[5:])} == {"the result of an earlier run"}
+
+
 # ---- Every command ---------------------------------------------------------------------------------------------------
 
 _WORK = (
@@ -118,7 +142,7 @@ def test_a_command_tells_what_it_replaces(
         out = " ".join(capsys.readouterr().out.split())
         return out.partition(f"Wrote {target.parent if key[1] == 'folder' else ''}")[2]
 
-    write_whole(Output(target, sealed("old").encode()))
+    write_whole(Output(target, b"of an earlier version"))
     assert "(replaced the result of an earlier run)" in told()
     with target.open("ab") as file:
         file.write(b"\n")

@@ -189,6 +189,26 @@ def test_what_is_used_is_not_called_unrecognised(tmp_path: Path, inspect: Inspec
         assert "the log has the vehicles" not in out
 
 
+@pytest.mark.parametrize("last", ["", ",u_6 [1]"])
+def test_commands_that_count_from_0_are_those_of_thrusters_from_1_on(
+    last: str, tmp_path: Path, inspect: Inspect, capsys: Capsys
+) -> None:
+    """Of seven outputs, the last one rests and drives no thruster, although its header is that of thruster 6."""
+    names = ",".join(f"u_{n} [1]" for n in range(6))
+    rest = [0.0 * TIME] if last else []
+    table(tmp_path / "dive.csv", f"time [s],depth [m],{names}{last}", TIME, DEPTH, *THRUSTERS, *rest)
+    out, draft = inspect()
+    assert parsed(draft)["columns"] == {f"u_{n} [1]": f"u_{n + 1} [1]" for n in range(6)}
+    assert "no thruster" not in out
+    weigh(tmp_path)
+    (log,) = load_tests(tmp_path).folder.logs
+    assert [commanded(log, f"{n}") for n in range(1, 7)] == [pytest.approx(own) for own in THRUSTERS]
+    rov = tmp_path / "rov.toml"
+    rov.write_text(rov.read_text("utf-8").partition("[columns]")[0], encoding="utf-8")
+    assert main(["identify", str(tmp_path)]) == 2
+    assert "column 'u_0 [1]': these columns count from 0" in capsys.readouterr().err
+
+
 def test_headers_of_loggers_are_read_and_no_sentence_contradicts_them(tmp_path: Path, inspect: Inspect) -> None:
     """Of two headers with the same meaning, one is read, and the other is told as such. A speed without an axis may be
     that of surge."""

@@ -1,6 +1,7 @@
 """The command `rov-fmu system`: a plan becomes an SSP, which is run; the companions are listed."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ from rich.table import Table
 from rov_fmu.bridges.system.companion import COMPANIONS, lack, slave_of
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
-from rov_fmu.bridges.system.plan import SystemPlan, load_system_plan
+from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.run import passed, picture, recorded, run_system, table
 from rov_fmu.bridges.system.ssp import Structure, is_unchanged, ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
@@ -19,6 +20,8 @@ from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.runs import Array
 from rov_fmu.report import console
 from rov_fmu.report.progress import Parts, parts
+from rov_fmu.vehicle.shipped import named_in
+from rov_fmu.vehicle.vehicle import load_vehicle
 
 _MOST_SHOWN = 10
 """The most variables of the table of what half the step changes."""
@@ -34,8 +37,10 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
     def is_ours(file: Path) -> bool:
         return file == output and is_unchanged(file)
 
-    check_targets([(output, SYSTEM), *((file, "") for file in results)], [path], force=force, is_ours=is_ours)
+    targets = [(output, SYSTEM), *((file, "") for file in results)]
+    check_targets(targets, [path], force=force, is_ours=is_ours)
     plan, half, changes = load_system_plan(path), None, None
+    check_targets(targets, _inputs(plan, path), force=force, is_ours=is_ours)
     with parts() as shown:
         structure = made(plan, path, lambda name: shown.begin(f"making {name}"))
         for sentence in unconnected(plan, structure):
@@ -83,6 +88,17 @@ def _half_step(
         numbers = (f"{low:.4g}", f"{high:.4g}", f"{half.largest[n]:.2g}", f"{half.typical[n]:.1%}")
         printed.add_row(f"{component}.{name}", structure.parts[component].unit(name)[0], *numbers)
     return half, printed
+
+
+def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
+    """Yield the files that a plan reads: itself, those that it names, and those of its vehicles."""
+    yield path
+    for name, one in plan.component.items():
+        yield from (path.parent / file for file in (one.fmu, one.file) if file)
+        for key, vehicle in (("vehicle", one.vehicle), ("coefficients", one.coefficients)):
+            with suppress(FileError):  # `made` tells every mistake
+                file = named_in(path, f"component.{name}.{key}", vehicle or "", SystemPlanError)
+                yield from (file, *load_vehicle(file).files)
 
 
 def list_companions() -> None:

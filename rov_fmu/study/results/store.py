@@ -15,7 +15,7 @@ from typing import Any
 from rov_fmu import __version__
 from rov_fmu.io.interrupts import cleaned_up
 from rov_fmu.io.messages import FileError, first_of, listed
-from rov_fmu.io.output import Output, WriteError, write_whole
+from rov_fmu.io.output import Output, WriteError, put_whole, write_whole
 from rov_fmu.io.reading import read_text
 
 PAGE, STUDY, RUNS, TRAJECTORIES, PARTS = "study.html", "study.json", "runs", "trajectories", "parts"
@@ -194,7 +194,7 @@ class Store:
         """Write the rows of some runs, whole or not at all. Raises WriteError."""
         name = _name(first, end)
         outputs = [Output(self.folder / TRAJECTORIES / name, trajectories)] if trajectories is not None else []
-        write_whole(*outputs, Output(self.folder / RUNS / name, runs), force=True)
+        put_whole(*outputs, Output(self.folder / RUNS / name, runs))
 
     def _clean(self) -> None:
         """Remove unfinished files of a process that was killed."""

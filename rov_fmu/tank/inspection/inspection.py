@@ -112,7 +112,11 @@ def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tab
         known = columns_of_log(layout, axis)
         named = KnownColumns(known)
         name_of = partial(_known_name, named)
-        told = {*map(name_of, own), ""}
+        # Where headers count from 0, u_1 is u_2 in truth, and a u_6 that is left gives its name away.
+        names_now = {title: name_of(title) for title in own}
+        moved = {title for title, name in names_now.items() if name and name_of(columns.get(title, title)) != name}
+        moved |= {columns[title] for title in moved}
+        told = {name for title, name in names_now.items() if title not in moved} | {""}
         columns = {title: meant for title, meant in columns.items() if title in numbers and name_of(meant) not in told}
         columns |= renamed
         names, _ = names_of(layout, tables.model_copy(update={"columns": columns}))

@@ -18,13 +18,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from threading import RLock
 from time import monotonic
+from traceback import walk_tb
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 import numpy as np
 
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions, LimitError, Limits
 from rov_fmu.io.csv_table import EMPTY, DataFileError, OpenStream, UnreadableFileError, open_text
-from rov_fmu.io.messages import FileError, brief, listed, reason_of
+from rov_fmu.io.messages import RovError, brief, listed, reason_of
 from rov_fmu.io.reading import open_file
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.readers.bags import read_bag, read_database, read_mcap, unpack
@@ -96,6 +97,8 @@ def format_of(path: Path) -> Format:
 _KEPT = 20_000_000
 """The contents of files of so many bytes together are kept. They take a sixth of the memory that any file may take."""
 
+_OWN_CODE = str(Path(__file__).parents[2])
+"""The folder of this package."""
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
 
@@ -103,8 +106,8 @@ _T = TypeVar("_T")
 def guarded(function: Callable[Concatenate[Path, _P], _T]) -> Callable[Concatenate[Path, _P], _T]:
     """Let a function that reads a file, its first argument, run in the child process, within the budget of the file.
 
-    Its other arguments and its result are pickled. It then raises DataFileError, too, for a file that is damaged or
-    exceeds its budget.
+    Its other arguments and its result are pickled. It then raises DataFileError, too, for a file that exceeds its
+    budget.
     """
 
     @wraps(function)
@@ -205,7 +208,6 @@ _PARSER = _Parser()
 def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
     """Return what a guarded function returns, in the child process.
 
-    Any exception means that the file is damaged: a parser may raise anything on damaged bytes, and return anything.
     `folder` is the working directory of the caller, from which its relative paths start.
     """
     _PARSER.is_child = True
@@ -215,15 +217,6 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
         with np.errstate(all="ignore"), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return function(path, *arguments, **options)
-    except FileError:
-        raise
-    except Exception as error:
-        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, reason_of(error))  # where it was unpacked
-        kind, reason = format_of(path), brief(told)
-        hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
-        raise UnreadableFileError(
-            f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
-        ) from error
     finally:
         os.chdir(home)  # Windows does not remove a folder in which a process works
 
@@ -231,11 +224,40 @@ def _call(folder: Path, function: Callable[..., Any], path: Path, arguments: Any
 # ---- In the child process --------------------------------------------------------------------------------------------
 
 
+_OF_DAMAGE = (ValueError, LookupError, ArithmeticError, EOFError, OSError, MemoryError)
+"""The exceptions of Python by which the readers of this package say that bytes are damaged."""
+
+
+@contextmanager
+def _damage_told(path: Path) -> Iterator[None]:
+    """Raise UnreadableFileError, in a block that parses a file, instead of an exception that is about its bytes.
+
+    The code of somebody else may raise anything on damaged bytes, and the readers of this package one of `_OF_DAMAGE`.
+    Another exception, such as an AttributeError, is a defect of this package, and stays what it is.
+    """
+    try:
+        yield
+    except (RovError, ModuleNotFoundError):
+        raise
+    except Exception as error:
+        *_, (last, _) = walk_tb(error.__traceback__)
+        is_own = last.f_code.co_filename.startswith(_OWN_CODE) and type(error).__module__ == "builtins"
+        if is_own and not isinstance(error, _OF_DAMAGE):
+            raise
+        told = re.sub(rf"{re.escape(gettempdir())}\S*", lambda _: path.name, reason_of(error))  # where it was unpacked
+        kind, reason = format_of(path), brief(told)
+        hint = f"; `{kind.repair}` may repair it" if kind.repair else ""
+        raise UnreadableFileError(
+            f"{path}: begins as {kind.name}, but is damaged or was cut short, and cannot be read: {reason}{hint}"
+        ) from error
+
+
 def open_table(path: Path) -> OpenStream | None:
     """Return a function that opens the lines of a table; None for another log. Raises DataFileError."""
     assert _PARSER.is_child, "only a guarded function may read a file"
-    opens = format_of(path).open
-    return opens(path) if opens else None
+    with _damage_told(path):
+        opens = format_of(path).open
+        return opens(path) if opens else None
 
 
 @guarded
@@ -256,7 +278,12 @@ def _parsed(path: Path, named: Collection[str]) -> Content:
     """Return the content of a log by the parser of its format. What the parser prints is about damage."""
     kind, printed = format_of(path), StringIO()
     try:
-        with redirect_stdout(printed), redirect_stderr(printed), TemporaryDirectory() as folder:
+        with (
+            _damage_told(path),
+            redirect_stdout(printed),
+            redirect_stderr(printed),
+            TemporaryDirectory() as folder,
+        ):
             file, shown = path, f"{path}"
             if kind.unpack:
                 file, shown = Path(folder) / "unpacked", f"{path}, unpacked"

@@ -126,6 +126,8 @@ def read_table(
     names = replace(names, columns={**time_columns(start, names.columns), **names.columns})
     flags = flag_columns(start[0], known, names)
     known |= dict.fromkeys(flags, LogColumn.of(FLAG))
+    meant = {names.columns.get(title, title) for title in start[0] if title in names.columns}
+    given_away = {title: "" for title in start[0] if title in meant}
     check = partial(_wrong_columns, path=path, layout=layout, axis=axis, known=known, is_part=is_part)
     table = read_columns(
         path,
@@ -133,7 +135,7 @@ def read_table(
         others=True,
         loose=True,
         grown=grown_rows,
-        renamed={**names.columns, **{title: f"{name} [1]" for name, title in flags.items()}},
+        renamed={**given_away, **names.columns, **{title: f"{name} [1]" for name, title in flags.items()}},
         hint=RENAMING,
         check_header=check,
         open_stream=open_stream,
@@ -151,7 +153,9 @@ def read_table(
     unlikely = _unlikely_rate(table, values["time"])
     if unlikely and not is_part:
         raise DataFileError(*sentences([replace(unlikely, file=f"{path}")]))
-    content = Content(path.name, [], names=frozenset(table.header), without_thruster=_without_thruster(table))
+    content = Content(
+        path.name, [], names=frozenset(table.header), without_thruster=_without_thruster(table, names.columns)
+    )
     _add_pieces(content, table, values, commanding)
     _tell_cells(content, table, pulses, names.keys.neutral)
     content.findings += [about(path.name, kind, **words) for kind, words in table.assumed.items()]
@@ -180,6 +184,9 @@ def _wrong_columns(
     if len(found) > 1:
         reason = "a log must have the commands of the axis, of the inputs or of the thrusters, but only one of these"
         yield f"columns {', '.join(found.values())}: {reason}"
+    zero = next((title for title in others if (match := _NUMBERED.fullmatch(title)) and int(match[1]) == 0), None)
+    if zero and any(map(_NUMBERED.fullmatch, headers.values())):
+        yield f"column {shown(zero)}: these columns count from 0, and the thrusters of this vehicle from 1{RENAMING}"
     if is_part and headers.keys() - {"date"} != {"time"}:
         return
     unread = {title.replace("(", "[").partition("[")[0].strip(): shown(title) for title in others}
@@ -306,11 +313,11 @@ def _tell_headers(content: Content, table: Columns, known: Mapping[str, LogColum
             content.findings.append(about(table.path.name, "column without unit", column=shown(title), header=better))
 
 
-def _without_thruster(table: Columns) -> dict[str, int]:
+def _without_thruster(table: Columns, renamed: Mapping[str, str]) -> dict[str, int]:
     """Return the numbers in headers such as `u_7 [%]` that are not read, although others like it are."""
     used, all_numbers = (
         {shown(title): int(match[1]) for title in titles if (match := _NUMBERED.fullmatch(title))}
-        for titles in (table.headers.values(), table.header)
+        for titles in (table.headers.values(), map(renamed.get, table.header, table.header))
     )
     unused = {title: number for title, number in all_numbers.items() if number not in used.values()}
     return unused if used else {}

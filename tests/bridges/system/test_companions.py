@@ -1,5 +1,6 @@
 """What the companions compute, and a system that is run, against what is known in closed form."""
 
+import shutil
 import zipfile
 from io import BytesIO
 from math import cos, cosh, hypot, pi, sin, sinh
@@ -171,8 +172,25 @@ def test_a_run_writes_the_motion_and_a_plot(tmp_path: Path, capsys: pytest.Captu
     assert motion["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert motion["water.V_N"] == pytest.approx(0.4 * 0.75 ** (1 / 7) * cos(0.5) * motion["time"] / 4.0)
     assert "water.V_N" in (tmp_path / "my.svg").read_text(encoding="utf-8")
+    assert main(line) == 0, "a second run replaces what the first one wrote"
+    with (tmp_path / "my.csv").open("a") as file:
+        file.write("9,9\n")
     assert main(line) == 2
-    assert "my.csv" in capsys.readouterr().err
+    assert "my.csv: cannot be written: the file there has no mark" in capsys.readouterr().err
+
+
+def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    plan, rows = tmp_path / "plan.toml", tmp_path / "my.csv"
+    parts = '[component.w]\ncompanion = "current"\nfile = "my.csv"\n[component.r]\nvehicle = "rov/bluerov2.toml"\n'
+    plan.write_text(f"step = 1.0\nstop_time = 1.0\n{parts}", encoding="utf-8")
+    rows.write_text("time (s),z (m),V_N (m/s),V_E (m/s)\n0,0,1,0\n", encoding="utf-8")
+    models = shutil.copytree(SHIPPED["bluerov2"].parent, tmp_path / "rov")
+    table = next(path for path in load_vehicle(models / "bluerov2.toml").files if path.suffix == ".csv")
+    for path in (rows, table):
+        before = path.read_bytes()
+        assert main(["system", str(plan), "-o", str(path.with_suffix(".ssp")), "--run", "--force"]) == 2
+        assert f"would overwrite {path}, an input" in capsys.readouterr().err
+        assert path.read_bytes() == before
 
 
 def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:

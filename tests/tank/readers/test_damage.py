@@ -2,6 +2,7 @@
 
 import shutil
 import sqlite3
+import struct
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,10 +12,14 @@ from mcap.reader import make_reader
 from mcap.writer import CompressionType, Writer
 from rosbags.rosbag1 import Writer as Writer1
 
+from rov_fmu.cli import main
+from rov_fmu.io.csv_table import UnreadableFileError
+from rov_fmu.io.messages import FileError
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.folder import folder_and_files
+from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.listing import list_files
-from rov_fmu.tank.readers.parsers import one_parser, read_topics
+from rov_fmu.tank.readers.parsers import guarded, one_parser, read_topics
 from tests.often import spread
 from tests.tank.logs import Read, measured, read_log
 from tests.tank.readers.motion import BLUEROV2, DEPTH, DIVE
@@ -121,6 +126,50 @@ def test_a_chunk_that_is_damaged_costs_only_itself(name: str, tmp_path: Path) ->
         is_chunked = name != "MCAP without chunks"
         assert (commands.rows[-1] - commands.rows[0] > 9.0) == is_chunked
         assert any(("left out" if is_chunked else CUT) in line for line in sentences(log.findings))
+
+
+def test_an_error_of_ours_is_not_told_as_damage(tmp_path: Path) -> None:
+    """A parser of somebody else may raise anything, a reader of ours only what damaged bytes lead to."""
+    path = tmp_path / "log.ulg"
+    path.write_bytes(b"ULog\x01\x12\x35" + bytes(50))
+    ours = {"__name__": "ours"}
+    exec(compile("def fail(error): raise error", parsers.__file__, "exec"), ours)
+
+    def theirs(error: Exception) -> None:
+        raise error
+
+    for fail, error in (
+        (theirs, AttributeError("x")),
+        (theirs, IndexError("x")),
+        (ours["fail"], ValueError("x")),
+        (ours["fail"], struct.error("x")),
+    ):
+        told = pytest.raises(UnreadableFileError, match="begins as a ULog, but is damaged or was cut short")
+        with told, parsers._damage_told(path):
+            fail(error)  # type: ignore[operator]
+    for other in (AttributeError("x"), TypeError("x"), FileError("x")):
+        with pytest.raises(type(other), match=r"^x$"), parsers._damage_told(path):
+            ours["fail"](other)  # type: ignore[operator]
+
+
+@guarded
+def _defect(_: Path) -> None:
+    raise IndexError("tuple index out of range")
+
+
+def test_a_defect_is_told_as_one_with_its_traceback(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "dive.csv").write_text("time [s]\n0\n", encoding="utf-8")
+    monkeypatch.setattr(
+        "rov_fmu.interface.inspect_command.inspect_tests", lambda *_, **__: _defect(tmp_path / "dive.csv")
+    )
+    assert main(["inspect", str(tmp_path)]) == 1
+    err = capsys.readouterr().err
+    assert 'raise IndexError("tuple index out of range")' in err  # in the child process
+    assert err.endswith(
+        "this is a defect of the program, and not of your files: please report it, with all the lines above\n"
+    )
 
 
 @pytest.mark.long
