@@ -130,7 +130,7 @@ def _ardusub_gains(vehicle: Vehicle, path: Path, options: Options) -> Contents:
     from rov_fmu.bridges.ardusub.gains import tuned
 
     found = tuned(vehicle, options.gains)
-    following = f"fly {path / 'gains.param'} in ArduSub's simulator, by rov-fmu sitl, and then in the pool"
+    following = f"fly {path / 'gains-from-4.7.param'} (or before-4.7) by rov-fmu sitl, and then in the pool"
     return gains_files(found), Exported({}, "Note", found.notes, following=following, table=table_of(found))
 
 

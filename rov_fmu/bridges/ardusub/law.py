@@ -46,9 +46,10 @@ _TURN = {
 }
 """The acceleration that the first controller respects, rad/s2: half of ATC_ACCEL_R_MAX and ATC_ACCEL_P_MAX, and the
 most that AC_AttitudeControl allows in yaw; the limit of the integrator (IMAX), a demand; the filter of the targets."""
-_DIVE = {"brake": 1.0, "f_a": 5.0, "f_error": 20.0, "f_demand": 2.0, "most": 1.0, "i_max": 0.2}
+_DIVE = {"brake": 1.0, "f_a": 5.0, "f_error": 20.0, "f_demand": 2.0, "most": 1.0, "i_max": 1.0}
 """The same of the depth: PILOT_ACCEL_Z, and the filters of the speed's error (PSC_VELZ_FLTE), of the last error, and
-of the throttle."""
+of the throttle. `AC_PosControl` lets the integrator reach the hover throttle, which is half of the throttle and so a
+full demand, whatever PSC_ACCZ_IMAX is."""
 _SENSORS = 20.0
 """The filters of gyroscope and accelerometer (INS_GYRO_FILTER, INS_ACCEL_FILTER), Hz."""
 _STICK = 0.8
