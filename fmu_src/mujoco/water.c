@@ -1,8 +1,9 @@
-/* The step of vehicles in MuJoCo, which plugin.py takes in Python by the same formulas and in the same order.
+/* The step of vehicles in MuJoCo.
  *
  * Python knows the addresses of MuJoCo's functions and arrays, so that no header of MuJoCo is needed, and any version
- * fits. All that a vehicle remembers is in a `vehicle`, whose memory belongs to Python, which may copy it. There are no
- * global variables, so that scenes can be stepped in several threads. */
+ * fits. What a vehicle remembers from step to step is in MuJoCo's data (`enum` of KEPT below). The rest of a `vehicle`
+ * follows from these and from what Python sets; its memory belongs to Python, which may copy it. Scenes can be stepped in
+ * several threads. */
 #include "real.h"
 
 #include <float.h>
@@ -10,6 +11,9 @@
 #include <stddef.h>
 #include <stdint.h>
 #include <string.h>
+#if !defined _WIN32
+#include <setjmp.h>
+#endif
 
 #include "equation.h"
 
@@ -31,33 +35,29 @@ enum { FIRST_STATE = N_GIVEN, N_VARIABLES = N_GIVEN + N_STATES };
 
 typedef struct {
     double at[N_VARIABLES]; /* commands, those that act after the dead time, coefficients, other inputs, and states */
-    double v[N_NUMBERS];    /* what follows from them while they, and the directions of the motion, are held */
-    bool is_held;           /* false before the first step */
-    double since, until;    /* s, since v was computed, and from then until a rotor reverses */
+    double v[N_NUMBERS];    /* they, the directions of the motion, what lags, and the numbers that follow from these */
+    bool is_held, is_lagged; /* true if the numbers are up to date that do not depend on what lags, and those that do */
     double outside[6];      /* the acceleration by other forces than those of the water */
 } water;
 
-/* Compute the numbers that are constant while the inputs and the directions of motion are held. */
+/* Compute the numbers that are constant during a part of the step, if they have changed. */
 static void hold(water *w, const double now[], const double y[])
 {
     double direction[N_DIRECTIONS + 1];
-    bool same = w->is_held && w->since < w->until && memcmp(now, w->v, N_GIVEN * sizeof now[0]) == 0;
+    bool same = w->is_held && memcmp(now, w->v, N_GIVEN * sizeof now[0]) == 0;
     for (int i = 0; i < N_DIRECTIONS; i++) {
         direction[i] = y[DIRECTIONS[i]] < 0.0 ? -1.0 : 1.0;
         same = same && direction[i] == w->v[N_GIVEN + i];
     }
-    if (same) {
-        return;
+    if (!same) {
+        memcpy(w->v, now, N_GIVEN * sizeof now[0]);
+        memcpy(w->v + N_GIVEN, direction, N_DIRECTIONS * sizeof now[0]);
+        equation_numbers(w->v);
     }
-    if (w->is_held) {
-        equation_lag(w->v, w->since);
+    if (!same || !w->is_lagged) {
+        equation_lagged(w->v);
     }
-    memcpy(w->v, now, N_GIVEN * sizeof now[0]);
-    memcpy(w->v + N_GIVEN, direction, N_DIRECTIONS * sizeof now[0]);
-    w->is_held = true;
-    w->since = 0.0;
-    equation_numbers(w->v);
-    w->until = equation_until_reversal(w->v);
+    w->is_held = w->is_lagged = true;
 }
 
 /* Compute the rotation matrix of a quaternion, scalar first, which need not have length 1. */
@@ -93,7 +93,7 @@ static void accelerate(water *w, const double now[], double after, const double 
         y[3 + i] = state[VELOCITY + 3 + i];
     }
     hold(w, now, y);
-    equation_rates(w->v, w->since + after, y, rate);
+    equation_rates(w->v, after, y, rate);
     const double tilt[6] = {0.0, 0.0, 0.0, R[7], -R[6], 0.0};
     for (int i = 0; i < 6; i++) {
         rate[i] = LACKS[i] ? -2.0 * y[i] / REST - tilt[i] / (REST * REST) : rate[i];
@@ -128,7 +128,8 @@ static int motion_step(const double now[], const model_numbers *n, double h, dou
         next[CHANGE + i] = state[CHANGE + i] + h * mean[i];
         next[VELOCITY + i] = state[VELOCITY + i] + h * (mean[i] + outside[i]);
     }
-    n->of->since += h;
+    equation_lag(n->of->v, h);
+    n->of->is_lagged = false;
     return 1;
 }
 
@@ -154,14 +155,21 @@ static inline void current_keep(double now[])
 
 /* ---- A vehicle --------------------------------------------------------------------------------------------------- */
 
-/* What Python tells, in this order: addresses of the model, its data, the data's arrays, functions, and callbacks. */
-enum { A_MODEL, A_DATA, A_M, A_QPOS, A_QVEL, A_CTRL, A_PASSIVE, A_XMAT };
-enum { A_STEP_1 = A_XMAT + 1, A_FACTOR, A_PROJECT, A_STEP_2, A_TURN, A_STATE, A_CALLBACKS };
+/* What Python tells, in this order: addresses of the model, its data, the data's arrays, functions, the function that
+ * MuJoCo calls in place of ending the program, and callbacks. */
+enum { A_MODEL, A_DATA, A_M, A_QPOS, A_QVEL, A_ACT, A_CTRL, A_PASSIVE, A_XMAT };
+enum { A_STEP_1 = A_XMAT + 1, A_FACTOR, A_PROJECT, A_STEP_2, A_TURN, A_STATE, A_FAIL, A_ON_ERROR, A_CALLBACKS };
 enum { N_CALLBACKS = 7, N_ADDRESSES = A_CALLBACKS + N_CALLBACKS };
 /* And these numbers: the places of its body, pose and velocity; one bit for each integrator that treats gyroscopic
- * forces as implicit; and the places of its entries in M and of its actuators. */
-enum { P_BODY, P_POSE, P_VELOCITY, P_IMPLICIT, P_ENTRIES, P_ACTUATORS = P_ENTRIES + 21 };
-enum { DONE, NO_BODY, TOO_MANY_WAIT, IN_ANOTHER_SCENE, HAS_CALLBACKS }; /* what a step returns */
+ * forces as implicit; the place of its memory in the activations, and how many changes of commands fit into it; and the
+ * places of its entries in M and of its actuators. */
+enum { P_BODY, P_POSE, P_VELOCITY, P_IMPLICIT, P_MEMORY, P_WAITING, P_ENTRIES, P_ACTUATORS = P_ENTRIES + 21 };
+enum { DONE, NO_BODY, TOO_MANY_WAIT, IN_ANOTHER_SCENE, HAS_CALLBACKS, MUJOCO_FAILS }; /* what a step returns */
+/* The memory of a vehicle, which is in the activations of its first actuator (dyntype "user"), so that MuJoCo copies,
+ * saves and resets it with its data: 1 after a step and 0 in new data; the acceleration by other forces; what lags. With a
+ * dead time, these follow: the commands that act, how many changes wait, and each change: its remaining time, the rounding
+ * error of that, and the commands. N_KEPT numbers in all, and N_CHANGE for each change. */
+enum { KEPT_MOVED, KEPT_OUTSIDE, KEPT_LAGGING = KEPT_OUTSIDE + 6, KEPT_COMMANDS = KEPT_LAGGING + N_LAGGING };
 
 typedef void of_mujoco(const void *model, void *data);
 
@@ -181,7 +189,7 @@ typedef struct {
     double mass[6][6];                  /* that of the vehicle, with added mass */
     double weighed[N_COEFFICIENTS + 1]; /* the coefficients that it was computed for */
     bool is_weighed;
-    double time;                        /* at the end of the last step */
+    double time;                        /* at the start of the step */
     double pose[7], velocity[6];        /* at the start of the step */
     double accelerated[6];              /* the mean acceleration by the water during the step */
     water water;
@@ -210,17 +218,52 @@ static double time_of(const member *m)
     return t;
 }
 
-static void reset(vehicle *o, double t)
+/* Read what the vehicle remembers, its commands, and its motion from MuJoCo's data. */
+static void recall(vehicle *o)
 {
-    water *const w = &o->water;
-    memset(w->v, 0, sizeof w->v);
-    memset(w->outside, 0, sizeof w->outside);
-    w->is_held = o->is_weighed = false;
-    w->since = w->until = 0.0;
-    o->time = t;
+    const member *const m = &o->shared;
+    const double *const kept = array(m, A_ACT) + o->places[P_MEMORY], *const ctrl = array(m, A_CTRL);
+    double *const at = o->water.at, *const state = at + FIRST_STATE;
+    memcpy(o->pose, array(m, A_QPOS) + o->places[P_POSE], sizeof o->pose);
+    memcpy(o->velocity, array(m, A_QVEL) + o->places[P_VELOCITY], sizeof o->velocity);
+    for (int i = 0; i < N_COMMANDS; i++) {
+        at[i] = ctrl[o->places[P_ACTUATORS + i]];
+    }
+    for (int i = 0; i < 6; i++) {
+        state[VELOCITY + i] = FLIP[i] * o->velocity[i];
+    }
+    state[ATTITUDE] = o->pose[3], state[ATTITUDE + 1] = o->pose[4];
+    state[ATTITUDE + 2] = -o->pose[5], state[ATTITUDE + 3] = -o->pose[6];
+    memcpy(o->water.outside, kept + KEPT_OUTSIDE, sizeof o->water.outside);
+    memcpy(o->water.v + FIRST_LAGGING, kept + KEPT_LAGGING, N_LAGGING * sizeof kept[0]);
+    o->water.is_lagged = false;
 #if HAS_DEAD_TIME
-    o->line.waiting = 0;
-    memcpy(w->at + FIRST_DELAYED, STARTS, N_COMMANDS * sizeof w->at[0]);
+    const bool has_moved = kept[KEPT_MOVED] != 0.0;
+    const double waiting = kept[KEPT_COMMANDS + N_COMMANDS], *change = kept + N_KEPT;
+    memcpy(at + FIRST_DELAYED, has_moved ? kept + KEPT_COMMANDS : STARTS, N_COMMANDS * sizeof at[0]);
+    o->line.waiting = waiting >= 0.0 && waiting <= o->places[P_WAITING] ? (int)waiting : 0;
+    for (int n = 0; n < o->line.waiting; n++, change += N_CHANGE) {
+        o->line.remaining[n] = change[0], o->line.lost[n] = change[1];
+        memcpy(o->line.commands[n], change + 2, sizeof o->line.commands[n]);
+    }
+#endif
+}
+
+/* Write what the vehicle remembers after a step into MuJoCo's data. */
+static void remember(const vehicle *o)
+{
+    double *const kept = array(&o->shared, A_ACT) + o->places[P_MEMORY];
+    kept[KEPT_MOVED] = 1.0;
+    memcpy(kept + KEPT_OUTSIDE, o->water.outside, sizeof o->water.outside);
+    memcpy(kept + KEPT_LAGGING, o->water.v + FIRST_LAGGING, N_LAGGING * sizeof kept[0]);
+#if HAS_DEAD_TIME
+    double *change = kept + N_KEPT;
+    memcpy(kept + KEPT_COMMANDS, o->water.at + FIRST_DELAYED, N_COMMANDS * sizeof kept[0]);
+    kept[KEPT_COMMANDS + N_COMMANDS] = o->line.waiting;
+    for (int n = 0; n < o->line.waiting; n++, change += N_CHANGE) {
+        change[0] = o->line.remaining[n], change[1] = o->line.lost[n];
+        memcpy(change + 2, o->line.commands[n], sizeof o->line.commands[n]);
+    }
 #endif
 }
 
@@ -266,9 +309,7 @@ static bool weigh(vehicle *o)
 static int add_mass(member *m, double t)
 {
     vehicle *const o = (vehicle *)m;
-    if (t != o->time) {
-        reset(o, t);
-    }
+    o->time = t;
     const double *const given = o->water.at + FIRST_COEFFICIENT;
     if ((!o->is_weighed || memcmp(o->weighed, given, N_COEFFICIENTS * sizeof given[0]) != 0) && !weigh(o)) {
         return NO_BODY;
@@ -308,6 +349,9 @@ static int mean_acceleration(vehicle *o, double t, double h, double result[6])
         return TOO_MANY_WAIT;
     }
     delay_commit(w->at, &o->line, t, h);
+    if (o->line.waiting > o->places[P_WAITING]) {
+        return TOO_MANY_WAIT;
+    }
 #else
     (void)t;
     motion_step(w->at, &n, h, next, NULL);
@@ -327,18 +371,9 @@ static void add_cross(double to[3], const double a[3], const double b[3])
 static int add_forces(member *m, double t, double h, int integrator)
 {
     vehicle *const o = (vehicle *)m;
-    double *const state = o->water.at + FIRST_STATE, *const passive = array(m, A_PASSIVE) + o->places[P_VELOCITY];
-    const double *const T = array(m, A_XMAT) + 9 * o->places[P_BODY], *const ctrl = array(m, A_CTRL);
-    memcpy(o->pose, array(m, A_QPOS) + o->places[P_POSE], sizeof o->pose);
-    memcpy(o->velocity, array(m, A_QVEL) + o->places[P_VELOCITY], sizeof o->velocity);
-    for (int i = 0; i < N_COMMANDS; i++) {
-        o->water.at[i] = ctrl[o->places[P_ACTUATORS + i]];
-    }
-    for (int i = 0; i < 6; i++) {
-        state[VELOCITY + i] = FLIP[i] * o->velocity[i];
-    }
-    state[ATTITUDE] = o->pose[3], state[ATTITUDE + 1] = o->pose[4];
-    state[ATTITUDE + 2] = -o->pose[5], state[ATTITUDE + 3] = -o->pose[6];
+    double *const passive = array(m, A_PASSIVE) + o->places[P_VELOCITY];
+    const double *const T = array(m, A_XMAT) + 9 * o->places[P_BODY];
+    recall(o);
     double mean[6], local[6], force[6], turning[6], change[3], *const rates = o->velocity + 3;
     const int result = mean_acceleration(o, t, h, mean);
     if (result != DONE) {
@@ -384,8 +419,7 @@ static int add_forces(member *m, double t, double h, int integrator)
 static void move(member *m, double t, double h)
 {
     vehicle *const o = (vehicle *)m;
-    if (t <= o->time) { /* MuJoCo has reset a simulation that became unstable */
-        reset(o, t);
+    if (t <= o->time) { /* MuJoCo has reset a simulation that became unstable, and with it what the vehicle remembers */
         return;
     }
     typedef void integrate(double quaternion[4], const double rates[3], double h);
@@ -400,49 +434,168 @@ static void move(member *m, double t, double h)
     }
     ((integrate *)m->addresses[A_TURN])(o->pose + 3, mean + 3, h);
     memcpy(array(m, A_QPOS) + o->places[P_POSE], o->pose, sizeof o->pose);
-    o->time = t;
+    remember(o);
+}
+
+/* ---- Errors of MuJoCo -------------------------------------------------------------------------------------------- */
+
+/* Where MuJoCo gives up, as when its memory is full, it calls a function that must not return, and else ends the program.
+ * This one jumps back to where the step of its thread began. */
+#if defined _WIN32 /* the libraries are built without the C run time's setjmp and variables of threads */
+typedef struct {
+    double registers[30]; /* where the call returns, the stack, and what a function of Windows keeps: 8, and 10 of 16 bytes */
+} mark;
+
+int save_registers(mark *where) __attribute__((returns_twice));
+void restore_registers(const mark *where) __attribute__((noreturn));
+#define KEPT_REGISTERS(move)                                                                                          \
+    move("%rbx", 16) move("%rbp", 24) move("%rsi", 32) move("%rdi", 40) move("%r12", 48) move("%r13", 56)              \
+        move("%r14", 64) move("%r15", 72)
+#define KEPT_VECTORS(move)                                                                                            \
+    move("%xmm6", 80) move("%xmm7", 96) move("%xmm8", 112) move("%xmm9", 128) move("%xmm10", 144) move("%xmm11", 160)  \
+        move("%xmm12", 176) move("%xmm13", 192) move("%xmm14", 208) move("%xmm15", 224)
+#define SAVE(name, place) "movq " name ", " #place "(%rcx)\n"
+#define RESTORE(name, place) "movq " #place "(%rcx), " name "\n"
+#define SAVE_VECTOR(name, place) "movups " name ", " #place "(%rcx)\n"
+#define RESTORE_VECTOR(name, place) "movups " #place "(%rcx), " name "\n"
+__asm__("save_registers:\n"
+        "movq (%rsp), %rax\n" SAVE("%rax", 0) "leaq 8(%rsp), %rax\n" SAVE("%rax", 8)
+        KEPT_REGISTERS(SAVE) KEPT_VECTORS(SAVE_VECTOR) "xorl %eax, %eax\n ret\n"
+        "restore_registers:\n"
+        KEPT_REGISTERS(RESTORE) KEPT_VECTORS(RESTORE_VECTOR) RESTORE("%rsp", 8) "movl $1, %eax\n jmpq *(%rcx)\n");
+#define MARK(where) save_registers(&(where))
+#define JUMP_TO(where) restore_registers(&(where))
+static inline const void *this_thread(void)
+{
+    const void *block;
+    __asm__("movq %%gs:0x30, %0" : "=r"(block));
+    return block;
+}
+#else
+typedef jmp_buf mark;
+#define MARK setjmp
+#define JUMP_TO(where) longjmp(where, 1)
+static inline const void *this_thread(void)
+{
+    static __thread char here;
+    return &here;
+}
+#endif
+
+typedef struct guard {
+    const void *thread;
+    struct guard *next;
+    char *text; /* what MuJoCo says */
+    size_t size;
+    mark start;
+} guard;
+typedef void on_error(const char *message);
+typedef void fail(const char *format, ...);
+
+static guard *guards; /* of the steps that are being taken */
+static char guards_are_locked;
+static on_error *before, **called_by_mujoco;
+static fail *end_program;
+
+static void lock_guards(void)
+{
+    while (__atomic_test_and_set(&guards_are_locked, __ATOMIC_ACQUIRE)) {
+    }
+}
+
+static void unlock_guards(void)
+{
+    __atomic_clear(&guards_are_locked, __ATOMIC_RELEASE);
+}
+
+static void raise_error(const char *message)
+{
+    const void *const thread = this_thread();
+    lock_guards();
+    guard *own = guards;
+    while (own != NULL && own->thread != thread) {
+        own = own->next;
+    }
+    unlock_guards();
+    if (own != NULL) {
+        size_t length = 0;
+        for (; length + 1 < own->size && message[length] != '\0'; length++) {
+            own->text[length] = message[length];
+        }
+        own->text[length] = '\0';
+        JUMP_TO(own->start);
+    } else if (before != NULL) { /* such as that of another vehicle's library */
+        before(message);
+    } else {
+        *called_by_mujoco = NULL;
+        end_program("%s", message);
+    }
+}
+
+static void begin_guard(guard *own, const member *m)
+{
+    lock_guards();
+    own->thread = this_thread();
+    own->next = guards;
+    guards = own;
+    if (called_by_mujoco == NULL) {
+        called_by_mujoco = (on_error **)m->addresses[A_ON_ERROR];
+        end_program = (fail *)m->addresses[A_FAIL];
+        before = *called_by_mujoco;
+        *called_by_mujoco = raise_error;
+    }
+    unlock_guards();
+}
+
+static void end_guard(guard *own)
+{
+    lock_guards();
+    guard **to = &guards;
+    while (*to != own) {
+        to = &(*to)->next;
+    }
+    *to = own->next;
+    unlock_guards();
 }
 
 /* ---- For Python -------------------------------------------------------------------------------------------------- */
 
 /* Write the size of a vehicle, and the place in it of the coefficients and the other inputs, both in doubles; and the
- * numbers of commands, coefficients, and other inputs. */
-EXPORT void water_sizes(int sizes[5])
+ * numbers of commands, coefficients, and other inputs; and N_KEPT and N_CHANGE. */
+EXPORT void water_sizes(int sizes[7])
 {
     sizes[0] = (int)(sizeof(vehicle) / sizeof(double));
     sizes[1] = (int)((offsetof(vehicle, water) + offsetof(water, at)) / sizeof(double)) + FIRST_COEFFICIENT;
     sizes[2] = N_COMMANDS;
     sizes[3] = N_COEFFICIENTS;
     sizes[4] = N_GIVEN - FIRST_COEFFICIENT - N_COEFFICIENTS;
+    sizes[5] = N_KEPT;
+    sizes[6] = N_CHANGE;
 }
 
-/* Connect a vehicle with a simulation. What it remembers stays. */
+/* Connect a vehicle with a simulation. */
 EXPORT void water_connect(vehicle *o, const uintptr_t addresses[], const int places[], const double rigid[])
 {
     memcpy(o->shared.addresses, addresses, sizeof o->shared.addresses);
     memcpy(o->places, places, sizeof o->places);
+#if HAS_DEAD_TIME
+    o->places[P_WAITING] = places[P_WAITING] < MOST_WAITING ? places[P_WAITING] : MOST_WAITING;
+#endif
     memcpy(o->rigid, rigid, sizeof o->rigid);
     o->shared.add_mass = add_mass;
     o->shared.add_forces = add_forces;
     o->shared.move = move;
 }
 
-EXPORT void water_reset(vehicle *o)
+/* Write the forces of the thrusters under the present commands. */
+EXPORT void water_forces(vehicle *o, double forces[])
 {
-    reset(o, time_of(&o->shared));
-}
-
-/* Write the forces of the thrusters. Return false before the first step. */
-EXPORT bool water_forces(const vehicle *o, double forces[])
-{
-    double v[N_NUMBERS];
-    memcpy(v, o->water.v, sizeof v);
-    equation_lag(v, o->water.since);
-    equation_numbers(v);
+    double mean[6];
+    recall(o);
+    accelerate(&o->water, o->water.at, 0.0, o->water.at + FIRST_STATE, mean);
     for (int i = 0; i < N_FORCES; i++) {
-        forces[i] = v[FORCES[i]];
+        forces[i] = o->water.v[FORCES[i]];
     }
-    return o->water.is_held;
 }
 
 /* The parts of a step, for a scene in which other code takes some of them. */
@@ -461,20 +614,9 @@ EXPORT void water_move(member *m, double t, double h)
     m->move(m, t, h);
 }
 
-/* Take some steps of a scene with n vehicles, whose libraries may be others. */
-EXPORT int water_step(member *const members[], int n, double h, int integrator, int steps)
+static int take_steps(member *const members[], int n, double h, int integrator, int steps)
 {
     const member *const first = members[0];
-    for (int i = 0; i < n; i++) {
-        if (members[i]->addresses[A_DATA] != first->addresses[A_DATA]) {
-            return IN_ANOTHER_SCENE;
-        }
-    }
-    for (int i = 0; i < N_CALLBACKS; i++) {
-        if (*(const volatile uintptr_t *)first->addresses[A_CALLBACKS + i] != 0) {
-            return HAS_CALLBACKS;
-        }
-    }
     int result = DONE;
     for (; steps > 0; steps--) {
         call(first, A_STEP_1);
@@ -498,4 +640,30 @@ EXPORT int water_step(member *const members[], int n, double h, int integrator, 
         }
     }
     return DONE;
+}
+
+/* Take some steps of a scene with n vehicles, whose libraries may be others. Write what MuJoCo says if it fails. */
+EXPORT int water_step(member *const members[], int n, double h, int integrator, int steps, char text[], int size)
+{
+    const member *const first = members[0];
+    for (int i = 0; i < n; i++) {
+        if (members[i]->addresses[A_DATA] != first->addresses[A_DATA]) {
+            return IN_ANOTHER_SCENE;
+        }
+    }
+    for (int i = 0; i < N_CALLBACKS; i++) {
+        if (*(const volatile uintptr_t *)first->addresses[A_CALLBACKS + i] != 0) {
+            return HAS_CALLBACKS;
+        }
+    }
+    guard own;
+    own.text = text;
+    own.size = (size_t)size;
+    volatile int result = MUJOCO_FAILS;
+    begin_guard(&own, first);
+    if (MARK(own.start) == 0) {
+        result = take_steps(members, n, h, integrator, steps);
+    }
+    end_guard(&own);
+    return result;
 }

@@ -145,10 +145,15 @@ MACHINES = {
 HOSTS = tuple(MACHINES.values())
 
 
+def processor() -> str:
+    """Return the name of the processor of this machine, as MACHINES has it."""
+    name = platform.machine().lower()
+    return {"amd64": "x86_64", "arm64": "aarch64"}.get(name, name)
+
+
 def host_platform(fmi: int = 2) -> str | None:
     """Return the platform that importers of this version look for on this machine, or None if it is not supported."""
-    processor = {"amd64": "x86_64", "arm64": "aarch64"}.get(platform.machine().lower(), platform.machine().lower())
-    name = MACHINES.get((platform.system(), processor))
+    name = MACHINES.get((platform.system(), processor()))
     return "darwin64" if name == "aarch64-darwin" and fmi == 2 else name
 
 

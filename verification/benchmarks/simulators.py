@@ -13,7 +13,7 @@ from mujoco import rollout
 from rov_fmu.bridges.gym import RovVectorEnv
 from rov_fmu.bridges.mcap import hull_size
 from rov_fmu.bridges.mujoco import load, mujoco_texts
-from rov_fmu.bridges.mujoco.native import step
+from rov_fmu.bridges.mujoco.plugin import step
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import SURGE, YAW
 from rov_fmu.vehicle.vehicle import Vehicle

@@ -1,11 +1,13 @@
 """Write a vehicle as a folder for MuJoCo, which is a Python package: the model (MJCF) and what adds the water to it.
 
-The package needs only MuJoCo and NumPy. It contains `plugin.py`, `native.py` and `step.py` as they are, the equation of
-the vehicle, which `equation/python/printed.py` prints, and the same in C (`source.py`), with its libraries.
+The package needs only MuJoCo and NumPy. It contains `plugin.py` as it is, the names and the numbers of the vehicle, and
+its equation in C (`source.py`), with its libraries.
 """
 
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from math import ceil, isinf
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
@@ -14,13 +16,22 @@ import numpy as np
 
 from rov_fmu.bridges import sdf
 from rov_fmu.bridges.mcap import hull_size
-from rov_fmu.bridges.mujoco.source import water_sources
-from rov_fmu.c.compile import HOSTS, MACHINES, PLATFORMS, compile_for
+from rov_fmu.bridges.mujoco.source import memory_size, water_sources
+from rov_fmu.c.compile import (
+    HOSTS,
+    MACHINES,
+    PLATFORMS,
+    compile_engine,
+    compile_for,
+    compiler,
+    host_platform,
+    is_zig,
+    processor,
+)
 from rov_fmu.c.library import load_sources
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import Point, Thruster
-from rov_fmu.equation.python import step
-from rov_fmu.equation.python.printed import left_out_of_accelerations, printed_accelerations
+from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
 from rov_fmu.report.plots.geometry import place
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -28,21 +39,21 @@ from rov_fmu.vehicle.vehicle import Vehicle
 if TYPE_CHECKING:
     from rov_fmu.bridges.mujoco.plugin import Rov
 
-_OWN = ("plugin.py", "native.py")
-"""The files of this folder that are part of each exported one."""
+_PLUGIN = Path(__file__).with_name("plugin.py")
+"""The file of this folder that is part of each exported one."""
 _SYSTEMS = {"Linux": "linux", "Windows": "win32", "Darwin": "darwin"}
-"""The names in `sys.platform`, by those of `platform.system()`. native.py looks for a library with such a name."""
+"""The names in `sys.platform`, by those of `platform.system()`. plugin.py looks for a library with such a name."""
 _PACKAGE = '''\
 """A vehicle in MuJoCo: see README.md. `load` returns it in its world, and `Rov` connects it in a world of your own."""
 
 from functools import partial
 from pathlib import Path
 
-from . import equation, native, plugin
-from .native import step
+from . import equation, plugin
+from .plugin import step
 
 FOLDER = Path(__file__).parent
-Rov = native.connector(equation, native.library_in(FOLDER))
+Rov = partial(plugin.connect, FOLDER, equation)
 load = partial(plugin.load, Rov, FOLDER / "scene.xml")
 draws = partial(plugin.draws, FOLDER / "draws.csv")
 '''
@@ -57,6 +68,8 @@ from .plugin import show
 
 show(load(), *map(Path, sys.argv[1:2]))
 '''
+_LEAST_WAITING = 64
+"""The fewest changes of commands that may wait for the dead time. There may be one in each millisecond of it."""
 _FLIP = np.array([1.0, -1.0, -1.0])
 """The signs of components in MuJoCo's frame of the body, relative to forward, starboard, down."""
 _PROPELLER = 0.05
@@ -68,21 +81,25 @@ def mujoco_files(
     package: str,
     card: Mapping[str, Sequence[str]],
     draws: Mapping[str, Sequence[float]],
-    platforms: Sequence[str] | None = None,
+    platforms: Sequence[str | None] | None = None,
 ) -> dict[str, str | bytes]:
     """Return the files of the folder by name. `package` is its own name.
 
-    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. On `platforms`,
-    by default HOSTS, the step is in C, and on others in Python. Raises InputError about a vehicle without a mass or
-    with β = 0, and BuildError if the C cannot be compiled.
+    `card` are the paragraphs about the vehicle by heading, and `draws` the drawn coefficients by name. The step has a
+    library for each of `platforms`, of which None is this machine. By default these are this machine and HOSTS, if the
+    compiler has them. Raises InputError about a vehicle without a mass or with β = 0, and BuildError if the C cannot be
+    compiled.
     """
     texts = mujoco_texts(vehicle, package, card, draws)
-    libraries = compile_for(HOSTS if platforms is None else platforms, _c_of(texts))
+    if platforms is None:
+        platforms = [*dict.fromkeys([*(HOSTS if is_zig(compiler()) else ()), host_platform(fmi=3)])]
+    libraries = compile_for([*filter(None, platforms)], _c_of(texts))
     names = {
-        name: f"water_{_SYSTEMS[system]}_{processor}{PLATFORMS[name].suffix}"
-        for (system, processor), name in MACHINES.items()
+        name: f"water_{_SYSTEMS[system]}_{machine}{PLATFORMS[name].suffix}"
+        for (system, machine), name in MACHINES.items()
     }
-    return {**texts, **{names[name]: library for name, library in libraries.items()}}
+    own = {f"water_{sys.platform}_{processor()}.so": compile_engine(_c_of(texts))} if None in platforms else {}
+    return {**texts, **own, **{names[name]: library for name, library in libraries.items()}}
 
 
 def mujoco_texts(
@@ -96,12 +113,14 @@ def mujoco_texts(
     example = layout.example(layout.axes[0].axis)
     hull = hull_size(vehicle) / 2.0
     low, _, high = layout.pulse or (-1.0, 0.0, 1.0)
+    waiting = max(_LEAST_WAITING, ceil(1000.0 * vehicle["T_d"])) if layout.has_dead_time else 0
     content = {
         "gravity": sdf.gravity(vehicle),
         "body": sdf.link_of(vehicle, 1.0),
         "hull": hull,
         "foam": {"at": hull * (0.0, 0.0, 0.72), "size": hull * (1.01, 0.9, 0.3)},
         "range": np.array([low, high]),
+        "memory": memory_size(layout)[0] + waiting * memory_size(layout)[1],
         "thrusters": [_drawn(vehicle, thruster, _PROPELLER * float(hull.max()) * 2.0) for thruster in layout.thrusters],
         "points": points,
         "package": package,
@@ -118,9 +137,8 @@ def mujoco_texts(
         "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
         "__init__.py": _PACKAGE,
         "__main__.py": _MAIN.format(package=package),
-        **{name: _text(name).replace("from rov_fmu.equation.python.step", "from .step") for name in _OWN},
-        **{name: Path(step.__file__).with_name(name).read_text(encoding="utf-8") for name in ("step.py", "dop853.py")},
-        "equation.py": equation_module(vehicle),
+        _PLUGIN.name: _PLUGIN.read_text(encoding="utf-8"),
+        "equation.py": _equation(vehicle),
         **water_sources(layout),
     }
     rows = zip(*draws.values(), strict=True)  # without draws, the file replaces that of an earlier export
@@ -142,41 +160,37 @@ def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
     """
     import mujoco
 
-    from rov_fmu.bridges.mujoco.native import connector
+    from rov_fmu.bridges.mujoco.plugin import Library, Rov
 
     files = mujoco_texts(vehicle, "rov", {}, {})
     equation = ModuleType("equation")
-    exec(compile(equation_module(vehicle, "rov_fmu.equation.python.step"), "<equation>", "exec"), equation.__dict__)
+    exec(compile(files["equation.py"], "<equation>", "exec"), equation.__dict__)
     model = mujoco.MjModel.from_xml_string(files["scene.xml"], {"vehicle.xml": files["vehicle.xml"].encode()})
     library = load_sources(files["equation.h"], lambda: _c_of(files))
-    return connector(equation, library)(model, None, "", **coefficients)
+    return Rov(Library(library, equation), equation, model, None, "", **coefficients)
 
 
-def equation_module(vehicle: Vehicle, step: str = ".step") -> str:
-    """Return the module with the equation of a vehicle and its numbers, as `plugin.py` takes it."""
-    vehicle = _without_points(vehicle)
+def _equation(vehicle: Vehicle) -> str:
+    """Return the module with the names and the numbers of a vehicle, as `plugin.py` takes it."""
     layout = vehicle.layout
+    bounds = {name: (one.minimum, one.maximum) for name, one in layout.coefficients.items()}
     data = {
         "IDENTIFIER": vehicle.identifier,
         "COEFFICIENTS": {name: vehicle[name] for name in layout.coefficients},
+        "BOUNDS": {name: pair for name, pair in bounds.items() if not all(map(isinf, pair))},
         "COMMANDS": {name: layout.usual_inputs[name] for name in layout.commands},
         "INPUTS": {name: x for name, x in layout.usual_inputs.items() if name not in layout.commands},
-        "DELAYED": layout.acting,
-        "LAGGING": [*layout.lagging],
         "FORCES": [f"F_{thruster.name}" for thruster in layout.thrusters],
         "EXAMPLE": layout.example(layout.axes[0].axis),
     }
     lines = [f"{name} = {value!r}" for name, value in data.items()]
-    return "\n".join([printed_accelerations(layout, step), "", *lines, ""])
+    words = '"""The names and the numbers of a vehicle, in SI units. water.c has its equation."""'
+    return "\n".join([words, "", "from math import inf", "", *lines, ""])
 
 
 def _c_of(files: Mapping[str, str]) -> dict[str, str]:
     """Return the C files of a folder. The last one includes the others."""
     return {name: text for name, text in files.items() if name.endswith((".c", ".h"))}
-
-
-def _text(name: str) -> str:
-    return Path(__file__).with_name(name).read_text(encoding="utf-8")
 
 
 def _without_points(vehicle: Vehicle) -> Vehicle:

@@ -1,22 +1,28 @@
 """A vehicle in MuJoCo, with the motion of its FMU. This file is a part of each exported folder.
 
-MuJoCo moves the body and solves contacts. In each time step, a `Rov` adds two things: what the vehicle's mass matrix
-has beyond that of the rigid body, above all the added mass, so that contacts, loads and payloads feel it; and the
-forces that give the body the accelerations of the equation. These are computed in the middle of the step, so that the
-errors of the motion are of second order in the length of the step. native.py does the same in C, where the folder has a
-library for this machine.
+MuJoCo moves the body and solves contacts. In each time step, the vehicle's library (water.c) adds two things: what the
+vehicle's mass matrix has beyond that of the rigid body, above all the added mass, so that contacts, loads and payloads
+feel it; and the forces that give the body the accelerations of the equation. These are computed in the middle of the
+step, so that the errors of the motion are of second order in the length of the step.
+
+The library calls the functions of the MuJoCo that Python has loaded, and knows its arrays by their addresses. What a
+vehicle remembers from step to step, such as thrust that lags, is in the activations of its first actuator (`data.act`).
+So it belongs to the data: MuJoCo copies, saves and resets it with them.
 
 The world of the model is north, west, up, and the body forward, port, up. The equation has north, east, down and
 forward, starboard, down, so components along and about the second and third axis have the other sign.
 """
 
 import csv
+import ctypes
 import os
+import platform
 import struct
 import sys
 import zlib
 from collections.abc import Callable, Iterator, Mapping, MutableMapping
 from copy import copy, deepcopy
+from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
@@ -26,27 +32,39 @@ if sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.k
 import mujoco
 import numpy as np
 
-from rov_fmu.equation.python.step import Memory
-
-_FLIP = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
-"""The signs of the components in MuJoCo's frames, relative to those in the equation's."""
+FORMAT = 2
+"""What the step of a scene takes for a vehicle in it (`member` in water.c). Others are stepped part by part."""
 _FREE = int(mujoco.mjtJoint.mjJNT_FREE)
+_FREEDOMS = 6
+"""Those of a free joint."""
+_USER = int(mujoco.mjtDyn.mjDYN_USER)
 _IMPLICIT = int(mujoco.mjtIntegrator.mjINT_IMPLICIT), int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)
 """The integrators that treat gyroscopic forces as implicit."""
-_HEAVY = 1e6
-"""The mass along, or the inertia about, an axis that the vehicle lacks, relative to that of the rigid body."""
-_REST = 0.1
-"""The time constant, s, with which the body comes to rest along such an axis, and becomes level."""
-NO_BODY = "coefficients: the mass matrix must be positive definite; check m_rov and beta"
-APART = "step: all vehicles must be in the same simulation, with the same data"
+_LIBRARIES = {"linux": "libmujoco.so*", "darwin": "libmujoco*.dylib", "win32": "mujoco.dll"}
+_PROCESSORS = {"amd64": "x86_64", "arm64": "aarch64"}
+"""The usual names of processors, by other names."""
+_FUNCTIONS = (
+    *("mj_step1", "mj_factorM", "mj_projectConstraint", "mj_step2", "mju_quatIntegrate", "mj_getState"),
+    *("mju_error", "mju_user_error"),
+    *(f"mjcb_{name}" for name in ("passive", "control", "contactfilter", "sensor")),
+    *(f"mjcb_act_{name}" for name in ("dyn", "gain", "bias")),
+)
+"""The functions, and the variables with functions, of MuJoCo, as water.c has them."""
+_DONE, _NO_BODY, _TOO_MANY_WAIT, _APART, _HAS_CALLBACKS, _MUJOCO_FAILS = range(6)
+_REASONS = {
+    _NO_BODY: "coefficients: the mass matrix must be positive definite; check m_rov and beta",
+    _TOO_MANY_WAIT: "more changes of commands wait for the dead time than the model keeps; change them less often, or "
+    "raise actdim of the vehicle's first actuator in vehicle.xml",
+    _APART: "step: all vehicles must be in the same simulation, with the same data",
+}
 
 
 class Numbers(MutableMapping[str, float]):
-    """Coefficients or inputs by their names. They are in an array, which the step in C reads as well."""
+    """Coefficients or inputs by their names. They are in an array, which the step reads."""
 
-    def __init__(self, values: Mapping[str, float]) -> None:
+    def __init__(self, values: Mapping[str, float], bounds: Mapping[str, tuple[float, float]]) -> None:
         self.places = {name: n for n, name in enumerate(values)}
-        self.array = np.array([*values.values()], float)
+        self.array, self.bounds = np.array([*values.values()], float), bounds
 
     def __getitem__(self, name: str) -> float:
         return float(self.array[self.places[name]])
@@ -54,6 +72,9 @@ class Numbers(MutableMapping[str, float]):
     def __setitem__(self, name: str, value: float) -> None:
         if name not in self.places:
             raise ValueError(f"{name}: the vehicle has no such coefficient or input")
+        low, high = self.bounds.get(name, (-inf, inf))
+        if not (isfinite(value) and low <= value <= high):
+            raise ValueError(f"{name} = {value!r}: must be a number within {low:g} ... {high:g}")
         self.array[self.places[name]] = value
 
     def __delitem__(self, name: str) -> None:
@@ -73,168 +94,81 @@ class Numbers(MutableMapping[str, float]):
         return self
 
 
-class Water:
-    """The equation of a vehicle: its commands, the thrust that lags behind them, and the accelerations.
+class Library:
+    """The functions of a vehicle in C, and those of MuJoCo."""
 
-    All frames, signs and units are those of the FMU.
-    """
-
-    def __init__(self, equation: Any) -> None:
-        self.equation = equation
-        self.coefficients, self.inputs = Numbers(equation.COEFFICIENTS), Numbers(equation.INPUTS)
-        self.lacking = [n for n, v in enumerate("uvwpqr") if v not in equation.VELOCITIES]
-        self.reset()
-
-    def reset(self) -> None:
-        """Stop the thrusters, and forget the commands that wait for the dead time."""
-        self.forces = dict.fromkeys(self.equation.LAGGING, 0.0)
-        self.memory = Memory(self.equation.COMMANDS, self.equation.DELAYED)
-        self.held: tuple[float, ...] = ()
-        self.numbers: dict[str, float] = {}
-        self.since = 0.0
-        """The time since the numbers of the equation were last computed, s."""
-        self.until = 0.0
-        """The time until a rotor reverses, after which they no longer hold, s."""
-
-    def mass(self) -> Any:
-        """Return the 6x6 mass matrix with added mass and tuning. Raises ValueError if no body has the coefficients."""
-        still, there = dict.fromkeys("uvwpqr", 0.0), [n for n in range(6) if n not in self.lacking]
+    def __init__(self, own: ctypes.CDLL, equation: Any) -> None:
+        """Raises ValueError without MuJoCo's library, or with that of another vehicle."""
+        files = [*Path(mujoco.__file__).parent.glob(_LIBRARIES.get(sys.platform, "libmujoco*"))]
         try:
-            mass = np.array(self.equation.mass(self._numbers({**self.equation.COMMANDS, **still})))
-            root = np.linalg.cholesky(mass[np.ix_(there, there)])
-        except (ZeroDivisionError, np.linalg.LinAlgError) as error:
-            raise ValueError(NO_BODY) from error
-        if not np.isfinite(root).all():
-            raise ValueError(NO_BODY)
-        return mass
-
-    def __copy__(self) -> "Water":
-        other = object.__new__(Water)
-        other.__dict__ = {**self.__dict__, "memory": copy(self.memory)}
-        other.coefficients, other.inputs = Numbers(self.coefficients), Numbers(self.inputs)
-        return other
-
-    def _numbers(self, values: Mapping[str, float]) -> dict[str, float]:
-        delayed = {later: values[name] for name, later in self.equation.DELAYED.items()}
-        found: dict[str, float] = self.equation.numbers(
-            {**self.coefficients, **self.inputs, **delayed, **values, **self.forces}
-        )
-        return found
-
-    def accelerate(
-        self,
-        commands: Mapping[str, float],
-        state: tuple[list[float], list[float]],
-        outside: list[float],
-        t: float,
-        h: float,
-    ) -> list[float]:
-        """Return the mean acceleration during a time step of h seconds from time t, with the commands held.
-
-        It is that of the origin in the earth frame, and that of the rates in the body frame. `state` are the velocities
-        in the same frames, and the quaternion; `outside` is the acceleration by other forces than those of the water.
-        """
-        self.velocity, self.quaternion = state
-        self.outside, self.change = outside, [0.0] * 6
-        self.memory.step(self, commands, {}, t, h)
-        return [x / h for x in self.change]
-
-    def __getitem__(self, name: str) -> float:
-        """Return a coefficient, as the memory asks for it."""
-        return self.coefficients[name]
-
-    def step(self, commands: Mapping[str, float], _: Mapping[str, float], h: float) -> dict[str, float]:
-        """Move for a part of the time step, during which some commands act. The memory calls this."""
-        before, outside = self.velocity, self.outside
-        start = self._acceleration(commands, 0.0, before, self.quaternion)
-        middle = [v + 0.5 * h * (a + b) for v, a, b in zip(before, start, outside, strict=True)]
-        turned = _turned(self.quaternion, before[3:], 0.5 * h)
-        mean = self._acceleration(commands, 0.5 * h, middle, turned)
-        self.change = [x + h * a for x, a in zip(self.change, mean, strict=True)]
-        self.quaternion = _turned(self.quaternion, middle[3:], h)
-        self.velocity = [v + h * (a + b) for v, a, b in zip(before, mean, outside, strict=True)]
-        self.since += h
-        return {}
-
-    def _acceleration(
-        self, commands: Mapping[str, float], after: float, velocity: list[float], quaternion: list[float]
-    ) -> list[float]:
-        """Return the acceleration some seconds after the start of a part of the step."""
-        R = first, second, third = _rotation(quaternion)
-        x, y, z = (v - self.inputs.get(name, 0.0) for v, name in zip(velocity, ("V_N", "V_E", "V_D"), strict=False))
-        u, v, w = (a * x + b * y + c * z for a, b, c in zip(first, second, third, strict=True))
-        nu = u, v, w, p, q, r = u, v, w, *velocity[3:]
-        self._hold(commands, nu)
-        rates: list[float] = self.rates(self.since + after, *nu, *third)
-        for n in self.lacking:
-            tilt = (0.0, 0.0, 0.0, third[1], -third[0], 0.0)[n]
-            rates[n] = -2.0 * nu[n] / _REST - tilt / _REST**2
-        # the velocity of the origin changes in the earth frame by v' + omega x v
-        a, b, c = rates[0] + q * w - r * v, rates[1] + r * u - p * w, rates[2] + p * v - q * u
-        return [*(row[0] * a + row[1] * b + row[2] * c for row in R), *rates[3:]]
-
-    def _hold(self, commands: Mapping[str, float], nu: tuple[float, ...]) -> None:
-        """Compute the numbers that are constant while the inputs and the directions of motion are held."""
-        directions = [-1.0 if x < 0.0 else 1.0 for x in nu]
-        outer = *self.coefficients.array.tolist(), *self.inputs.array.tolist()
-        held = *outer, *commands.values(), *directions
-        if held != self.held or self.since >= self.until:
-            if self.held:
-                self.forces = self.equation.lagging(self.numbers, self.since)
-            self.held, self.since = held, 0.0
-            self.numbers = self._numbers({**commands, **dict(zip("uvwpqr", directions, strict=True))})
-            self.rates = self.equation.accelerations(self.numbers)
-            self.until = self.equation.until_reversal(self.numbers)
-
-
-def _rotation(quaternion: list[float]) -> list[list[float]]:
-    """Return the rotation matrix of a quaternion, scalar first, which need not have length 1."""
-    e, a, b, c = quaternion
-    s = 2.0 / (e * e + a * a + b * b + c * c)
-    return [
-        [1.0 - s * (b * b + c * c), s * (a * b - c * e), s * (a * c + b * e)],
-        [s * (a * b + c * e), 1.0 - s * (a * a + c * c), s * (b * c - a * e)],
-        [s * (a * c - b * e), s * (b * c + a * e), 1.0 - s * (a * a + b * b)],
-    ]
-
-
-def _turned(quaternion: list[float], rates: list[float], h: float) -> list[float]:
-    """Return a quaternion after a turn of h seconds, to first order."""
-    e, a, b, c = quaternion
-    p, q, r = (0.5 * h * rate for rate in rates)
-    return [e - a * p - b * q - c * r, a + e * p + b * r - c * q, b + e * q + c * p - a * r, c + e * r + a * q - b * p]
+            its = ctypes.CDLL(str(files[0]))
+            self.functions = [ctypes.addressof(ctypes.c_char.in_dll(its, name)) for name in _FUNCTIONS]
+        except (IndexError, OSError, ValueError) as error:
+            raise ValueError(f"MuJoCo {mujoco.__version__}: its library cannot be used: {error}") from error
+        sizes = (ctypes.c_int * 7)()
+        own.water_sizes(sizes)
+        self.size, self.outer, *counts, self.kept, self.change = sizes
+        if counts != [len(equation.COMMANDS), len(equation.COEFFICIENTS), len(equation.INPUTS)]:
+            raise ValueError(f"{own._name}: the library belongs to another vehicle")
+        address, integer, number = ctypes.c_void_p, ctypes.c_int, ctypes.c_double
+        self.step, self.connect, self.forces = own.water_step, own.water_connect, own.water_forces
+        self.step.argtypes = [address, integer, number, integer, integer, ctypes.c_char_p, integer]
+        self.connect.argtypes, self.forces.argtypes = [address] * 4, [address] * 2
+        self.add_mass, self.add_forces, self.move = own.water_add_mass, own.water_add_forces, own.water_move
+        self.add_mass.argtypes, self.move.argtypes = [address, number], [address, number, number]
+        self.add_forces.argtypes = [address, number, number, integer]
+        for function in (self.connect, self.forces, self.move):
+            function.restype = None
 
 
 class Rov:
     """A vehicle in a simulation of MuJoCo.
 
     `data.ctrl` has the commands, by actuators with the names of the FMU's inputs. `coefficients` and `inputs` (loads
-    from outside, current, voltage) may change at any time: `rov.coefficients["m_rov"] += 0.5` takes ballast on board.
+    from outside, current, voltage) may change at any time: `rov.inputs["Z_ext"] = 3.0` is a load of 3 N.
     """
 
-    def __init__(self, equation: Any, model: Any, data: Any = None, prefix: str = "", **coefficients: float) -> None:
+    FORMAT = FORMAT
+    scene: Any = None
+    """The vehicles that moved together with this one in the last step, and the arguments of the C."""
+
+    def __init__(
+        self, library: Library, equation: Any, model: Any, data: Any = None, prefix: str = "", **coefficients: float
+    ) -> None:
         """Connect the equation with its body in a model.
 
         All names in the model begin with `prefix`, if the vehicle was attached with one. Other `coefficients` replace
-        those of the vehicle. Raises ValueError about a model or a coefficient that cannot be used.
+        those of the vehicle. Raises ValueError about a model, its data or a coefficient that cannot be used.
         """
-        self.model, self.data = model, mujoco.MjData(model) if data is None else data
-        self.water = Water(equation)
+        self.library, self.equation, self.memory = library, equation, np.zeros(library.size)
+        self._coefficients = Numbers(equation.COEFFICIENTS, equation.BOUNDS)
+        self._inputs = Numbers(equation.INPUTS, {})
         self.coefficients.update(coefficients)
         name = prefix + equation.IDENTIFIER
         self.body = model.body(name).id
         self._actuators = [model.actuator(prefix + command).id for command in equation.COMMANDS]
+        first = model.actuator(prefix + next(iter(equation.COMMANDS), "memory")).id
         _check(model, self.body, name)
+        self._kept = model.actuator_actadr[first], model.actuator_actnum[first] - library.kept
+        if model.actuator_dyntype[first] != _USER or self._kept[1] < 0:
+            raise ValueError(
+                f'actuator {model.actuator(first).name}: must have dyntype="user" and actdim="{library.kept}" or more, '
+                "because it has the vehicle's memory: take vehicle.xml of the same export"
+            )
         joint = model.body_jntadr[self.body]
         place, dof = model.jnt_qposadr[joint], model.jnt_dofadr[joint]
-        self._pose, self._dofs = slice(place, place + 7), slice(dof, dof + 6)
-        self._lower = np.tril_indices(6)
-        self._entries = model.M_rowadr[dof + self._lower[0]] + self._lower[1]
-        self._rigid = _rigid_mass(model, self.body)
-        self._turning = self._rigid[:, 3:]
+        lower = np.tril_indices(6)
         # implicitfast treats gyroscopic forces as implicit if the free joint moves the whole tree of bodies
-        self._implicit = _IMPLICIT if model.tree_dofnum[model.dof_treeid[dof]] == len(_FLIP) else _IMPLICIT[:1]
-        self.reset()
+        implicit = _IMPLICIT if model.tree_dofnum[model.dof_treeid[dof]] == _FREEDOMS else _IMPLICIT[:1]
+        self._places = [
+            *(self.body, place, dof, sum(1 << integrator for integrator in implicit)),
+            *(self._kept[0], self._kept[1] // library.change if library.change else 0),
+            *(model.M_rowadr[dof + lower[0]] + lower[1]),
+            *self._actuators,
+        ]
+        self._rigid = _rigid_mass(model, self.body)
+        self._model = model
+        self.data = mujoco.MjData(model) if data is None else data
 
     def __copy__(self) -> "Rov":
         """Return the same vehicle in a simulation of its own, in the same state. The model is shared."""
@@ -246,120 +180,124 @@ class Rov:
 
     def _copied(self, model: Any, data: Any) -> "Rov":
         other = object.__new__(type(self))
-        own = {name: x.copy() for name, x in self.__dict__.items() if isinstance(x, np.ndarray)}
-        other.__dict__ = {**self.__dict__, **own, "water": copy(self.water)}
-        other.model, other.data = model, data
+        other.__dict__ = {**self.__dict__, "memory": self.memory.copy(), "_model": model}
+        other._coefficients, other._inputs = copy(self._coefficients), copy(self._inputs)
+        other.data = data
         return other
+
+    @property
+    def model(self) -> Any:
+        """The model. It cannot be exchanged: connect the vehicle with another one by another `Rov`."""
+        return self._model
+
+    @property
+    def data(self) -> Any:
+        """The state of the simulation. It may be exchanged for other data of the same model at any time.
+
+        Thrust that lags, commands that wait for the dead time and all else that a vehicle remembers are in the data.
+        """
+        return self._data
+
+    @data.setter
+    def data(self, data: Any) -> None:
+        model = self.model
+        sizes = [(one.nq, one.nv, one.nu, one.na, one.nbody, one.nM, one.signature) for one in (model, data.model)]
+        if sizes[0] != sizes[1]:
+            raise ValueError("data: must be those of the vehicle's model, MjData(rov.model)")
+        self._data = data
+        memory, first = self.memory, self.library.outer
+        for numbers in (self.coefficients, self.inputs):  # which the C and Python share
+            view = memory[first : first + len(numbers)]
+            view[:], numbers.array, first = numbers.array, view, first + len(numbers)
+        arrays = (data.M, data.qpos, data.qvel, data.act, data.ctrl, data.qfrc_passive, data.xmat)
+        pointers = [model._address, data._address, *(one.ctypes.data for one in arrays), *self.library.functions]
+        given = np.array(pointers, np.uintp), np.array(self._places, np.intc), np.ascontiguousarray(self._rigid)
+        self.address, self.scene = memory.ctypes.data, None
+        self.library.connect(self.address, *(one.ctypes.data for one in given))
 
     @property
     def coefficients(self) -> Numbers:
         """The coefficients by their names in the FMU, in SI units."""
-        return self.water.coefficients
+        return self._coefficients
 
     @coefficients.setter
     def coefficients(self, values: Mapping[str, float]) -> None:
-        self.water.coefficients.update(values)
+        self._coefficients.update(values)
 
     @property
     def inputs(self) -> Numbers:
         """The inputs that are no commands, by their names in the FMU, in SI units."""
-        return self.water.inputs
+        return self._inputs
 
     @inputs.setter
     def inputs(self, values: Mapping[str, float]) -> None:
-        self.water.inputs.update(values)
+        self._inputs.update(values)
 
     def reset(self) -> None:
-        """Stop the thrusters and forget the commands that wait for the dead time.
-
-        `step` does this when the time is not that at the end of the last step, as after a reset of MuJoCo.
-        """
-        self.water.reset()
-        self._time, self._outside = self.data.time, np.zeros(6)
-        self._weighed: list[float] = []
+        """Stop the thrusters and forget the commands that wait for the dead time, as a reset of MuJoCo does."""
+        place, more = self._kept
+        self.data.act[place : place + self.library.kept + more] = 0.0
 
     @property
     def forces(self) -> dict[str, float]:
         """The force of each thruster, N, by its name in the FMU."""
-        water = self.water
-        if not water.held:
-            return {}
-        now = water.equation.numbers({**water.numbers, **water.equation.lagging(water.numbers, water.since)})
-        return {name: now[name] for name in water.equation.FORCES}
+        names = self.equation.FORCES
+        found = np.zeros(len(names) + 1)
+        self.library.forces(self.address, found.ctypes.data)
+        return dict(zip(names, found.tolist(), strict=False))
 
     def step(self, steps: int = 1) -> None:
         """Move the simulation by some time steps. For several vehicles in one model, there is the function `step`."""
         step(self, steps=steps)
 
-    # ---- The parts of a step, in their order ----
+    # ---- The parts of a step, where some of it is in Python ----
 
     def add_mass(self) -> None:
         """Add to MuJoCo's inertia matrix what the mass matrix of the vehicle has beyond that of the rigid body."""
-        data = self.data
-        if data.time != self._time:
-            self.reset()
-        if self._weighed != self.coefficients.array.tolist():
-            self._weighed = self.coefficients.array.tolist()
-            self._mass = np.outer(_FLIP, _FLIP) * self.water.mass()
-            for n in self.water.lacking:
-                self._mass[n] = self._mass[:, n] = 0.0
-                self._mass[n, n] = _HEAVY * self._rigid[n, n]
-        self._turn = np.eye(6)
-        self._turn[:3, :3] = data.xmat[self.body].reshape(3, 3).T
-        added = self._turn.T @ (self._mass - self._rigid) @ self._turn
-        data.M[self._entries] += added[self._lower]
+        _raise(self.library.add_mass(self.address, self.data.time))
 
     def add_forces(self) -> None:
         """Add the forces that give the body the accelerations of the equation, unless other forces act."""
-        data, commands = self.data, self.water.equation.COMMANDS
-        pose, velocity = self._start = data.qpos[self._pose].copy(), data.qvel[self._dofs].copy()
-        held = dict(zip(commands, data.ctrl[self._actuators].tolist(), strict=True))
-        e, a, b, c = pose[3:].tolist()
-        state = (_FLIP * velocity).tolist(), [e, a, -b, -c]
-        outside = (_FLIP * self._outside).tolist()
-        mean = self.water.accelerate(held, state, outside, data.time, self.model.opt.timestep)
-        self._accelerated = _FLIP * np.array(mean)
-        data.qfrc_passive[self._dofs] += self._turn.T @ (
-            self._mass @ (self._turn @ self._accelerated) + self._subtracted(velocity[3:])
-        )
-
-    def _subtracted(self, rates: Any) -> Any:
-        """Return the rigid body's part of what MuJoCo subtracts: m omega x (omega x r_G) and omega x I omega.
-
-        Integrators that treat it as implicit subtract its value at the end of the step, linearised about the start.
-        """
-        turning = self._turning @ rates
-        subtracted = _crossed(rates, turning)
-        if self.model.opt.integrator in self._implicit:
-            change = self.model.opt.timestep * (self._accelerated + self._outside)[3:]
-            subtracted += _crossed(change, turning) + _crossed(rates, self._turning @ change)
-        return subtracted
+        option = self.model.opt
+        _raise(self.library.add_forces(self.address, self.data.time, option.timestep, option.integrator))
 
     def move(self) -> None:
         """Move the body with its mean velocity during the step, where MuJoCo took the last one."""
-        data, h = self.data, self.model.opt.timestep
-        if data.time <= self._time:  # MuJoCo has reset a simulation that became unstable
-            self.reset()
-            return
-        self._time = data.time
-        pose, velocity = self._start
-        mean = 0.5 * (velocity + data.qvel[self._dofs])
-        pose[:3] += h * mean[:3]
-        mujoco.mju_quatIntegrate(pose[3:], mean[3:], h)
-        data.qpos[self._pose] = pose
-        self._outside = (data.qvel[self._dofs] - velocity) / h - self._accelerated
+        self.library.move(self.address, self.data.time, self.model.opt.timestep)
 
 
-def step(*rovs: Rov, steps: int = 1) -> None:
+def step(*rovs: Any, steps: int = 1) -> None:
     """Move the simulation of some vehicles, which share a model and its data, by some time steps.
 
-    This is MuJoCo's own step (`mj_step1`, `mj_step2`) by its integrator Euler, implicit or implicitfast. Raises
-    ValueError about vehicles in different simulations, and when more commands wait for the dead time than a vehicle
-    can keep.
+    This is MuJoCo's own step (`mj_step1`, `mj_step2`) by its integrator Euler, implicit or implicitfast. The vehicles
+    may be of several kinds, from several folders. Other threads run meanwhile. Raises ValueError about vehicles in
+    different simulations, and when more commands wait for the dead time than a vehicle can keep; mujoco.FatalError
+    where MuJoCo gives up, after which its data must be reset.
     """
+    first, others = rovs[0], rovs[1:]
+    scene = getattr(first, "scene", None)
+    if scene is None or scene[0] != others:
+        if any(getattr(rov, "FORMAT", None) != FORMAT for rov in rovs):
+            _step_by_parts(rovs, steps)
+            return
+        members = (ctypes.c_void_p * len(rovs))(*(rov.address for rov in rovs))
+        said = ctypes.create_string_buffer(500)
+        scene = first.scene = others, members, ctypes.addressof(members), len(rovs), first.model.opt, said
+    _, _, members_at, count, option, said = scene
+    result = first.library.step(members_at, count, option.timestep, option.integrator, steps, said, len(said))
+    if result == _HAS_CALLBACKS:  # their errors could not pass through the C
+        _step_by_parts(rovs, steps)
+    elif result == _MUJOCO_FAILS:
+        raise mujoco.FatalError(said.value.decode(errors="replace"))
+    else:
+        _raise(result)
+
+
+def _step_by_parts(rovs: tuple[Any, ...], steps: int) -> None:
+    """Take some steps as `step` does, for functions in Python that MuJoCo calls, and for vehicles of other folders."""
     model, data = rovs[0].model, rovs[0].data
     if any(rov.data is not data for rov in rovs):
-        raise ValueError(APART)
+        _raise(_APART)
     for _ in range(steps):
         mujoco.mj_step1(model, data)
         for rov in rovs:
@@ -371,6 +309,12 @@ def step(*rovs: Rov, steps: int = 1) -> None:
         mujoco.mj_step2(model, data)
         for rov in rovs:
             rov.move()
+
+
+def _raise(result: int) -> None:
+    """Raise ValueError unless a step was taken."""
+    if result != _DONE:
+        raise ValueError(_REASONS[result])
 
 
 def _check(model: Any, body: int, name: str) -> None:
@@ -399,14 +343,26 @@ def _rigid_mass(model: Any, body: int) -> Any:
     return np.block([[mass * np.eye(3), -mass * cross], [mass * cross, about_centre - mass * cross @ cross]])
 
 
-def _crossed(omega: Any, other: Any) -> Any:
-    """Return the cross products of the rates with two vectors, one after the other."""
-    p, q, r = omega.tolist()
-    a, b, c, d, e, f = other.tolist()
-    return np.array([q * c - r * b, r * a - p * c, p * b - q * a, q * f - r * e, r * d - p * f, p * e - q * d])
-
-
 # ---- The exported folder ---------------------------------------------------------------------------------------------
+
+
+def library_name() -> str:
+    """Return the name of a vehicle's library for this machine, without its suffix."""
+    processor = platform.machine().lower()
+    return f"water_{sys.platform}_{_PROCESSORS.get(processor, processor)}"
+
+
+def connect(folder: Path, equation: Any, *arguments: Any, **coefficients: Any) -> Rov:
+    """Return the vehicle of a folder, connected as by `Rov`. Raises ValueError also without a library for it here."""
+    file = next(folder.glob(f"{library_name()}.*"), None)
+    try:
+        own = ctypes.CDLL(str(file)) if file else None
+    except OSError as error:
+        raise ValueError(f"{file}: this library cannot be loaded: {error}") from error
+    if own is None:
+        here = f"{folder}: there is no {library_name()}, the library for this machine"
+        raise ValueError(f"{here}; export the vehicle on it: rov-fmu export {equation.IDENTIFIER} --to mujoco")
+    return Rov(Library(own, equation), equation, *arguments, **coefficients)
 
 
 def load(rov: Callable[..., Rov], scene: Path, **coefficients: float) -> Rov:
@@ -425,7 +381,7 @@ def show(rov: Rov, picture: Path | None = None) -> None:
 
     Raises SystemExit with a line about what is missing.
     """
-    for name, value in rov.water.equation.EXAMPLE.items():
+    for name, value in rov.equation.EXAMPLE.items():
         if name in rov.inputs:
             rov.inputs[name] = value
         else:

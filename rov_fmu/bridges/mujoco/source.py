@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import AXES, CURRENT, CURRENT_DOWN
 from rov_fmu.equation.expression import ZERO, Expression, to_c
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Table
-from rov_fmu.equation.python.printed import TIME, accelerations_of, arrived, lagging, reversals
+from rov_fmu.equation.python.printed import TIME, accelerations_of, arrived, lagging
 from rov_fmu.io.paths import FMU_SRC
 
 WATER = FMU_SRC / "mujoco" / "water.c"
@@ -37,9 +37,22 @@ def water_sources(layout: Layout) -> dict[str, str]:
     return {"equation.h": _equation(layout)} | shared | {WATER.name: WATER.read_text(encoding="utf-8")}
 
 
+def memory_size(layout: Layout) -> tuple[int, int]:
+    """Return how many numbers a vehicle remembers from step to step, and how many more for each change that waits.
+
+    These are N_KEPT and N_CHANGE of water.c. Without a dead time, nothing waits.
+    """
+    kept = 1 + len(_VELOCITIES) + len(lagging(accelerations_of(layout).equation))
+    commands = len(layout.commands)
+    return (kept + commands + 1, 2 + commands) if layout.has_dead_time else (kept, 0)
+
+
 def _equation(layout: Layout) -> str:
     """Print equation.h."""
     equation, numbers, mass, rates = accelerations_of(layout)
+    late = {*lagging(equation)}
+    for name, formula in numbers.items():
+        late |= {name} if late & formula.names else set()
     used = frozenset[str]().union(*(formula.names for formula in numbers.values()))
     directions = [name for name in _BODY if name in used]
     given = [*layout.commands, *layout.acting.values(), *outer_names(layout)]
@@ -53,6 +66,9 @@ def _equation(layout: Layout) -> str:
         "N_COEFFICIENTS": len(layout.coefficients),
         "N_GIVEN": len(given),
         "N_DIRECTIONS": len(directions),
+        "FIRST_LAGGING": len(given) + len(directions),
+        "N_LAGGING": len(lagging(equation)),
+        **dict(zip(("N_KEPT", "N_CHANGE"), memory_size(layout), strict=True)),
         "N_FORCES": len(layout.thrusters),
         "N_NUMBERS": len(places),
         "N_BODY": len(_BODY),
@@ -71,10 +87,17 @@ enum {{ {", ".join(f"{name} = {n}" for name, n in sizes.items())} }};
 {_array("int", "LACKS", (int(name not in layout.velocities) for name in _VELOCITIES))} /* 1 along axes that it lacks */
 {_array("double", "STARTS", (layout.usual_inputs[name] for name in layout.commands))} /* of the commands */
 {_tables(equation.thrust_tables)}
-/* Compute all numbers that follow from coefficients, inputs, directions of motion and what lags. */
+/* Compute the numbers that follow from coefficients, inputs and directions of motion. */
 static void equation_numbers(double v[])
 {{
-{_lines({f"v[V_{name}]": formula for name, formula in numbers.items()})}}}
+    (void)v;
+{_lines({f"v[V_{name}]": formula for name, formula in numbers.items() if name not in late})}}}
+
+/* Compute the numbers that also follow from what lags. */
+static void equation_lagged(double v[])
+{{
+    (void)v;
+{_lines({f"v[V_{name}]": formula for name, formula in numbers.items() if name in late})}}}
 
 /* Compute the mass matrix about the origin, with added mass and tuning. */
 static void equation_mass(const double v[], double M[36])
@@ -90,21 +113,12 @@ static void equation_rates(const double v[], double _time, const double y[], dou
 {"".join(f"    (void){name};{chr(10)}" for name in fractions)}\
 {_lines({f"rate[{n}]": rates.get(name, ZERO) for n, name in enumerate(_VELOCITIES)}, in_rates)}}}
 
-/* Compute the forces and the speeds of rotors that lag, some seconds after the numbers. */
+/* Replace the forces and the speeds of rotors that lag by those some seconds after the numbers. */
 static void equation_lag(double v[], double _time)
 {{
     (void)v, (void)_time;
 {_lines({f"const double {name}": formula for name, formula in after.items()})}\
 {"".join(f"    v[V_{force}] = {name};{chr(10)}" for force, name in zip(lagging(equation), after, strict=True))}}}
-
-/* Return the time from when the numbers were computed until a rotor reverses. */
-static double equation_until_reversal(const double v[])
-{{
-    double until = INFINITY;
-    (void)v;
-{"".join(f"    until = fmin(until, {_in_c(x)});{chr(10)}" for x in reversals(equation))}\
-    return until;
-}}
 """
 
 

@@ -1,6 +1,6 @@
-"""The equation of motion of a vehicle, printed as Python modules that need only the standard library and step.py.
+"""The equation of motion of a vehicle, printed as a Python module that needs only the standard library and step.py.
 
-One is for step.py, and part of the FMU in pure Python. The other is for simulators that move the body themselves.
+It is for step.py, and part of the FMU in pure Python. The formulas for simulators that move the body are here as well.
 """
 
 import math
@@ -22,20 +22,14 @@ _IMPORTED = ["expm1", "inf", "log1p", *(name for name in FUNCTIONS if name != "a
 
 def printed(layout: Layout, step: str) -> str:
     """Return the module. `step` is the name of the module that step.py has there."""
-    words = f"The equation of motion of a vehicle, for {step}.py. All numbers are in SI units."
-    return _module(words, step, equation_text(layout))
-
-
-def _module(words: str, step: str, text: str) -> str:
-    """Return a module with its docstring and its imports."""
     return f"""\
-\"\"\"{words}\"\"\"
+\"\"\"The equation of motion of a vehicle, for {step}.py. All numbers are in SI units.\"\"\"
 
 from math import {", ".join(_IMPORTED)}
 
 from {step} import interpolated
 
-{text}"""
+{equation_text(layout)}"""
 
 
 def equation_text(layout: Layout) -> str:
@@ -106,17 +100,6 @@ def model_of(layout: Layout) -> ModuleType:
 # ---- For a simulator that moves the body itself ----------------------------------------------------------------------
 
 
-def printed_accelerations(layout: Layout, step: str) -> str:
-    """Return the module for a simulator that knows the velocities and the attitude of the body.
-
-    Frames and signs are those of the equation: forward, starboard, down. `step` is the name of step.py there.
-    """
-    words = (
-        "The mass matrix and the accelerations of a vehicle (forward, starboard, down). All numbers are in SI units."
-    )
-    return _module(words, step, accelerations_text(layout))
-
-
 _KNOWN = (*(axis.velocity for axis in AXES.values()), *ROTATION[6:])
 """The states that the simulator gives: the velocities through the water, and the third row of the rotation matrix."""
 
@@ -162,44 +145,6 @@ def accelerations_of(layout: Layout) -> Accelerations:
     return Accelerations(equation, numbers, [[masses.get((a, b), of(0.0)) for b in every] for a in every], rates)
 
 
-def accelerations_text(layout: Layout) -> str:
-    """Return this module without its imports."""
-    equation, numbers, mass, rates = accelerations_of(layout)
-    every = [axis.velocity for axis in AXES.values()]
-    states = [*_KNOWN]
-    rows = "".join(f"        [{', '.join(written(x, PYTHON, _value) for x in row)}],\n" for row in mass)
-    accelerations = "".join(f"            {written(rates[v], PYTHON) if v in rates else None},  # {v}\n" for v in every)
-    return f"""\
-VELOCITIES = {tuple(layout.velocities)!r}  # of the axes that the vehicle has
-{_tables(equation.thrust_tables)}
-
-def numbers(values):
-    \"\"\"Return all numbers that follow from coefficients, inputs, velocities and what lags, and these.\"\"\"
-    v = dict(values)
-{_assignments(numbers)}
-    return v
-
-
-def mass(v):
-    \"\"\"Return the mass matrix about the origin, with added mass and tuning, for some numbers.\"\"\"
-    return [
-{rows}    ]
-
-
-def accelerations(_numbers):
-    \"\"\"Return the function from the time since `_numbers`, the velocities through the water, and the third row of the
-    rotation matrix to the accelerations, which are None along axes that the vehicle lacks.\"\"\"
-{_coefficients(rates.values(), equation, [*states, *(lag.arrived for lag in equation.lags)])}
-    def rates(_time, {", ".join(states)}):
-{_arrived(equation, " " * 8)}        return [
-{accelerations}        ]
-
-    return rates
-
-
-{_lagging_text(equation)}"""
-
-
 # ---- What lags ----
 
 TIME = Name("_time")
@@ -225,7 +170,7 @@ def reversals(equation: Equation) -> list[Expression]:
     return [call("log1p", x) / lag.rate for lag in equation.lags for x in lag.reversals]
 
 
-# ---- Parts of both ---------------------------------------------------------------------------------------------------
+# ---- Parts of the module ---------------------------------------------------------------------------------------------
 
 
 def _assignments(formulas: Mapping[str, Expression]) -> str:

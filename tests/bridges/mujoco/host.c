@@ -2,7 +2,8 @@
  * program runs on every platform, because it calls no function of the mathematics library.
  *
  * Usage: host LIBRARY. The input has 36 entries of the mass matrix of the rigid body, and coefficients and inputs. Each
- * further line has the commands of a step. Each line of output has the pose and the velocity after it. Numbers are the
+ * further line has the commands of a step. Each line of output has the pose and the velocity after it. At the end, the
+ * stand-in fails twice as MuJoCo does, which must not end the program, nor change the vehicle. Numbers are the
  * bits of a double in hexadecimal: exact everywhere. */
 #include "../../fmu/bits.h"
 
@@ -23,8 +24,11 @@
 static const double H = 0.002;
 
 typedef struct {
-    double M[36], qpos[7], qvel[6], ctrl[64], passive[6], xmat[18], rigid[36], time;
+    double M[36], qpos[7], qvel[6], act[20000], ctrl[64], passive[6], xmat[18], rigid[36], time;
+    int fails;
 } simulation;
+
+static void (*on_error)(const char *);
 
 static void step_1(const void *model, void *data)
 {
@@ -37,6 +41,10 @@ static void step_1(const void *model, void *data)
     memcpy(s->xmat + 9, R, sizeof R);
     memcpy(s->M, s->rigid, sizeof s->M);
     memset(s->passive, 0, sizeof s->passive);
+    if (s->fails) {
+        on_error("out of memory");
+        abort();
+    }
 }
 
 static void nothing(const void *model, void *data)
@@ -96,10 +104,10 @@ int main(int argc, char *argv[])
     void (*const sizes)(int *) = (void (*)(int *))SYMBOL(library, "water_sizes");
     void (*const connect)(void *, const uintptr_t *, const int *, const double *) =
         (void (*)(void *, const uintptr_t *, const int *, const double *))SYMBOL(library, "water_connect");
-    void (*const reset)(void *) = (void (*)(void *))SYMBOL(library, "water_reset");
-    int (*const step)(void *const *, int, double, int, int) =
-        (int (*)(void *const *, int, double, int, int))SYMBOL(library, "water_step");
-    int size[5], places[4 + 21 + 64] = {1, 0, 0, 0};
+    int (*const step)(void *const *, int, double, int, int, char *, int) =
+        (int (*)(void *const *, int, double, int, int, char *, int))SYMBOL(library, "water_step");
+    int size[7], places[6 + 21 + 64] = {1, 0, 0, 0, 0, 1000};
+    char text[20];
     sizes(size);
     double *const memory = calloc((size_t)size[0], sizeof *memory);
     for (int i = 0; i < 36; i++) {
@@ -112,35 +120,41 @@ int main(int argc, char *argv[])
             return 2;
         }
     }
-    for (int i = 0, n = 4; i < 6; i++) {
+    for (int i = 0, n = 6; i < 6; i++) {
         for (int j = 0; j <= i; j++) {
             places[n++] = 6 * i + j;
         }
     }
     for (int i = 0; i < 64; i++) {
-        places[4 + 21 + i] = i;
+        places[6 + 21 + i] = i;
     }
     const uintptr_t none = (uintptr_t)&no_callback;
     const uintptr_t addresses[] = {(uintptr_t)&s, (uintptr_t)&s, (uintptr_t)s.M, (uintptr_t)s.qpos, (uintptr_t)s.qvel,
-                                   (uintptr_t)s.ctrl, (uintptr_t)s.passive, (uintptr_t)s.xmat, (uintptr_t)step_1,
+                                   (uintptr_t)s.act, (uintptr_t)s.ctrl, (uintptr_t)s.passive, (uintptr_t)s.xmat, (uintptr_t)step_1,
                                    (uintptr_t)nothing, (uintptr_t)nothing, (uintptr_t)step_2, (uintptr_t)turn,
-                                   (uintptr_t)get_state, none, none, none, none, none, none, none};
+                                   (uintptr_t)get_state, (uintptr_t)nothing, (uintptr_t)&on_error, none, none, none, none, none, none, none};
     void *const members[1] = {memory};
     s.qpos[3] = 1.0;
     connect(memory, addresses, places, s.rigid);
-    reset(memory);
     while (size[2] > 0 && read_double(&s.ctrl[0])) {
         for (int i = 1; i < size[2]; i++) {
             if (!read_double(&s.ctrl[i])) {
                 return 2;
             }
         }
-        if (step(members, 1, H, 0, 1) != 0) {
+        if (step(members, 1, H, 0, 1, text, sizeof text) != 0) {
             return 3;
         }
         for (int i = 0; i < 13; i++) {
             write_double(i < 7 ? s.qpos[i] : s.qvel[i - 7], i < 12 ? ' ' : '\n');
         }
     }
-    return 0;
+    s.fails = 1;
+    const simulation before = s;
+    for (int i = 0; i < 2; i++) {
+        if (step(members, 1, H, 0, 1, text, sizeof text) != 5 || strcmp(text, "out of memory") != 0) {
+            return 4;
+        }
+    }
+    return memcmp(before.act, s.act, sizeof s.act) == 0 ? 0 : 5;
 }

@@ -1,9 +1,10 @@
-"""The step in C is that in Python up to rounding errors, for every kind of vehicle, in every order of events.
+"""The step is that in Python (reference.py) up to rounding errors, for every kind of vehicle, in every order of events.
 
-The step in Python is `plugin.Rov`, which `tests/bridges/test_mujoco.py` compares with the FMU.
+What a vehicle remembers is in MuJoCo's data, and MuJoCo's errors are exceptions.
 """
 
 import gc
+import re
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -19,18 +20,13 @@ from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.mujoco import mujoco_files
-from rov_fmu.bridges.mujoco.native import connector, library_in
 from rov_fmu.bridges.mujoco.source import water_sources
+from tests.bridges.mujoco.reference import Reference
 from tests.bridges.test_mujoco import EULER, FILES, IMPLICIT, loaded, mujoco, scene
 from tests.commands import BARE
 
 Array = NDArray[np.float64]
 STEPS = 240
-
-
-def in_python(package: ModuleType, model: Any, data: Any = None, prefix: str = "") -> Any:
-    """Return the vehicle whose step is in Python."""
-    return package.plugin.Rov(package.equation, model, data, prefix)
 
 
 def world(package: ModuleType, integrator: int = EULER) -> Any:
@@ -105,9 +101,8 @@ def test_it_moves_as_in_python(name: str, integrator: int) -> None:
     """Also with dead time, lag, rotors, changed coefficients, and after resets to earlier and to later times."""
     vehicle, package = loaded(name)
     model = world(package, integrator)
-    native, reference = package.Rov(model), in_python(package, model)
-    assert type(native).__name__ == "NativeRov"
-    expected = flown([reference], [vehicle], package.plugin.step)
+    native, reference = package.Rov(model), Reference(vehicle, model)
+    expected = flown([reference], [vehicle], Reference.step)
     assert_same(flown([native], [vehicle], package.step), expected)
 
 
@@ -129,18 +124,18 @@ def test_several_kinds_in_one_scene_move_as_in_python(mixed: bool) -> None:
         data = mujoco.MjData(model)
         prefixes = ["", *(f"{n}_" for n in range(1, len(packages)))]
         return [
-            in_python(package, model, data, prefix) if n in python else package.Rov(model, data, prefix)
-            for n, (package, prefix) in enumerate(zip(packages, prefixes, strict=True))
+            Reference(vehicle, model, data, prefix) if n in python else package.Rov(model, data, prefix)
+            for n, (vehicle, package, prefix) in enumerate(zip(vehicles, packages, prefixes, strict=True))
         ]
 
-    expected = flown(connected((0, 1, 2, 3)), vehicles, packages[0].plugin.step)
+    expected = flown(connected((0, 1, 2, 3)), vehicles, packages[0].step)
     assert_same(flown(connected((2,) if mixed else ()), vehicles, packages[1].step), expected)
 
 
 def test_many_steps_at_once_are_as_many_steps() -> None:
-    _, package = loaded("every_option")
+    vehicle, package = loaded("every_option")
     model = world(package)
-    rovs = [package.Rov(model), package.Rov(model), in_python(package, model)]
+    rovs = [package.Rov(model), package.Rov(model), Reference(vehicle, model)]
     for rov in rovs:
         rov.data.ctrl[:] = 0.7 * model.actuator_ctrlrange[:, 1]
     rovs[0].step(100)
@@ -154,9 +149,8 @@ def test_many_steps_at_once_are_as_many_steps() -> None:
 # ---- Copies ----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("python", [False, True])
 @pytest.mark.parametrize("copied", [copy, deepcopy])
-def test_a_copy_goes_on_by_itself_from_the_same_state(copied: Callable[[Any], Any], python: bool) -> None:
+def test_a_copy_goes_on_by_itself_from_the_same_state(copied: Callable[[Any], Any]) -> None:
     """Also what lags and what waits for the dead time is copied. The original may be gone."""
     _, package = loaded("every_option")
 
@@ -166,7 +160,7 @@ def test_a_copy_goes_on_by_itself_from_the_same_state(copied: Callable[[Any], An
         return np.array([*rov.data.qpos, *rov.data.qvel, *rov.forces.values()])
 
     model = world(package)
-    original = in_python(package, model) if python else package.Rov(model)
+    original = package.Rov(model)
     original.coefficients["m_rov"] *= 1.1
     fly(original, 30, 0.6)
     other, twin = copied(original), copied(original)
@@ -200,22 +194,105 @@ def test_vehicles_that_are_copied_together_stay_together() -> None:
     assert (copies[0].data.qpos == data.qpos).all()
     with pytest.raises(ValueError, match=r"^step: all vehicles must be in the same simulation"):
         package.step(both[0], copies[1])
-    with pytest.raises(ValueError, match=r"^step: all vehicles must be in the same simulation"):
-        package.plugin.step(both[0], copies[1])
 
 
-def test_other_data_of_the_same_model_are_moved() -> None:
-    _, package = loaded("bluerov2")
-    rov, fresh = package.load(), package.load()
-    rov.data.ctrl[:] = 0.5
-    rov.step(20)
-    before = rov.data
-    rov.data, there = mujoco.MjData(rov.model), before.qpos.copy()
+def command(rov: Any, share: float) -> None:
+    rov.data.ctrl[:] = share * rov.model.actuator_ctrlrange[:, 1]
+
+
+def test_data_that_are_moved_in_turn_move_as_each_alone() -> None:
+    """To the bit, although lag, dead time, rotors, loads and the number of steps differ."""
+    vehicle, package = loaded("every_option")
+    model = world(package)
+
+    def fly(rovs: list[Any], steps: Callable[[int], int]) -> list[Array]:
+        datas = [mujoco.MjData(model) for _ in range(3)]
+        for n in range(60):
+            for k, data in enumerate(datas):
+                rov = rovs[k % len(rovs)]
+                rov.data = data
+                command(rov, 0.2 * k * (1 + n // 20))
+                data.qfrc_applied[0] = 3.0 * k * (n % 7)
+                rov.step(steps(k))
+        return [np.array([*data.qpos, *data.qvel, *data.act]) for data in datas]
+
+    together = fly([package.Rov(model)], lambda k: k + 1)
+    for k, found in enumerate(together):
+        rov = package.Rov(model)
+        reference = Reference(vehicle, model)
+        for one in (rov, reference):
+            for n in range(60):
+                command(one, 0.2 * k * (1 + n // 20))
+                one.data.qfrc_applied[0] = 3.0 * k * (n % 7)
+                one.step(k + 1)
+        assert (found == [*rov.data.qpos, *rov.data.qvel, *rov.data.act]).all()
+        assert rov.data.qpos == pytest.approx(reference.data.qpos, rel=1e-12, abs=1e-12)
+
+
+def saved_state(model: Any, data: Any) -> Any:
+    state = np.empty(mujoco.mj_stateSize(model, mujoco.mjtState.mjSTATE_PHYSICS))
+    mujoco.mj_getState(model, data, state, mujoco.mjtState.mjSTATE_PHYSICS)
+    return state
+
+
+@pytest.mark.parametrize("how", ["copied", "set", "copied to other data"])
+def test_what_mujoco_saves_is_all_that_the_motion_depends_on(how: str) -> None:
+    _, package = loaded("every_option")
+    model = world(package)
+    rov, kept = package.Rov(model), mujoco.MjData(model)
+    command(rov, 0.6)
+    rov.step(300)
+    command(rov, -0.3)
+    rov.step(3)
+    mujoco.mj_copyData(kept, model, rov.data)
+    state = saved_state(model, rov.data)
+
+    def rest() -> Array:
+        command(rov, 0.5)
+        rov.step(120)
+        return np.array([*rov.data.qpos, *rov.data.qvel, *rov.forces.values()])
+
+    expected, forces = rest(), rov.forces
+    rov.step(100)
+    if how == "copied":
+        mujoco.mj_copyData(rov.data, model, kept)
+    elif how == "set":
+        mujoco.mj_setState(model, rov.data, state, mujoco.mjtState.mjSTATE_PHYSICS)
+    else:
+        rov.data = kept
+    assert rov.forces != forces
+    assert (rest() == expected).all()
+
+
+def test_a_reset_to_the_same_time_stops_the_thrusters() -> None:
+    _, package = loaded("every_option")
+    rov, fresh = package.Rov(world(package)), package.Rov(world(package))
+    command(rov, 0.6)
+    rov.step(50)
+    mujoco.mj_resetData(rov.model, rov.data)
+    rov.data.time = fresh.data.time = 50 * rov.model.opt.timestep
     for one in (rov, fresh):
-        one.data.ctrl[:] = 0.2
-        one.step(20)
+        one.step(30)
     assert (rov.data.qpos == fresh.data.qpos).all()
-    assert (before.qpos == there).all()
+
+
+def test_data_of_another_model_and_a_model_without_memory_are_one_line() -> None:
+    _, package = loaded("bluerov2")
+    rov = package.load()
+    before = rov.data
+    for other in (loaded("videoray")[1], loaded("every_option")[1]):
+        with pytest.raises(ValueError, match=r"^data: must be those of the vehicle's model"):
+            rov.data = mujoco.MjData(other.load().model)
+        with pytest.raises(ValueError, match=r"^data: must be those of the vehicle's model"):
+            package.Rov(rov.model, mujoco.MjData(other.load().model))
+    assert rov.data is before
+    with pytest.raises(AttributeError):
+        rov.model = None
+    spec = scene(package)
+    spec.actuator("u_1").dyntype = mujoco.mjtDyn.mjDYN_NONE
+    spec.actuator("u_1").actdim = 0
+    with pytest.raises(ValueError, match=r'^actuator u_1: must have dyntype="user" and actdim="\d+" or more'):
+        package.Rov(spec.compile())
 
 
 # ---- Threads, and functions in Python --------------------------------------------------------------------------------
@@ -269,61 +346,124 @@ def test_a_function_in_python_that_mujoco_calls_acts_and_its_error_is_raised(cal
         rov.step(20)
 
 
-# ---- What it refuses, and where there is no library ------------------------------------------------------------------
+# ---- Errors of MuJoCo ------------------------------------------------------------------------------------------------
 
 
-def test_more_commands_than_a_vehicle_keeps_are_one_line() -> None:
+def without_frame(rov: Any) -> Any:
+    """Return a vehicle whose first step MuJoCo 4.0 cannot take: it is in the sea bed, and may fall asleep there."""
+    rov.model.opt.enableflags |= int(mujoco.mjtEnableBit.mjENBL_SLEEP)
+    rov.data.qpos[2] = -5.0
+    return rov
+
+
+def test_an_error_of_mujoco_is_an_exception_and_the_data_go_on_after_a_reset() -> None:
+    """Also with several libraries, in several threads, and in MuJoCo's own functions."""
+    packages = [loaded(name)[1] for name in ("bluerov2", "every_option", "bluerov2", "videoray")]
+
+    def fly(package: ModuleType) -> bool:
+        rov, other, fresh = without_frame(package.load()), without_frame(package.load()), package.load()
+        with pytest.raises(mujoco.FatalError) as caught:
+            rov.step(5000)
+        with pytest.raises(mujoco.FatalError, match=re.escape(str(caught.value))):  # by MuJoCo's functions in Python
+            package.plugin._step_by_parts((other,), 5000)
+        rov.model.opt.enableflags = 0
+        mujoco.mj_resetData(rov.model, rov.data)
+        for one in (rov, fresh):
+            command(one, 0.3)
+            one.step(50)
+        return bool(str(caught.value)) and bool((rov.data.qpos == fresh.data.qpos).all())
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(pool.map(fly, packages))
+
+
+# ---- What it refuses -------------------------------------------------------------------------------------------------
+
+
+def test_more_commands_than_the_model_keeps_are_one_line_and_lose_nothing() -> None:
     _, package = loaded("every_option")
-    model = world(package)
-    model.opt.timestep = 1e-6
-    rov = package.Rov(model)
-    rov.coefficients["T_d"] = 1.0
+    spec = scene(package, 1e-4)
+    first = next(iter(package.equation.COMMANDS))
+    rov = package.Rov(spec.compile())
+    room = (rov.model.actuator(first).actnum[0] - rov.library.kept) // rov.library.change
+    assert room == max(64, np.ceil(1000.0 * package.equation.COEFFICIENTS["T_d"]))
+    rov.coefficients["T_d"] = 0.5
 
-    def send() -> None:
-        for n in range(1030):
-            rov.data.ctrl[:] = model.actuator_ctrlrange[:, 1] * n / 2000.0
+    def send(count: int) -> None:
+        for n in range(count):
+            command(rov, (n + 1) / 4000.0)
             rov.step()
 
-    with pytest.raises(ValueError, match=r"^more than 1024 changes of commands wait for the dead time"):
-        send()
+    send(room)
+    before = rov.data.act.copy()
+    command(rov, 0.5)
+    with pytest.raises(ValueError, match=r"^more changes of commands wait .* raise actdim"):
+        rov.step()
+    assert (rov.data.act == before).all()
+    spec.actuator(first).actdim = rov.library.kept + 1100 * rov.library.change
+    rov = package.Rov(spec.compile())
+    rov.coefficients["T_d"] = 0.5
+    send(1024)
+    with pytest.raises(ValueError, match=r"^more changes of commands wait"):
+        send(1)
 
 
-@pytest.mark.parametrize("python", [False, True])
-def test_coefficients_change_and_are_never_added_or_removed(python: bool) -> None:
-    _, package = loaded("videoray")
-    rov = in_python(package, world(package)) if python else package.load()
+def test_coefficients_change_within_their_bounds_and_are_never_added_or_removed() -> None:
+    _, package = loaded("every_option")
+    rov = package.load()
     rov.coefficients |= {"m_rov": 7.0}
     rov.inputs = {"V_N": 0.3}
-    assert (rov.coefficients["m_rov"], rov.inputs["V_N"]) == (7.0, 0.3)
-    assert (rov.water.coefficients["m_rov"], rov.inputs["V_E"]) == (7.0, 0.0)
+    assert (rov.coefficients["m_rov"], rov.inputs["V_N"], rov.inputs["V_E"]) == (7.0, 0.3, 0.0)
     assert eval(repr(rov.inputs)) == dict(rov.inputs)
     with pytest.raises(ValueError, match=r"^m_rov: a coefficient or an input can only change$"):
         del rov.coefficients["m_rov"]
+    for name, value in (("m_rov", np.nan), ("m_rov", -50.0), ("T_d", 0.0), ("T_d", 1e9), ("beta_u", -1.0)):
+        with pytest.raises(ValueError, match=rf"^{name} = .*: must be a number within .* \.\.\. "):
+            rov.coefficients[name] = value
+        with pytest.raises(ValueError, match=rf"^{name} = "):
+            package.load(**{name: value})
+    with pytest.raises(ValueError, match=r"^V_N = nan: must be a number within -inf"):
+        rov.inputs["V_N"] = np.nan
+    assert (rov.coefficients["m_rov"], rov.inputs["V_N"]) == (7.0, 0.3)
 
 
-@pytest.mark.parametrize("content", [None, b"no library"])
-def test_without_a_library_that_fits_the_step_is_in_python(content: bytes | None, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [(None, r"there is no water_\w+, .* rov-fmu export videoray"), (b"no library", "cannot be loaded")],
+)
+def test_without_a_library_that_fits_there_is_one_line(content: bytes | None, message: str, tmp_path: Path) -> None:
     _, package = loaded("videoray")
     here = next(package.FOLDER.glob(f"water_{sys.platform}_*"))
     if content:
         (tmp_path / here.name).write_bytes(content)
-    rov = connector(package.equation, library_in(tmp_path))(package.load().model)
-    assert type(rov).__name__ == "Rov"
-    rov.step()
-    assert library_in(package.FOLDER)
+    with pytest.raises(ValueError, match=message):
+        package.plugin.connect(tmp_path, package.equation, package.load().model)
 
 
-def test_a_library_of_another_vehicle_is_not_taken() -> None:
+def test_a_library_of_another_vehicle_is_one_line() -> None:
     (_, package), (_, other) = loaded("videoray"), loaded("bluerov2")
-    rov = connector(package.equation, library_in(other.FOLDER))(package.load().model)
-    assert type(rov).__name__ == "Rov"
+    with pytest.raises(ValueError, match="the library belongs to another vehicle"):
+        package.plugin.connect(other.FOLDER, package.equation, package.load().model)
 
 
-def test_without_the_library_of_mujoco_the_step_is_in_python(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_without_the_library_of_mujoco_the_reason_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     _, package = loaded("videoray")
-    library, model = library_in(package.FOLDER), package.load().model
     monkeypatch.setattr(mujoco, "__file__", str(tmp_path / "__init__.py"))
-    assert type(connector(package.equation, library)(model)).__name__ == "Rov"
+    with pytest.raises(ValueError, match=r"^MuJoCo .*: its library cannot be used"):
+        package.load()
+
+
+def test_a_machine_without_a_library_of_ours_exports_its_own(tmp_path: Path) -> None:
+    bare = rov_fmu.load(BARE)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("platform.machine", lambda: "riscv64")
+        patched.setattr("rov_fmu.bridges.mujoco.is_zig", lambda _: False)
+        files = mujoco_files(bare, "rov", {}, {})
+        name = f"water_{sys.platform}_riscv64.so"
+        assert [*filter(lambda file: file.startswith("water_"), files)] == [name]
+        (tmp_path / name).write_bytes(bytes(files[name]))  # type: ignore[arg-type]
+        package = loaded("videoray")[1]
+        assert package.plugin.library_name() == f"water_{sys.platform}_riscv64"
 
 
 @pytest.mark.long
