@@ -25,7 +25,7 @@ from pathlib import Path
 from fat_macho import FatWriter
 from platformdirs import user_cache_path
 
-from rov_fmu.io.child_process import cause, kill
+from rov_fmu.io.child_process import cause, inherited, kill
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up, temporary_folder
 from rov_fmu.io.messages import MOST, RovError, listed
 from rov_fmu.io.paths import FMU_SRC, own_folder
@@ -164,14 +164,20 @@ def compiler() -> list[str]:
     """
     if package := _package_folder("ziglang"):
         return [str(package / ("zig.exe" if os.name == "nt" else "zig")), "cc"]
-    if zig := shutil.which("zig"):
+    if zig := _on_path("zig"):
         return [zig, "cc"]
     others = [] if os.name == "nt" else ["clang", "cc"]
-    if other := next(filter(None, map(shutil.which, others)), None):
+    if other := next(filter(None, map(_on_path, others)), None):
         return [other]
     raise BuildError(
         f"the C compiler is missing: pip install ziglang, or put {listed(['zig', *others], 'or')} on the PATH"
     )
+
+
+def _on_path(program: str) -> str | None:
+    """Return where a program on the PATH is, from any folder; None if it is not there."""
+    place = shutil.which(program)  # relative where the entry of the PATH is
+    return str(Path(place).absolute()) if place else None
 
 
 def is_zig(command: Sequence[str]) -> bool:
@@ -196,10 +202,13 @@ def _version(command: Sequence[str]) -> str:
 
 
 def _zig_library(zig: str) -> Path:
-    """Return the folder in which zig has the headers of other systems."""
-    said = subprocess.run([zig, "env"], capture_output=True, text=True, check=False).stdout
-    found = re.search(r'\blib_dir"?\s*[:=]\s*"([^"]+)"', said)
-    return Path(found[1] if found else Path(zig).parent / "lib")
+    """Return the folder in which zig has the headers of other systems.
+
+    Below the current folder, zig tells a relative path, and it compiles in another folder.
+    """
+    said = os.fsdecode(subprocess.run([zig, "env"], capture_output=True, check=False).stdout)
+    found = re.search(r'\blib_dir"?\s*[:=]\s*"(.+)"', said)
+    return Path(found[1] if found else Path(zig).parent / "lib").absolute()
 
 
 def _of_other(command: Sequence[str], arguments: Sequence[str], failed: str) -> list[str]:
@@ -445,7 +454,7 @@ class _Compilers:
             process = subprocess.Popen(
                 command,
                 cwd=folder,
-                env={**os.environ, _CACHE_VARIABLE: self._cache},
+                env=inherited({_CACHE_VARIABLE: self._cache}),
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,
                 start_new_session=True,  # so that the compiler's own child processes can be killed with it

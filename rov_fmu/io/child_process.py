@@ -11,7 +11,7 @@ import re
 import signal
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
@@ -27,6 +27,8 @@ _POLL = 0.1
 """The longest single wait for an answer, s. It is short, because Windows delivers Ctrl-C only between waits."""
 _NO_MEMORY = re.compile("(?i)NoMem|bad_alloc|(?:out of|not enough|cannot allocate|unable to allocate) memory")
 """How the exceptions of compiled libraries say that there is no memory; they are no MemoryError."""
+_PATHS = ("PATH", "TMPDIR", "TEMP", "TMP", "XDG_CACHE_HOME", "ZIG_LIB_DIR", "CPATH", "C_INCLUDE_PATH", "LIBRARY_PATH")
+"""The variables that name folders, and that a compiler, a parser or an FMU reads."""
 _PROGRAM = "import sys; sys.path[:] = {}; from rov_fmu.io.child_process import _serve; _serve()"
 
 
@@ -110,7 +112,7 @@ class ChildProcess:
                 [sys.executable, "-c", _PROGRAM.format([*map(os.path.abspath, sys.path)])],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
-                env={**os.environ, **folders, **threads},
+                env=inherited({**folders, **threads}),
                 cwd=folder,
                 start_new_session=True,
             )
@@ -182,6 +184,19 @@ class Functions:
     def call(self, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return what a function returns."""
         return function(*arguments)
+
+
+def inherited(changes: Mapping[str, str]) -> dict[str, str]:
+    """Return the environment of this process, with changes, for a process that works in another folder.
+
+    There, a relative path would lead elsewhere, as `.venv/bin` of a PATH or `tmp` of a TMPDIR. So paths are absolute.
+    """
+    lists = {name: os.environ[name].split(os.pathsep) for name in _PATHS if os.environ.get(name)}
+    return {
+        **os.environ,
+        **{name: os.pathsep.join(map(os.path.abspath, some)) for name, some in lists.items()},
+        **changes,
+    }
 
 
 def kill(process: "subprocess.Popen[bytes]") -> None:

@@ -49,7 +49,9 @@ def temporary_folder(prefix: str, parent: str | None = None) -> Iterator[str]:
     """
     with ExitStack() as stack:
         with UNINTERRUPTED:
-            folder = tempfile.mkdtemp(prefix=prefix, dir=parent)
+            folder = str(
+                Path(tempfile.mkdtemp(prefix=prefix, dir=parent)).absolute()
+            )  # `TMPDIR=.` gives a relative one
             stack.enter_context(cleaned_up(partial(_remove, folder)))
         yield folder
 

@@ -1,10 +1,12 @@
 """The platforms that binaries are compiled for (rov_fmu/c/compile.py)."""
 
 import ctypes
+import os
 import platform
 import shutil
 import stat
 import sys
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -108,10 +110,14 @@ def test_the_messages_of_a_compiler_are_told_but_not_all(compiled_by: Path) -> N
 @pytest.fixture
 def without_ziglang(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """A folder that is all of the PATH, on a machine without the package."""
-    found = module._package_folder
-    monkeypatch.setattr(module, "_package_folder", lambda name: None if name == "ziglang" else found(name))
+    _forget_ziglang(monkeypatch)
     monkeypatch.setenv("PATH", str(tmp_path))
     return tmp_path
+
+
+def _forget_ziglang(monkeypatch: pytest.MonkeyPatch) -> None:
+    folder_of = module._package_folder
+    monkeypatch.setattr(module, "_package_folder", lambda name: None if name == "ziglang" else folder_of(name))
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="there, only zig is looked for")
@@ -128,6 +134,30 @@ def test_a_compiler_on_the_path_serves_without_ziglang(without_ziglang: Path) ->
 
 
 _THREE = '__attribute__((visibility("default"))) int three(void);\nint three(void) { return 3; }\n'
+
+
+@pytest.mark.parametrize("is_package", [True, False])
+def test_paths_relative_to_the_current_folder_hold_in_that_of_the_compiler(
+    is_package: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """zig lies below the current folder, as in `.venv`, and then tells its own folder relative to it.
+
+    So are entries of the PATH, and the temporary folder. Another folder of zig is taken from there, too.
+    """
+    zig = Path(os.path.realpath(module.compiler()[0]))
+    monkeypatch.chdir(zig.parents[1])
+    for name in ("TMPDIR", "TEMP", "TMP"):
+        monkeypatch.setenv(name, os.path.relpath(tmp_path))
+    monkeypatch.setattr(tempfile, "tempdir", None)
+    if not is_package:
+        _forget_ziglang(monkeypatch)
+        monkeypatch.setenv("PATH", zig.parent.name)
+        monkeypatch.setenv("ZIG_LIB_DIR", f"{zig.parent.name}/lib")
+    (library,) = module.compile_all(["win64"], {"fmu.c": f"#include <math.h>\n{_THREE}"}, "rov").values()
+    assert library.startswith(b"MZ")
+    assert [*tmp_path.iterdir()] == []
+
+
 OTHERS = [name for name in ("clang", "gcc") if shutil.which(name)]
 
 
