@@ -157,14 +157,14 @@ def answers(
         return of_table(table)(z[:, None]).reshape(own.shape)
 
     for posterior in posteriors:
-        with np.errstate(invalid="ignore"):  # a speed of 0 has no logarithm
+        with np.errstate(invalid="ignore"):  # the logarithm of a speed of 0, or of one that never ends
             slopes = posterior.slopes(of_table(posterior.table))
+            middle = fitted(posterior.table, posterior.z)
+            misfit = np.abs(fitted(posterior.table.of_file(posterior.z, speeds or {}), posterior.z) - middle)
         slopes = np.where(np.isfinite(slopes), slopes, 0.0)
         variances = variances_of(slopes, posterior.covariance).reshape(own.shape)
         variances += beyond[:, None]
         half = np.minimum(np.maximum(QUANTILE * np.sqrt(variances), narrowest), _WIDEST_HALF)
-        middle = fitted(posterior.table, posterior.z)
-        misfit = np.abs(fitted(posterior.table.of_file(posterior.z, speeds or {}), posterior.z) - middle)
         ends += [middle - half, middle + half, own - misfit, own + misfit]
     low, high = (np.exp(of([np.where(np.isfinite(one), one, own) for one in ends], axis=0)) for of in (np.min, np.max))
     low[:, 0], high[:, 0] = np.where(of_file[:, 0] < 0.0, (-high[:, 0], -low[:, 0]), (low[:, 0], high[:, 0]))

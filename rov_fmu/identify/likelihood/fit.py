@@ -10,7 +10,6 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.likelihood.file_fit import FileFit, without_weak_effects
-from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import Starts, Suspect
 from rov_fmu.identify.likelihood.objective import Objective, TableRow
 from rov_fmu.identify.likelihood.parameters import Table
@@ -34,6 +33,7 @@ from rov_fmu.identify.likelihood.solve import (
     evidence,
     least_from,
     minimise,
+    refined,
     scaled,
     start_of,
 )
@@ -44,9 +44,8 @@ from rov_fmu.tank.arrays import Array
 
 _SAME = 0.01
 """Two ends of fits are the same vehicle if they differ by less than this share of the prior's deviation."""
-_STARTS = ("start 1", "start 2", "a more careful start")
-"""Two starts, and one for a motion that diverges from both. The kinds of the parameters say where they begin: with much
-noise, J has few minima far from the data, and a heavier vehicle with less drag is careful."""
+_STARTS = ("start 1", "start 2")
+"""The kinds of the parameters say where they begin: with much noise, J has few minima far from the data."""
 _UNREFINED = 4
 """The most steps on all samples of a fit that is wrong because of a mistake in a log."""
 _LOUD = 2.3
@@ -166,7 +165,7 @@ def fit_all(
     if not is_wrong:
         # Other parameters move a little with the scale that the priors prefer, such as the sizes of slow forces.
         work.steps("exact derivatives")(0)
-        best = minimise(full, scaled(full, near.z), most=0)
+        best = refined(full, near)
     posterior = Posterior.of(full.table, best.z, best.information)
     difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
     apart = [
@@ -210,16 +209,10 @@ def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
-        is_enough = len(ends) == n and not any(_is_loud(quick.table, end.z) for end in ends)
-        if ends and (words is _STARTS[-1] or is_enough):
+        if is_enough := bool(ends) and not any(_is_loud(quick.table, end.z) for end in ends):
             break
-        try:
-            ends.append(least_from(quick, start_of(quick, n), work.steps(words)))
-        except DivergedError:
-            continue
+        ends.append(least_from(quick, start_of(quick, n), work.steps(words)))
         work.fits(quick, min(ends, key=lambda end: end.value))
-    if not ends:
-        raise DivergedError
     return sorted(ends, key=lambda end: end.value), is_enough
 
 

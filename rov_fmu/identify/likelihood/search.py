@@ -35,7 +35,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, total
 from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -373,19 +373,16 @@ def fitted(
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. If a motion diverges from there, all begin as
-    in a first fit. The result is None if a motion diverges from both starts, or if the evidence of thinned logs is
-    below `enough`.
+    fit `near` ended, or at its prior mean if the hypotheses change that. The result is None if a motion diverges, or if
+    the evidence of thinned logs is below `enough`.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
-    for z in (there, start_of(thinned)):
-        with suppress(DivergedError):
-            end = minimise(thinned, begun(thinned, z, starts), enough=QUICK, last=False)
-            quick = evidence(thinned, end)
-            if not quick > enough:
-                return None
+    with suppress(DivergedError):
+        end = minimise(thinned, begun(thinned, there, starts), enough=QUICK, last=False)
+        quick = evidence(thinned, end)
+        if quick > enough:
             objective = applied(plain, starts)
             return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
     return None

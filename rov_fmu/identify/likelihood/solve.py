@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import log
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ from rov_fmu.tank.arrays import Array
 
 Chosen = NDArray[np.bool_]
 _Key = TypeVar("_Key")
+OnStep = Callable[[int], None]
+"""A function that is called with the number of each step of a fit."""
 
 MOST_STEPS = 30
 ENOUGH = 0.3
@@ -26,6 +28,8 @@ QUICK = 8.0
 _TRIALS = ((0.0, 1.0), (0.0, 0.4), (0.0, 0.1), (0.03, 1.0), (0.3, 1.0), (3.0, 1.0), (100.0, 1.0), (1e4, 1.0))
 """The steps that are tried together: the damping in units of the information of the prior, and the share of the step.
 Data that are far more exact than the prior make a step short by its share alone."""
+_CAREFUL = 2
+"""The number of the start for a motion that diverges from others: a heavier vehicle with less drag."""
 _LARGEST = 4.0
 """The largest change in one step, in standard deviations of the prior."""
 _UP = 0.5
@@ -53,10 +57,24 @@ class Minimum:
     """p x p: the second derivatives of J, with those of the prior."""
 
 
-def minimise(
+def minimise(objective: Objective, start: Array, on_step: OnStep = lambda _: None, **how: Any) -> Minimum:
+    """Minimise J from a start. Raises DivergedError.
+
+    If a motion diverges at the start, the vehicle begins there with the noise of a first fit, and then with the values
+    of a careful start: rounding decides whether motions that no sensor measures diverge beside exact measurements, so
+    they do on one processor and not on another. The other options are those of `_minimised`.
+    """
+    louder = np.where(objective.table.each("of_motion"), start, np.maximum(start, start_of(objective)))
+    for z in (start, louder):
+        with suppress(DivergedError):
+            return _minimised(objective, z, on_step, **how)
+    return _minimised(objective, start_of(objective, _CAREFUL), on_step, **how)
+
+
+def _minimised(
     objective: Objective,
     start: Array,
-    on_step: Callable[[int], None] = lambda _: None,
+    on_step: OnStep,
     *,
     near: Sequence[Data] = (),
     most: int = MOST_STEPS,
@@ -109,12 +127,19 @@ def minimise(
     return now
 
 
+def refined(objective: Objective, near: Minimum) -> Minimum:
+    """Return a minimum after a step with exact derivatives, or as it is if motions beside it diverge."""
+    with suppress(DivergedError):
+        return _minimised(objective, scaled(objective, near.z), lambda _: None, near=near.data, most=0)
+    return near
+
+
 def start_of(objective: Objective, number: int = 0) -> Array:
     """Return the coordinates at which a start begins."""
     return np.asarray(objective.mean + objective.deviation * objective.table.each("of_kind.starts")[:, number])
 
 
-def least_from(objective: Objective, start: Array, on_step: Callable[[int], None] = lambda _: None) -> Minimum:
+def least_from(objective: Objective, start: Array, on_step: OnStep = lambda _: None) -> Minimum:
     """Return the lower of two minima: the one from a start, and the one from there with larger dead bands.
 
     In the valley between both, J has a kink wherever the dead band passes a command of the tests.
@@ -327,5 +352,7 @@ def scaled(objective: Objective, z: Array) -> Array:
     change = -float(weight @ (z - objective.mean)) / float(weight @ direction)
     moved = z + direction * np.where(objective.table.each("is_log"), change, np.expm1(change))
     moved = np.clip(moved, objective.low, objective.high)
-    before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
-    return moved if after < before else z
+    with suppress(DivergedError):
+        before, after = (objective.value(one, objective.runs(one)) for one in (z, moved))
+        return moved if after < before else z
+    return z

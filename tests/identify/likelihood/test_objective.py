@@ -14,7 +14,7 @@ from rov_fmu.identify.likelihood import parameters
 from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter
-from rov_fmu.identify.likelihood.solve import minimise, refits, total
+from rov_fmu.identify.likelihood.solve import minimise, refits, start_of, total
 from rov_fmu.tank.arrays import Array
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
@@ -199,13 +199,21 @@ def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objec
         assert (np.abs(found.z - again.z) < 1.5 * errors)[of_motion].all()
 
 
-def test_a_search_ends_where_the_motion_diverges_and_cannot_begin_there(objective: Objective, point: Array) -> None:
-    z = np.clip(point, objective.low, objective.high)
-    step, data = minimise(objective, z, most=1, last=False), objective.data(z, objective.runs(z), exact=False)
-    with patch.object(Objective, "data", side_effect=[data, DivergedError, DivergedError]):
-        assert minimise(objective, z, last=False).z == pytest.approx(step.z)
-        with pytest.raises(DivergedError):
-            minimise(objective, z, last=False)
+def test_a_search_ends_where_the_motion_diverges_and_begins_elsewhere_if_it_does_there(
+    objective: Objective, point: Array
+) -> None:
+    """With the noise of a first fit, and then with all values of a careful start."""
+    z, first, careful = np.clip(point, objective.low, objective.high), start_of(objective), start_of(objective, 2)
+    louder = np.where([p.of_motion for p in objective.table.parameters], z, np.maximum(z, first))
+    for failures, start in enumerate((z, louder, careful)):
+        step, data = (
+            minimise(objective, start, most=1, last=False),
+            objective.data(start, objective.runs(start), exact=False),
+        )
+        with patch.object(Objective, "data", side_effect=[*[DivergedError] * failures, data, DivergedError]):
+            assert minimise(objective, z, last=False).z == pytest.approx(step.z)
+    with patch.object(Objective, "data", side_effect=DivergedError), pytest.raises(DivergedError):
+        minimise(objective, z)
 
 
 def test_sets_of_parameters_have_the_rows_of_each_of_them(objective: Objective, point: Array) -> None:
