@@ -2,10 +2,10 @@
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import groupby
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import Any
 from uuid import UUID
@@ -17,6 +17,7 @@ from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.python_flavour import python_files
 from rov_fmu.fmu.terminals import FOLDER, Terminal, port_of, terminals_document
 from rov_fmu.io.csv_table import DataFileError, read_series
+from rov_fmu.io.interrupts import temporary_folder
 
 _FILES = {path.stem: path for path in Path(__file__).with_name("companions").glob("[a-z]*.py")}
 COMPANIONS = tuple(sorted(_FILES))
@@ -26,10 +27,11 @@ _PORT = port_of(Point(name="point")).names
 
 
 def slave_of(name: str) -> Any:
-    """Return the class of a companion. Its `variables` have causality, start value, unit and description by name.
+    """Return the class of a companion. The `variables` of an object have causality, start value, unit and description.
 
-    It may also have: `terminals`, groups of variables by name; `points`, the ports, whose variables end with the name
-    of the port and are in the order of a vehicle's; `columns`, those of its file; and `needs`, a package.
+    It may also have: `terminals`, groups of variables with their name, and the names of the members if they differ;
+    `points`, the ports, whose variables end with the name of the port and are in the order of a vehicle's; `places`,
+    the terminals that each one whom it serves has for itself; `columns`, those of its file; and `needs`, a package.
     """
     return getattr(import_module(f"rov_fmu.bridges.system.companions.{name}"), name.capitalize())
 
@@ -40,30 +42,41 @@ def lack(name: str) -> str:
     return f"needs {needs}: pip install 'rov-fmu[system]'" if needs and find_spec(needs) is None else ""
 
 
-def companion(name: str, table: Path | None = None) -> bytes:
-    """Return the FMU of a companion, with the table of a file if it takes one. Raises DataFileError about this file."""
+Rows = list[tuple[float, list[list[float]]]]
+"""The rows of a table by their times."""
+
+
+def companion(name: str, rows: Rows = [], places: Sequence[str] = (), levels: int = 0) -> bytes:  # noqa: B006
+    """Return the FMU of a companion.
+
+    - `rows`: those of its table, if it takes one.
+    - `places`: whom it serves beside the first one, each with terminals of its own.
+    - `levels`: with how many levels it passes on or gets a profile of the water; 0 for the usual number.
+    """
     slave = slave_of(name)
     sources = {f"{slave.__name__}_slave.py": _FILES[name].read_text(encoding="utf-8")}
-    if table:
-        sources["table.json"] = _table(table, slave.columns)
-    description = _description(slave, sources)
-    terminals = terminals_document(_terminals(slave))
+    if shape := {key: one for key, one in {"rows": rows, "places": [*places], "levels": levels}.items() if one}:
+        sources["shape.json"] = json.dumps(shape)
+    with temporary_folder("companion-") as folder:
+        Path(folder, "shape.json").write_text(sources.get("shape.json", "{}"), encoding="utf-8")
+        made = slave(instance_name="", resources=folder)
+    description = _description(made, sources)
+    terminals = terminals_document(_terminals(made))
     files = {"modelDescription.xml": description, f"{FOLDER}/terminalsAndIcons.xml": terminals}
     return archive(files | python_files(slave.__name__, sources))
 
 
-def _description(slave: Any, sources: Mapping[str, str]) -> bytes:
+def _description(made: Any, sources: Mapping[str, str]) -> bytes:
     """Return PythonFMU's description, with the units and the dependencies that it does not write.
 
     No output follows an input before the step. Without the time, the same file gives the same bytes.
     """
-    made = slave(instance_name="")
     made.guid = ""
     root: Element = made.to_xml()
     del root.attrib["generationDateAndTime"]
     definitions = Element("UnitDefinitions")
     root.insert(1, definitions)
-    for unit in sorted({unit for _, _, unit, _ in slave.variables.values()}):
+    for unit in sorted({unit for _, _, unit, _ in made.variables.values()}):
         defined = SubElement(definitions, "Unit", name=unit)
         try:
             exponents = unit_of(unit).exponents
@@ -72,7 +85,7 @@ def _description(slave: Any, sources: Mapping[str, str]) -> bytes:
         SubElement(defined, "BaseUnit", {base: str(exponent) for base, exponent in exponents.items()})
     for variable in root.iter("ScalarVariable"):
         for kind in variable.iter("Real"):
-            kind.set("unit", slave.variables[variable.attrib["name"]][2])
+            kind.set("unit", made.variables[variable.attrib["name"]][2])
     for output in root.iter("Unknown"):
         output.set("dependencies", "")
     content = json.dumps([tostring(root, "unicode"), *sources.items()])
@@ -80,20 +93,32 @@ def _description(slave: Any, sources: Mapping[str, str]) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{tostring(root, "unicode")}'.encode()
 
 
-def _terminals(slave: Any) -> list[Terminal]:
+def _terminals(made: Any) -> list[Terminal]:
     """Return the terminals of a companion: its groups of variables, and its ports with the members of a vehicle's."""
-    causality = {name: causality for name, (causality, *_) in slave.variables.items()}
-    found = [Terminal(name, causality[names[0]], "bus", "", names) for name, names in getattr(slave, "terminals", ())]
-    for point in getattr(slave, "points", ()):
-        names = tuple(name for name in slave.variables if name.endswith(f"_{point}"))[: len(_PORT)]
+    causality = {name: causality for name, (causality, *_) in made.variables.items()}
+    groups = getattr(made, "terminals", ())
+    found = [Terminal(name, causality[own[0]], "bus", "", tuple(own), *members) for name, own, *members in groups]
+    for point in getattr(made, "points", ()):
+        names = tuple(name for name in made.variables if name.endswith(f"_{point}"))[: len(_PORT)]
         found.append(Terminal(point, "port", "bus", "", names, _PORT))
     return found
 
 
-def _table(path: Path, columns: tuple[str, ...]) -> str:
-    """Return the rows of a file by their times, in JSON. Raises DataFileError."""
+def rows_of(path: Path, columns: tuple[str, ...]) -> Rows:
+    """Return the rows of a table by their times, with the depth first. Raises DataFileError."""
     series = read_series(path, lambda name: None if name in columns else f"must be one of {', '.join(columns)}")
-    if missing := [name for name in columns[1:] if name not in series]:
+    if missing := [name for name in columns[1:-1] if name not in series]:
         raise DataFileError(f"{path}: column {missing[0]!r} is missing: the columns are {', '.join(columns)}")
-    rows = [*zip(series[next(iter(series))], *(series[name] for name in columns[1:]), strict=True)]
-    return json.dumps([[t, sorted(row[1:] for row in some)] for t, some in groupby(rows, lambda row: row[0])])
+    time, *others = ([*series[next(iter(series))]], *(series.get(name) for name in columns[1:]))
+    rows = [*zip(time, *([0.0] * len(time) if one is None else one for one in others), strict=True)]
+    found = [(t, sorted([*row[1:]] for row in some)) for t, some in groupby(rows, lambda row: row[0])]
+    for t, some in found:
+        if alike := [above[0] for above, below in pairwise(some) if above[0] == below[0]]:
+            raise DataFileError(f"{path}: time {t:g} s has two rows of z = {alike[0]:g} m")
+    return found
+
+
+def levels_of(rows: Rows) -> int:
+    """Return the number of levels of the water between two times: the depths of the rows of both, and the seabed."""
+    profiles = [{depth for depth, *_ in some} for _, some in rows]
+    return 1 + max(len(before | after) for before, after in pairwise([profiles[0], *profiles]))

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import dropwhile
 from typing import NamedTuple
 
-from rov_fmu.bridges.system.part import Part, kind_of
+from rov_fmu.bridges.system.part import Part, Value, kind_of
+from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import RovError, listed, only, shown
 
 _CAUSALITIES = ("output", "input")
@@ -35,6 +36,9 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
     if is_port != [True, True]:
         port, variable = (first, second) if is_port[0] else (second, first)
         raise MismatchError(f"{port} is a terminal and {variable} a variable: a terminal joins a terminal")
+    if factor != 1.0:
+        reason = "one number would change places, velocities and forces alike: `port` of a component has factors"
+        raise MismatchError(f"{first} and {second} are terminals, which take no factor: {reason}")
     members = [parts[component].terminals[name] for component, name in ends]
     common = [member for member in members[0] if member in members[1]]
     if not common:
@@ -50,8 +54,10 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
         if sorted(causalities) != sorted(_CAUSALITIES):
             reason = f"an {causalities[0]} of {first} and an {causalities[1]} of {second}"
             raise MismatchError(f"member {member} is {reason}: one must be an output, and the other an input")
-        start, end = pair if causalities[0] == "output" else pair[::-1]
-        found.append(checked(Connection(start, end, factor), parts))
+        both = [parts[component].factors.get((port, member), 1.0) for component, port in ends]
+        if causalities[0] == "input":
+            pair, both = pair[::-1], both[::-1]
+        found.append(checked(Connection(pair[0], pair[1], both[0] / both[1]), parts))
     return found
 
 
@@ -98,6 +104,61 @@ def _are_alike(a: tuple[str, tuple[float, ...] | None], b: tuple[str, tuple[floa
     if not (a[0] and b[0]) or a[0] == b[0]:
         return True
     return a[1] is not None and a[1] == b[1]
+
+
+VELOCITIES = {"x": "vg_N", "y": "vg_E", "z": "vg_D"}
+"""The members of a port that are the place of a point, each with that of its velocity."""
+DIFFERENCE = "difference_{}"
+"""The parameter with which an FMU takes the velocity of a port from its place."""
+_FORCES = ("F_N", "F_E", "F_D")
+
+
+def halves(
+    connections: Sequence[Connection], parts: Mapping[str, Part], values: Mapping[str, Mapping[str, Value]]
+) -> Iterator[tuple[str, str, str]]:
+    """Yield the component, the port and the input, as component.variable, for each port that is connected by half.
+
+    Place and velocity of a point belong together, and so do its motion and the force on it, where both sides have them.
+    """
+    ends = {one.end for one in connections}
+    ports = {
+        (component, port): names
+        for component, part in parts.items()
+        for port, names in part.terminals.items()
+        if names.keys() & VELOCITIES.keys() and names.keys() & {*VELOCITIES.values(), *_FORCES}
+    }
+
+    def lacking(*sides: tuple[str, str]) -> str:
+        """Return the input that is missing between two ports, or an empty text."""
+        for member in ports[sides[0]]:
+            if member in ports[sides[1]] and member not in VELOCITIES.values():
+                both = [(component, ports[component, port][member]) for component, port in sides]
+                inputs = [(c, name) for c, name in both if parts[c].variables[name].causality == "input"]
+                if len(inputs) == 1 and inputs[0] not in ends and inputs[0][1] not in values.get(inputs[0][0], {}):
+                    return ".".join(inputs[0])
+        return ""
+
+    for (component, port), names in ports.items():
+        for pair in VELOCITIES.items():
+            both = [(component, names[member]) for member in pair if member in names]
+            told = [end for end in both if end in ends]
+            if len(both) == 2 and len(told) == 1:
+                (other,) = {*both} - {*told}
+                yield component, port, ".".join(other)
+    members = grouped(
+        ((component, name), (port, member))
+        for (component, port), names in ports.items()
+        for member, name in names.items()
+    )
+    for one in connections:
+        lacks = [
+            lacking((one.start[0], first), (one.end[0], second))
+            for first, member in members.get(one.start, ())
+            for second, same in members.get(one.end, ())
+            if member == same
+        ]
+        if lacks and all(lacks):  # a variable may be in several ports
+            yield one.end[0], members[one.end][0][0], lacks[0]
 
 
 def loop(connections: Sequence[Connection], parts: Mapping[str, Part]) -> list[str]:

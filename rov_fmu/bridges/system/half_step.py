@@ -35,8 +35,10 @@ class HalfStep(NamedTuple):
         return f"{of}, and other connected variables by less"
 
 
-def half_step(rows: Array, halved: Array) -> HalfStep:
-    """Compare the rows of a run with those of one that took half the step."""
+def half_step(rows: Array, halved: Array, units: Sequence[str]) -> HalfStep:
+    """Compare the rows of a run with those of one that took half the step. A turn is no change of an angle."""
     changes, ranges = np.abs(halved - rows), np.ptp(rows, axis=0)
+    angles = [unit == "rad" for unit in units]
+    changes[:, angles] = np.abs(np.remainder(changes[:, angles] + np.pi, 2.0 * np.pi) - np.pi)
     shares = np.divide(changes, ranges, out=np.zeros_like(changes), where=ranges > 0.0)
     return HalfStep(changes.max(axis=0), np.sqrt((shares**2).mean(axis=0)), shares.max(axis=1))

@@ -1,7 +1,7 @@
 """What a system must know about each of its FMUs: variables, terminals, units, and what follows an input at once."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from io import BytesIO
 from math import inf
@@ -37,6 +37,8 @@ class Part:
     """FMPy's."""
     terminals: Mapping[str, Mapping[str, str]]
     """The variables by the names of the members, for each terminal."""
+    factors: Mapping[tuple[str, str], float] = field(default_factory=dict)
+    """By what a variable is multiplied to be the member of a terminal, where this is not 1."""
 
     @cached_property
     def variables(self) -> dict[str, Any]:
@@ -67,6 +69,19 @@ class Part:
     @cached_property
     def _bases(self) -> dict[str, Any]:
         return {one.name: one.baseUnit for one in self.description.unitDefinitions}
+
+    def with_ports(self, ports: Mapping[str, Mapping[str, tuple[str, float]]]) -> "Part":
+        """Return the FMU with more terminals, for each the variable and the factor of each member. Raises ValueError
+        with the port and the reason."""
+        for port, members in ports.items():
+            if port in self.variables or port in self.terminals:
+                raise ValueError(f"{port}: the FMU has a variable or a terminal of this name")
+            for name, _ in members.values():
+                if name not in self.variables:
+                    raise ValueError(f"{port}: {self.unknown(name)}")
+        named = {port: {member: name for member, (name, _) in members.items()} for port, members in ports.items()}
+        factors = {(port, member): factor for port, one in ports.items() for member, (_, factor) in one.items()}
+        return replace(self, terminals={**self.terminals, **named}, factors=factors)
 
     def unknown(self, name: str) -> str:
         """Return the message about a name that the FMU does not have."""

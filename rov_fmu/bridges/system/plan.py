@@ -34,6 +34,22 @@ _StartValue = Annotated[
     ),
 ]
 _Position = Annotated[tuple[Finite, Finite, Finite], AS_TUPLE]
+
+
+def _port(given: Any) -> dict[str, tuple[str, float]]:
+    """Return the variable and the factor of each member of a port. Raises ValueError with the rule."""
+    named = dict(zip(given, given, strict=True)) if isinstance(given, list) and {*map(type, given)} == {str} else given
+    found = {}
+    for member, one in named.items() if isinstance(named, dict) else ():
+        match one if isinstance(one, list) else [one, 1.0]:
+            case [str(variable), factor] if _is_finite(factor) and factor:
+                found[member] = variable, float(factor)
+    if not found or len(found) != len(given):
+        raise ValueError('must be { member = "variable", other = ["variable", factor], ... } or a list of variables')
+    return found
+
+
+_Port = Annotated[dict[str, tuple[str, float]], BeforeValidator(_port), Field(max_length=_MOST)]
 SOURCES = ("vehicle", "fmu", "companion")
 """The keys that say which FMU a component is."""
 
@@ -48,9 +64,12 @@ class ComponentTable(Strict):
     companion: Literal[COMPANIONS] | None = None  # type: ignore[valid-type]
     """A companion that ships; `rov-fmu system --list` has their variables."""
     file: Beside | None = None
-    """The table (CSV) of the companion `current`: time (s), z (m), V_N and V_E (m/s)."""
+    """The table (CSV) of the companion `current`: time (s), z (m), V_N, V_E and perhaps V_D (m/s)."""
     point: Annotated[dict[Symbol, _Position], Field(max_length=_MOST)] = Field({})
     """More points of the vehicle, at which forces act: forward, starboard, down of the origin, m. Each is a port."""
+    port: Annotated[dict[Symbol, _Port], Field(max_length=_MOST)] = Field({})
+    """Ports of an FMU without terminals: { member = "variable", other = ["variable", factor] }, or a list of
+    variables."""
     coefficients: Beside | None = None
     """A vehicle file or name. Its coefficients are start values of the FMU, which must have them."""
     start: Annotated[dict[str, _StartValue], Field(max_length=_MOST_NAMED)] = Field({})
@@ -88,8 +107,8 @@ class SystemPlan(Strict):
     stop_time: Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
     """s; a whole number of steps."""
     connect: Annotated[tuple[_Connection, ...], AS_TUPLE, Field(max_length=_MOST_NAMED)] = ()
-    """[["component.output", "component.input"], ...], or two ports (terminals), in any order. A third entry is a number
-    by which the value is multiplied."""
+    """[["component.output", "component.input"], ...], or two ports (terminals), in any order. A third entry, of
+    variables, is a number by which the value is multiplied."""
     plot: Annotated[tuple[str, ...], AS_TUPLE, Field(max_length=_MOST)] = ()
     """The variables that the plot of --run shows. The default is what passes between the components."""
     component: Annotated[dict[Symbol, ComponentTable], Field(min_length=1, max_length=_MOST)]

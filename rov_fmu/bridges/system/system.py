@@ -1,12 +1,21 @@
 """A system from its plan: everything that does not fit is told, and then the FMUs of vehicles are built."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
-from rov_fmu.bridges.system.companion import companion, lack
-from rov_fmu.bridges.system.connections import Connection, MismatchError, connected, loop
+from rov_fmu.bridges.system.companion import Rows, companion, lack, levels_of, rows_of, slave_of
+from rov_fmu.bridges.system.connections import (
+    DIFFERENCE,
+    VELOCITIES,
+    Connection,
+    MismatchError,
+    connected,
+    halves,
+    loop,
+)
 from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
@@ -21,6 +30,8 @@ from rov_fmu.io.toml_file import LARGEST, key_line
 from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 
+_MOST_TOLD = 8
+"""The most inputs of a terminal that are told by their names."""
 _MOST_BYTES = 1_000_000_000
 """The most bytes of all FMUs, which are in memory."""
 
@@ -37,46 +48,65 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
     ]
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
-    parts, unread = dict[str, Part](), list[str]()
-    ready: dict[str, Part] = {}
-    vehicles: dict[str, Vehicle] = {}
-    kinds = {  # components of one kind have one FMU
-        name: table.model_dump_json(include={*SOURCES, "file", "point"}) for name, table in plan.component.items()
-    }
-    for name, table in plan.component.items():
-        kind = kinds[name]
-        try:
-            if table.vehicle and kind not in ready:
-                vehicles[kind] = _vehicle(name, table, path)
-                ready[kind] = _description(vehicles[kind])
-            elif kind not in ready:
-                on_part(name)
-                ready[kind] = _part(table, path)
-        except FileError as error:
-            where = f"{path}: component.{name}.fmu: " if table.fmu else ""
-            unread += [f"{where}{line}" for line in str(error).split("\n")]
-            continue
-        parts[name] = ready[kind]
-        _check_size(parts, name, path)
-    if unread:
-        raise SystemPlanError(*unread)
+    served, lines = _served(plan)
+    parts, vehicles = _parts(plan, path, served, on_part)
     values: dict[str, dict[str, Value]] = {}
     wrong += _set_values(plan, path, parts, values)
     connections = list[Connection]()
-    wrong += _connect(plan, parts, connections)
+    wrong += _connect(plan, lines, parts, connections)
+    if not wrong:
+        connections += _depths(served, parts, values, connections)
+        wrong += _seabeds(parts, values, connections)
+        wrong += _differences(parts, values, connections)
     if not wrong and (around := loop(connections, parts)):
         reason = "is a loop without delay, for each output follows its input at once: put an FMU with a state into it"
         wrong.append(f"connect: {' -> '.join(around)} {reason}")
     if wrong:
         raise SystemPlanError(*lines_on(path, wrong))
     _pass_on(connections, parts, values)
-    for name, kind in kinds.items():
-        if vehicle := vehicles.pop(kind, None):
-            on_part(name)
-            ready[kind] = replace(ready[kind], content=_built(vehicle))
-        parts[name] = ready[kind]
+    for name, vehicle in vehicles.items():
+        on_part(name)
+        described = parts[name]
+        built = replace(described, content=_built(vehicle))
+        parts |= {other: built for other, part in parts.items() if part is described}
         _check_size(parts, name, path)
     return Structure(parts, values, connections)
+
+
+def _parts(
+    plan: SystemPlan, path: Path, served: Mapping[str, Sequence[str]], on_part: Callable[[str], object]
+) -> tuple[dict[str, Part], dict[str, Vehicle]]:
+    """Return the FMUs of a plan, and the vehicles whose FMUs are only described, by the first component of each.
+
+    Components of one kind have one FMU. Raises SystemPlanError with every reason, and FileError about a vehicle.
+    """
+    parts, vehicles, unread = dict[str, Part](), dict[str, Vehicle](), list[str]()
+    tables = _tables(plan, path, unread)
+    levels = max(map(levels_of, tables.values()), default=0)
+    ready: dict[str, Part] = {}
+    for name, table in plan.component.items():
+        kind = f"{table.model_dump_json(include={*SOURCES, 'file', 'point', 'port'})}{served.get(name)}"
+        try:
+            if kind in ready:
+                part = ready[kind]
+            elif table.vehicle:
+                vehicles[name] = _vehicle(name, table, path)
+                part = _description(vehicles[name]).with_ports(table.port)
+            else:
+                on_part(name)
+                shape = {"rows": tables.get(name, []), "places": served.get(name, [])[1:], "levels": levels}
+                part = _part(table, path, **shape).with_ports(table.port)
+        except FileError as error:
+            where = f"{path}: component.{name}.fmu: " if table.fmu else ""
+            unread += [f"{where}{line}" for line in str(error).split("\n")]
+        except ValueError as error:
+            unread += lines_on(path, [f"component.{name}.port.{error}"])
+        else:
+            parts[name] = ready[kind] = part
+            _check_size(parts, name, path)
+    if unread:
+        raise SystemPlanError(*unread)
+    return parts, vehicles
 
 
 def _check_size(parts: Mapping[str, Part], name: str, path: Path) -> None:
@@ -85,15 +115,49 @@ def _check_size(parts: Mapping[str, Part], name: str, path: Path) -> None:
         raise SystemPlanError(f"{path}: component.{name}: the FMUs have more than {_MOST_BYTES:,} bytes in all")
 
 
-def _part(table: ComponentTable, path: Path) -> Part:
-    """Make a companion, or read an FMU. Raises FileError."""
-    folder = path.parent
+def _part(table: ComponentTable, path: Path, **shape: Any) -> Part:
+    """Make a companion of a shape, or read an FMU. Raises FileError."""
     if table.fmu:
-        file = inside(folder, table.fmu)
+        file = inside(path.parent, table.fmu)
         return read_part(file, read_bytes(file))
     assert table.companion
-    content = companion(table.companion, inside(folder, table.file) if table.file else None)
-    return read_part(Path(table.companion), content, is_ours=True)
+    return read_part(Path(table.companion), companion(table.companion, **shape), is_ours=True)
+
+
+def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
+    """Return the rows of the table of each companion that has one, and collect what is wrong with them."""
+    found: dict[str, Rows] = {}
+    for name, table in plan.component.items():
+        if table.file and table.companion:
+            columns = getattr(slave_of(table.companion), "columns", ())
+            try:
+                if not columns:
+                    raise FileError(f"{path}: component.{name}.file: the companion {table.companion} takes no file")
+                found[name] = rows_of(inside(path.parent, table.file), columns)
+            except FileError as error:
+                unread.append(str(error))
+    return found
+
+
+def _served(plan: SystemPlan) -> tuple[dict[str, list[str]], list[tuple[str, str, float]]]:
+    """Return whom each companion serves at places of their own, and the connections between these places.
+
+    The first one has the terminals of the companion, and the others those that end with their names.
+    """
+    served: dict[str, list[str]] = {}
+    lines = []
+    for first, second, factor in plan.connect:
+        ends = [first, second]
+        for n, end in enumerate(ends):
+            component, _, name = end.partition(".")
+            table = plan.component.get(component)
+            if table and table.companion and name in dict(getattr(slave_of(table.companion), "places", ())):
+                other = (second, first)[n].partition(".")[0]
+                others = served.setdefault(component, [])
+                others += [other] * (other not in others)
+                ends[n] += f"_{other}" * (other != others[0])
+        lines.append((ends[0], ends[1], factor))
+    return served, lines
 
 
 def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
@@ -140,20 +204,22 @@ def _set_values(
                 yield key_line(where, str(error), value)
 
 
-def _connect(plan: SystemPlan, parts: Mapping[str, Part], connections: list[Connection]) -> Iterator[str]:
-    """Fill in the connections, and yield a line for each that does not fit."""
-    lines: dict[tuple[str, str], int] = {}
-    for n, (first, second, factor) in enumerate(plan.connect, 1):
+def _connect(
+    plan: SystemPlan, lines: Sequence[tuple[str, str, float]], parts: Mapping[str, Part], connections: list[Connection]
+) -> Iterator[str]:
+    """Fill in the connections of some lines, and yield a line of the plan for each that does not fit."""
+    taken: dict[tuple[str, str], int] = {}
+    for n, (given, line) in enumerate(zip(plan.connect, lines, strict=True), 1):
         try:
-            found = connected(first, second, factor, parts)
+            found = connected(*line, parts)
             for one in found:
-                if one.end in lines:
-                    before = lines[one.end]
+                if one.end in taken:
+                    before = taken[one.end]
                     where = f"connect#{before} connects it too" if before < n else "this line connects it twice"
                     raise MismatchError(f"{'.'.join(one.end)} takes one connection, and {where}")
-                lines[one.end] = n
+                taken[one.end] = n
         except MismatchError as error:
-            yield key_line(f"connect#{n}", str(error), [first, second])
+            yield key_line(f"connect#{n}", str(error), [*given[:2]])
             continue
         connections += found
     for component, name in plan.plotted:
@@ -177,6 +243,51 @@ def _pass_on(
                 values[component][name] = parts[component].start_value(name, passed)
 
 
+def _depths(
+    served: Mapping[str, Sequence[str]],
+    parts: Mapping[str, Part],
+    values: Mapping[str, Mapping[str, Value]],
+    connections: Sequence[Connection],
+) -> Iterator[Connection]:
+    """Yield the connections that tell a companion where the vehicles are that it serves, if nothing else tells it."""
+    ends = {one.end for one in connections}
+    for component, others in served.items():
+        for other in others:
+            suffix = f"_{other}" * (other != others[0])
+            for member, name in parts[component].terminals[f"pose{suffix}"].items():
+                if (
+                    (component, name) not in ends
+                    and name not in values[component]
+                    and member in parts[other].names("output")
+                ):
+                    yield Connection((other, member), (component, name))
+
+
+def _seabeds(
+    parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
+) -> Iterator[str]:
+    """Give the water around a tether the seabed that only the tether was told, and yield a line where they differ."""
+    for one in connections:
+        (water, _), (tether, name) = one.start, one.end
+        if name == "depth_1" and "seabed" in parts[water].variables and (depth := values[tether].get("seabed")):
+            other = values[water].setdefault("seabed", depth)
+            if other != depth:
+                reason = f"component.{water}.start.seabed is {other}: there is one seabed, which one of them is told"
+                yield key_line(f"component.{tether}.start.seabed", reason, depth)
+
+
+def _differences(
+    parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
+) -> Iterator[str]:
+    """Have a companion take velocities from places where only these are connected; yield a line for other halves."""
+    for component, port, lacking in halves(connections, parts, values):
+        velocities = {f"{component}.{parts[component].terminals[port].get(name)}" for name in VELOCITIES.values()}
+        if lacking in velocities and (flag := DIFFERENCE.format(port)) in parts[component].variables:
+            values[component][flag] = True
+        else:
+            yield f"connect: {component}.{port} is connected by half: nothing is connected to {lacking}"
+
+
 def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
     """Yield a sentence for each port, and each component with other inputs, that the plan neither connects nor sets."""
     ends = {one.end for one in structure.connections}
@@ -185,9 +296,13 @@ def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
         free = [name for name in part.names("input") if (component, name) not in ends and name not in set_here]
         for terminal, members in part.terminals.items():
             own = {name for name in members.values() if name in part.names("input")}
-            if own and own <= {*free} and not own.issuperset(members.values()):
+            if own and own <= {*free} and (len(own) > _MOST_TOLD or not own.issuperset(members.values())):
                 yield f"{component}: the port {terminal} is not connected, so its inputs keep their start values"
                 free = [name for name in free if name not in own]
+            if structure.values[component].get(DIFFERENCE.format(terminal)):
+                velocities = {members[name] for name in VELOCITIES.values()}
+                yield f"{component}: the velocity of {terminal} is the change of its place, because it is not connected"
+                free = [name for name in free if name not in velocities]
         if free:
             yield f"{component}: nothing is connected to {listed(free)}, which keep their start values"
 

@@ -75,7 +75,8 @@ def _half_step(
     except FileError as error:
         shown.print(f"warning: with half the step: {error}")
         return None, None
-    half = half_step(np.array([found[name] for name in names]).T, halved.rows)
+    units = [structure.parts[component].unit(name)[0] for component, name in names]
+    half = half_step(np.array([found[name] for name in names]).T, halved.rows, units)
     order = np.argsort(-half.typical, kind="stable")[:_MOST_SHOWN]
     shown.print(half.words(names))
     columns = ["unit", "from", "to", "half the step changes it by up to", "root mean square of its range"]
@@ -86,7 +87,7 @@ def _half_step(
         component, name = names[n]
         low, high = found[names[n]].min(), found[names[n]].max()
         numbers = (f"{low:.4g}", f"{high:.4g}", f"{half.largest[n]:.2g}", f"{half.typical[n]:.1%}")
-        printed.add_row(f"{component}.{name}", structure.parts[component].unit(name)[0], *numbers)
+        printed.add_row(f"{component}.{name}", units[n], *numbers)
     return half, printed
 
 
@@ -104,11 +105,11 @@ def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
 def list_companions() -> None:
     """Print the companions with their variables."""
     for name in COMPANIONS:
-        slave = slave_of(name)
-        title = f"{name}: {slave.description}"
+        slave = slave_of(name)(instance_name=name)
+        title = f"{name}: {type(slave).description}"
         if reason := lack(name):
             title += f"; {reason}"
-        groups = [*(terminal for terminal, _ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
+        groups = [*(terminal for terminal, *_ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
         if groups:
             title += f". Terminals: {', '.join(groups)}"
         shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])

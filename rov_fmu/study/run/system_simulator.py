@@ -76,7 +76,8 @@ def half_step_words(job: Job, model: SystemModel) -> str:
                 rows = [child.call("call", _rows, folder, alike, model, parts) for parts in (1, 2)]
         except (ChildError, RunError) as error:
             return f"half the step was tried in one run, which cannot be done: {error}"
-    return f"in one run, {half_step(*rows).words([*map(split, names)])}"
+    half = half_step(rows[0], rows[1], [model.variables[name].unit for name in names])
+    return f"in one run, {half.words([*map(split, names)])}"
 
 
 def _rows(folder: str, job: Job, model: SystemModel, parts: int) -> Array:

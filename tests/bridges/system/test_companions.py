@@ -1,9 +1,10 @@
 """What the companions compute, and a system that is run, against what is known in closed form."""
 
 import shutil
+import sys
 import zipfile
-from io import BytesIO
-from math import cos, cosh, hypot, pi, sin, sinh
+from io import BytesIO, StringIO
+from math import cos, cosh, hypot, pi, sin, sinh, sqrt
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,8 @@ import pytest
 from pythonfmu.builder import FmuBuilder
 from scipy.optimize import brentq
 
-from rov_fmu.bridges.system.companion import companion, slave_of
+from rov_fmu.bridges.system.companion import companion, rows_of, slave_of
+from rov_fmu.bridges.system.companion import levels_of as levels_of_rows
 from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.half_step import half_step
@@ -32,13 +34,16 @@ from tests.vehicles import tied
 HERE = Path(__file__).parent
 
 
-def test_the_new_companions_are_short() -> None:
-    for name in ("tether", "current"):
-        source = Path(slave_of(name).__module__.replace(".", "/")).with_suffix(".py")
-        assert len((HERE.parents[2] / source).read_text(encoding="utf-8").splitlines()) <= 150
-
-
 # ---- A current -------------------------------------------------------------------------------------------------------
+
+
+def levels_of(water: Any) -> Any:
+    """Return depth and velocity of the levels of a water, a row for each."""
+    count = sum(name.startswith("depth_") for name in water.variables)
+    return np.array([[getattr(water, f"{name}_{n + 1}") for name in NAMES] for n in range(count)])
+
+
+NAMES = ("depth", "V_N", "V_E", "V_D")
 
 
 def test_a_current_follows_its_profile() -> None:
@@ -49,34 +54,48 @@ def test_a_current_follows_its_profile() -> None:
     water.do_step(2.0, 3.0)
     speed = 0.5 * 0.4 * 0.75 ** (1 / 7)
     assert pytest.approx([speed * cos(0.5), speed * sin(0.5)]) == [water.V_N, water.V_E]
-    levels = [[getattr(water, f"{name}_{n}") for n in range(1, 7)] for name in ("depth", "V_N")]
-    assert levels[0] == [0.0, 4.0, 8.0, 12.0, 16.0, 20.0]
-    assert levels[1][0] == pytest.approx(0.2 * cos(0.5))
-    assert levels[1][-1] == 0.0
+    depth, V_N, *_ = levels_of(water).T
+    z, most = np.linspace(0.0, 19.8, 500), 0.2 * cos(0.5)
+    np.testing.assert_allclose(np.interp(z, depth, V_N), most * (1.0 - z / 20.0) ** (1 / 7), atol=0.005 * most)
+    assert (depth[-1], V_N[-1]) == (20.0, 0.0)
 
 
-ROWS = "time,z,V_N,V_E\n0,0,0.4,0\n0,10,0.2,0.1\n20,0,0,0\n"
-AT = {(0.0, 0.0): (0.4, 0.0), (0.0, 5.0): (0.3, 0.05), (10.0, 5.0): (0.15, 0.025), (30.0, 50.0): (0.0, 0.0)}
+ROWS = "time,z,V_N,V_E,V_D\n0,0,0.4,0,0\n0,10,0.2,0.1,0.4\n20,0,0,0,0\n20,4,0.4,0,0\n20,30,0,0,0\n"
+AT = {
+    (0.0, 0.0): (0.4, 0.0, 0.0),
+    (0.0, 5.0): (0.3, 0.05, 0.2),
+    (10.0, 5.0): (0.5 * (0.3 + 0.4 * 25.0 / 26.0), 0.025, 0.1),
+    (30.0, 50.0): (0.0, 0.0, 0.0),
+}
 """The velocity by time and depth: on straight lines between the rows, and outside of them that of the nearest one."""
 
 
-def test_a_current_follows_its_file(tmp_path: Path) -> None:
-    file = tmp_path / "current.csv"
-    file.write_text(ROWS, encoding="utf-8")
-    with zipfile.ZipFile(BytesIO(companion("current", file))) as fmu:
-        fmu.extract("resources/table.json", tmp_path)
-    water = Current(instance_name="water", resources=tmp_path / "resources")
+def water_of(folder: Path, text: str, *places: str) -> Any:
+    """Return a current with a file, as its FMU has it."""
+    (folder / "current.csv").write_text(text, encoding="utf-8")
+    rows = rows_of(folder / "current.csv", Current.columns)
+    with zipfile.ZipFile(BytesIO(companion("current", rows, places, levels_of_rows(rows)))) as fmu:
+        fmu.extract("resources/shape.json", folder)
+    return Current(instance_name="water", resources=folder / "resources")
+
+
+def test_a_current_follows_its_file_at_every_place_and_as_a_profile(tmp_path: Path) -> None:
+    water = water_of(tmp_path, ROWS, "b")
     for (time, z), velocity in AT.items():
-        water.z = z
+        water.z, water.z_b = 0.5 * z, z
         water.do_step(time - 1.0, 1.0)
-        assert pytest.approx(velocity) == [water.V_N, water.V_E]
+        assert pytest.approx(velocity) == [water.V_N_b, water.V_E_b, water.V_D_b]
+        levels = levels_of(water)
+        assert pytest.approx(velocity, abs=1e-15) == [np.interp(z, levels[:, 0], levels[:, k]) for k in (1, 2, 3)]
+        half = [np.interp(0.5 * z, levels[:, 0], levels[:, k]) for k in (1, 2, 3)]
+        assert pytest.approx(half, abs=1e-15) == [water.V_N, water.V_E, water.V_D]
     for text, message in (
         (ROWS.replace("V_E", "V_X"), "column 'V_X': must be one of time, z, V_N, V_E"),
         ("time,z\n0,1\n", "column 'V_N' is missing"),
+        ("time,z,V_N,V_E\n0,1,0,0\n0,1,1,0\n", "time 0 s has two rows of z = 1 m"),
     ):
-        file.write_text(text, encoding="utf-8")
         with pytest.raises(DataFileError, match=message):
-            companion("current", file)
+            water_of(tmp_path, text)
 
 
 # ---- A tether --------------------------------------------------------------------------------------------------------
@@ -120,10 +139,97 @@ def test_a_current_drags_a_tether_along_at_the_depths_where_it_flows() -> None:
     assert abs(below.F_N_top + below.F_N_bottom) < 0.01 * most
 
 
+JET = "time,z,V_N,V_E\n0,0,0,0\n0,2,0,0\n0,3,0,0.5\n0,7,0,0.5\n0,8,0,0\n"
+
+
+def test_a_tether_feels_a_jet_where_it_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The water between 3 and 7 m flows; at each node of the tether it has the velocity of the file."""
+    water = water_of(tmp_path, JET)
+    water.seabed = 30.0
+    water.exit_initialization_mode()
+    profile = {
+        f"{name}_{n}": x for n, row in enumerate(levels_of(water), 1) for name, x in zip(NAMES, row, strict=True)
+    }
+    ends = {"mass": 0.0465, "y_top": 0.0, "z_top": 0.0, "z_bottom": 14.9, "x_bottom": -0.2}
+    found = tether(60.0, **ends, **profile)
+    depths, speeds = np.loadtxt(StringIO(JET), delimiter=",", skiprows=1).T[[1, 3]]
+    module = sys.modules[type(found).__module__]
+    monkeypatch.setattr(module, "current", lambda _, depth: [0.0, -np.interp(depth, depths, speeds), 0.0])
+    expected = tether(60.0, **ends)
+    assert found.tension_bottom == pytest.approx(expected.tension_bottom, rel=1e-3)
+    assert (found.F_E_bottom, found.tension_bottom) == pytest.approx((1.741, 2.906), rel=0.01)
+
+
+def test_water_that_wells_up_lifts_a_tether() -> None:
+    """Across a tether that is nearly level, as much as water that flows across it."""
+    ends = {"mass": 0.0465, "length": 15.5}
+    levels = {"depth_1": 0.0, "depth_2": 100.0}
+    up = tether(30.0, **ends, **levels, V_D_1=-0.5, V_D_2=-0.5)
+    across = tether(30.0, **ends, **levels, V_N_1=0.5, V_N_2=0.5)
+    assert up.F_D_top + up.F_D_bottom == pytest.approx(-(across.F_N_top + across.F_N_bottom), rel=0.02)
+    assert up.F_D_top < -1.0
+
+
+def test_a_tether_on_the_seabed_pulls_like_a_catenary() -> None:
+    """T - H = w h for a line that hangs down to the seabed, h below its end, and ends there."""
+    on_it = tether(60.0, seabed=12.0, length=25.0, z_top=2.0, z_bottom=11.9)
+    assert max(getattr(on_it, f"z_{n}") for n in range(11)) == pytest.approx(12.0, abs=0.01)
+    H = hypot(on_it.F_N_top, on_it.F_E_top)
+    assert on_it.tension_top - H == pytest.approx(WEIGHT / 20.0 * 10.0, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {"mass": 0.0465, "length": 60.0, "seabed": 12.0, "y_top": -25.0, "z_top": 0.0, "z_bottom": 8.0},
+        {"mass": 0.6, "diameter": 0.025, "EA": 1e6, "length": 300.0, "seabed": 20.0},
+        {"mass": 0.05, "diameter": 0.004, "EA": 5e3, "length": 150.0, "seabed": 5.0, "z_bottom": 4.9},
+        {"mass": 0.2, "length": 60.0, "depth_1": 0.0, "depth_2": 20.0},
+    ],
+)
+def test_no_tether_shakes_on_the_seabed(values: dict[str, float]) -> None:
+    """A slack one begins as a shape that hangs far below the seabed."""
+    at_rest = tether(20.0, **values)
+    ground = values.get("seabed", 20.0)
+    assert max(getattr(at_rest, f"z_{n}") for n in range(11)) == pytest.approx(ground, abs=0.05)
+    assert at_rest.tension_top < 60.0
+    later = tether(22.0, **values)
+    assert later.tension_top == pytest.approx(at_rest.tension_top, abs=0.5)
+
+
+def test_what_the_seabed_and_the_numbers_forbid_is_told() -> None:
+    below = tether(0.1, seabed=4.0)
+    assert "the upper end begins 5 m deep, below the seabed at 4 m" in below.log_queue[0].msg
+    made: Any = slave_of("tether")(instance_name="tether")
+    made.mass = 0.0
+    assert not made.do_step(0.0, 0.1)
+    assert made.log_queue[0].msg == "MoorDyn: mass must be more than 0"
+
+
+@pytest.mark.parametrize("h", [0.02, 0.1])
+def test_the_velocity_of_an_end_may_follow_from_its_place(h: float) -> None:
+    """A tip that heaves by half a metre in 8 s."""
+    pytest.importorskip("moordyn")
+    tensions = []
+    for difference in (False, True):
+        made: Any = slave_of("tether")(instance_name="tether")
+        vars(made).update(length=30.0, mass=0.3, x_bottom=25.0, z_bottom=15.0, difference_top=difference)
+        some = []
+        for n in range(round(24.0 / h)):
+            made.z_top, omega = 0.5 * sin(pi / 4.0 * n * h), pi / 4.0
+            made.vg_D_top = 0.0 if difference else 0.5 * omega * cos(omega * n * h)
+            assert made.do_step(n * h, h)
+            some.append(made.tension_top)
+        made.terminate()
+        tensions.append(np.array(some[round(8.0 / h) :]))
+    assert np.ptp(tensions[0]) > 45.0
+    np.testing.assert_allclose(tensions[1], tensions[0], rtol=0.002)
+
+
 def test_steps_that_differ_in_their_last_bits_make_no_difference() -> None:
     """Those of an importer that counts in nanoseconds do."""
     first, second = tether(0.5), tether(0.5, step=0.05 + 1e-15)
-    assert all(getattr(first, name) == getattr(second, name) for name in slave_of("tether").variables)
+    assert all(getattr(first, name) == getattr(second, name) for name in first.variables)
 
 
 def test_the_peak_of_a_snap_load_grows_with_the_step_as_the_page_says() -> None:
@@ -159,6 +265,37 @@ def test_a_step_that_moordyn_cannot_do_is_refused() -> None:
     assert not made.do_step(0.0, 0.1)
     assert made.log_queue[0].msg.startswith("MoorDyn: ")
     made.terminate()
+
+
+# ---- A battery -------------------------------------------------------------------------------------------------------
+
+
+def test_a_battery_ends_after_the_time_of_peukerts_law() -> None:
+    """148 W at 14.8 V are 10 A; 18 A.h, stated for 20 h, then last 20 (18 / (20 10))^1.1 h."""
+    battery: Any = slave_of("battery")(instance_name="battery")
+    values = {"E_full": 14.8, "E_empty": 14.8, "capacity": 18.0, "resistance": 0.0, "peukert": 1.1}
+    vars(battery).update(values, hotel_load=48.0, electric_power=100.0)
+    battery.exit_initialization_mode()
+    assert battery.voltage == 14.8
+    steps = 0
+    while not battery.empty:
+        assert battery.do_step(10.0 * steps, 10.0)
+        steps += 1
+    assert battery.electric_current == pytest.approx(10.0)
+    assert 10.0 * steps == pytest.approx(3600.0 * 20.0 * (18.0 / (20.0 * 10.0)) ** 1.1, abs=10.0)
+    battery.do_step(0.0, 10.0)
+    assert [one.msg for one in battery.log_queue] == ["the battery is empty: its 18 A.h have been drawn"]
+
+
+def test_a_battery_gives_at_most_the_power_at_half_of_its_voltage() -> None:
+    battery: Any = slave_of("battery")(instance_name="battery")
+    vars(battery).update(E_full=16.0, resistance=0.1, hotel_load=0.0, capacity=1e6)
+    for power, voltage, overloaded in ((600.0, 8.0 + sqrt(64.0 - 60.0), False), (700.0, 8.0, True)):
+        battery.electric_power = power
+        battery.do_step(0.0, 1.0)
+        assert battery.voltage == pytest.approx(voltage, rel=1e-3)
+        assert battery.overloaded is overloaded
+    assert "overloaded: 700 W" in battery.log_queue[0].msg
 
 
 # ---- A system that is run --------------------------------------------------------------------------------------------
@@ -206,7 +343,7 @@ def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     # Half the step: V_N of the first half a step before.
     halved = run_system(structure, tmp_path, names, 1.0, 3, parts=2).rows
     assert halved[:, 1].tolist() == [0.5, 1.0 - 0.5 * 0.125, 1.0 - 0.5 * 0.375, 1.0 - 0.5 * 0.5]
-    half = half_step(rows, halved)
+    half = half_step(rows, halved, ["m/s", "m/s"])
     assert half.largest.tolist() == [0.0, 0.0625]
     assert half.typical.tolist() == [0.0, pytest.approx(0.0625 / np.sqrt(2.0) / 0.5)]
     assert half.shares.tolist() == [0.0, 0.125, 0.125, 0.0]

@@ -1,7 +1,9 @@
 """Plans of systems: what is connected, and what does not fit, in one line each; nothing is written then."""
 
+import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
 from fmpy.ssp.ssd import read_ssd
@@ -47,7 +49,13 @@ fmu = "foreign.fmu"
 LAST = '["a.y", "b.u"],'
 
 
-_companion = cache(companions.companion)
+@cache
+def _of_shape(name: str, shape: str) -> bytes:
+    return companions.companion(name, **json.loads(shape))
+
+
+def _companion(name: str, **shape: Any) -> bytes:
+    return _of_shape(name, json.dumps(shape))
 
 
 def _read_here(path: Path, content: bytes, where: str = "", **_: bool) -> Part:
@@ -98,6 +106,56 @@ WRONG = {
     "two outputs": (LAST, '["rov.current", "rov.current"],', "member V_N is an input of rov.current and an input of"),
     "an input twice": (LAST, '["rov.x", "water.z"],', "water.z takes one connection, and connect#4 connects it too"),
     "a port twice": (LAST, '["tether.bottom", "rov.point_bow"],', "takes one connection, and connect#1 connects"),
+    "a factor between ports": (
+        '"tether.bottom"]',
+        '"tether.bottom", -1.0]',
+        "rov.point_bow and tether.bottom are terminals, which take no factor",
+    ),
+    "a force one way": (
+        '["rov.point_bow", "tether.bottom"]',
+        ", ".join(f'["tether.F_{d}_bottom", "rov.F_{d}_bow"]' for d in "NED"),
+        "connect: rov.point_bow is connected by half: nothing is connected to tether.x_bottom",
+    ),
+    "a place without the force": (
+        '["rov.point_bow", "tether.bottom"]',
+        ", ".join(f'["rov.{name}_bow", "tether.{name}_bottom"]' for name in ("x", "y", "z", "vg_N", "vg_E", "vg_D")),
+        "connect: tether.bottom is connected by half: nothing is connected to rov.F_N_bow",
+    ),
+    "a velocity without a place": (
+        LAST,
+        '["rov.vg_N_bow", "tether.vg_N_top"],',
+        "connect: tether.top is connected by half: nothing is connected to tether.x_top",
+    ),
+    "a port of nothing": (
+        'fmu = "foreign.fmu"',
+        'fmu = "foreign.fmu"\nport = { tip = { x = "yy" } }',
+        "component.a.port.tip: the FMU has no variable or terminal 'yy'",
+    ),
+    "a port with the name of a variable": (
+        'fmu = "foreign.fmu"',
+        'fmu = "foreign.fmu"\nport = { y = ["y"] }',
+        "component.a.port.y: the FMU has a variable or a terminal of this name",
+    ),
+    "a port that is a number": (
+        'fmu = "foreign.fmu"',
+        'fmu = "foreign.fmu"\nport = { tip = { x = ["y", 0.0] } }',
+        "must be { member = ",
+    ),
+    "a port of the plan by half": (
+        "length = 20.0 }",
+        'length = 20.0 }\nport = { tip = { x = "vg_D_top", vg_N = "vg_N_top" } }',
+        "connect: tether.tip is connected by half: nothing is connected to tether.vg_D_top",
+    ),
+    "a file that nobody reads": (
+        'companion = "tether"',
+        'companion = "tether"\nfile = "foreign.fmu"',
+        "component.tether.file: the companion tether takes no file",
+    ),
+    "two seabeds": (
+        "length = 20.0 }\n[component.water]",
+        "length = 20.0, seabed = 20 }\n[component.water]\nstart = { seabed = 30 }",
+        "component.tether.start.seabed = 20: component.water.start.seabed is 30.0: there is one seabed",
+    ),
     "a loop": (LAST, '["a.y", "b.u"], ["b.y", "a.u"],', "connect: a.y -> b.u -> b.y -> a.u -> a.y is a loop without"),
     "a loop of one": (LAST, '["a.y", "a.u"],', "connect: a.y -> a.u -> a.y is a loop without delay"),
     "a start value of nothing": ("length = 20.0", "lenght = 20.0", "tether.start.lenght = 20.0: the FMU has no"),
@@ -162,6 +220,65 @@ def test_a_port_that_is_forgotten_is_told(capsys: pytest.CaptureFixture[str]) ->
     Path("plan.toml").write_text("\n".join(lines), encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp"]) == 0
     assert "rov: the port point_bow is not connected, so its inputs keep" in capsys.readouterr().err
+
+
+MANY = """
+step = 0.1
+stop_time = 1.0
+connect = [
+  ["b.point_bow", "two.bottom"], ["rov.point_bow", "one.bottom"], ["crane.tip", "one.top"],
+  ["water.current", "b.current"], ["water.current", "rov.current"], ["water.profile", "one.profile"],
+  ["two.profile", "water.profile"], ["deep.current", "cage.water"], ["cage.water", "deep.pose"],
+]
+[component.rov]
+vehicle = "videoray"
+point = { bow = [0.2, 0.0, -0.1] }
+start = { z = 3.0 }
+[component.b]
+vehicle = "videoray"
+point = { bow = [0.2, 0.0, -0.1] }
+[component.one]
+companion = "tether"
+start = { seabed = 12.0 }
+[component.two]
+companion = "tether"
+[component.water]
+companion = "current"
+file = "water.csv"
+[component.deep]
+companion = "current"
+[component.crane]
+fmu = "metres.fmu"
+port = { tip = { z = ["y", -0.3048] } }
+[component.cage]
+companion = "current"
+port = { water = { z = "V_N", V_N = "z" } }
+"""
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_field_and_ports_of_the_plan_are_handed_on() -> None:
+    """The water serves both vehicles where they are, and both tethers with all rows of its file and the seabed."""
+    rows = [f"0,{z},0.1,0" for z in range(40)]
+    Path("water.csv").write_text("\n".join(["time,z,V_N,V_E", *rows]), encoding="utf-8")
+    unlike = MANY.replace('"V_N", V_N = "z"', '["V_N", 10.0], V_N = ["z", 0.1]')
+    Path("plan.toml").write_text(unlike, encoding="utf-8")
+    plan = load_system_plan(Path("plan.toml"))
+    found = system.made(plan, Path("plan.toml"))
+    sources = {one.end: one for one in found.connections}
+    assert sources["water", "z"].start == ("b", "z"), "the first one that is served has the plain names"
+    assert sources["water", "z_rov"].start == ("rov", "z")
+    assert sources["b", "V_N"].start == ("water", "V_N")
+    assert sources["rov", "V_N"].start == ("water", "V_N_rov")
+    assert sources["one", "depth_41"].start == sources["two", "depth_41"].start == ("water", "depth_41")
+    assert ("one", "depth_42") not in sources
+    assert found.values["water"]["seabed"] == 12.0
+    assert sources["one", "z_top"] == (("crane", "y"), ("one", "z_top"), -0.3048)
+    assert found.values["one"] == {"seabed": 12.0, "difference_top": True}
+    assert sources["deep", "z"] == (("cage", "V_N"), ("deep", "z"), 10.0)
+    assert sources["cage", "z"] == (("deep", "V_N"), ("cage", "z"), 10.0), "a member is 0.1 of this variable"
+    told = [*system.unconnected(plan, found)]
+    assert "one: the velocity of top is the change of its place, because it is not connected" in told
 
 
 @pytest.mark.usefixtures("folder")
@@ -251,7 +368,7 @@ def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     content = companions.companion(name)
     assert companions.companion(name) == content
     part = read_part(Path(name), content, is_ours=True)
-    slave = companions.slave_of(name)
+    slave = companions.slave_of(name)(instance_name=name)
     assert part.variables.keys() == slave.variables.keys()
     for variable, (causality, start, unit, text) in slave.variables.items():
         v = part.variables[variable]
@@ -268,7 +385,7 @@ def test_the_list_names_every_companion_with_its_variables(capsys: pytest.Captur
     printed = capsys.readouterr().out
     for name in companions.COMPANIONS:
         assert f"{name}: {companions.slave_of(name).description}" in printed
-        assert all(variable in printed for variable in companions.slave_of(name).variables)
+        assert all(variable in printed for variable in companions.slave_of(name)(instance_name=name).variables)
 
 
 @pytest.mark.usefixtures("folder")

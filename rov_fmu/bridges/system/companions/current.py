@@ -1,8 +1,11 @@
-"""A current that depends on depth and time, as a PythonFMU slave, for a vehicle and for its tether.
+"""A current that depends on depth and time, as a PythonFMU slave, for vehicles and tethers.
 
 Without a file it is V(z) = speed (1 - z / seabed)^exponent in one direction, which grows within `rise`. The exponent
 is 1/7 in a tidal stream, and 0 makes the water move alike at all depths. A file has rows of time, depth and velocity:
 between them the velocity is on straight lines, and outside of them it is that of the nearest row.
+
+Each vehicle has a place in the water, where it asks for the velocity. A tether gets the profile as a whole: the levels
+between which the velocity is on straight lines. They are the rows of the file, or lie close where the profile bends.
 """
 
 import json
@@ -12,25 +15,35 @@ from pathlib import Path
 
 from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
-LEVELS = range(1, 7)
+LEVELS = 16  # at least; a file may have more rows
 
 # name: causality, start, unit, description
 VARIABLES: dict[str, tuple[str, float, str, str]] = {
-    "z": ("input", 0.0, "m", "Depth of the vehicle"),
-    "V_N": ("output", 0.0, "m/s", "Velocity of the water at this depth, northward"),
-    "V_E": ("output", 0.0, "m/s", "Velocity of the water at this depth, eastward"),
     "speed": ("parameter", 0.3, "m/s", "Speed at the surface; without a file"),
     "direction": ("parameter", 0.0, "rad", "Direction that the water runs to, from north to east; without a file"),
     "exponent": ("parameter", 1.0 / 7.0, "1", "Exponent of the profile; without a file"),
     "rise": ("parameter", 0.0, "s", "Time in which the current grows from nothing; without a file"),
     "seabed": ("parameter", 100.0, "m", "Depth of the seabed, to which the levels reach"),
 }
-PROFILE = {
-    f"{name}_{n}": ("output", 0.0, unit, f"{what} at level {n} of the water, level 1 at the top")
-    for n in LEVELS
-    for name, unit, what in (("depth", "m", "Depth"), ("V_N", "m/s", "Current north"), ("V_E", "m/s", "Current east"))
-}
-VARIABLES |= PROFILE
+WATER = (("V_N", "northward"), ("V_E", "eastward"), ("V_D", "downward"))
+
+
+def place(suffix: str) -> dict[str, tuple[str, float, str, str]]:
+    """Return the variables of a place in the water."""
+    found = {f"z{suffix}": ("input", 0.0, "m", "Depth of the vehicle")}
+    return found | {
+        f"{name}{suffix}": ("output", 0.0, "m/s", f"Velocity of the water there, {to}") for name, to in WATER
+    }
+
+
+def profile(levels: int) -> dict[str, tuple[str, float, str, str]]:
+    """Return the variables of the levels."""
+    found = {}
+    for n in range(1, levels + 1):
+        found[f"depth_{n}"] = ("output", 0.0, "m", f"Depth of level {n} of the water, level 1 at the top")
+        found |= {f"{name}_{n}": ("output", 0.0, "m/s", f"Velocity at level {n}, {to}") for name, to in WATER}
+    return found
+
 
 Rows = list[list[float]]
 
@@ -41,12 +54,11 @@ class Current(Fmi2Slave):  # type: ignore[misc]
     author = "rov-fmu"
     description = "A current that depends on depth and time"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
-    variables = VARIABLES
-    columns = ("time", "z", "V_N", "V_E")
-    """Those of a file, which becomes table.json: for each time the depth and the velocity of each row."""
-    terminals = (("pose", ("z",)), ("current", ("V_N", "V_E")), ("profile", tuple(PROFILE)))
+    columns = ("time", "z", "V_N", "V_E", "V_D")
+    """Those of a file, of which V_D may be left out. Its rows are those of shape.json, by their times."""
+    places = (("pose", ("z",)), ("current", ("V_N", "V_E", "V_D")))
+    """The terminals that each vehicle has for itself; those of all but the first end with its name."""
 
-    z: float
     speed: float
     direction: float
     exponent: float
@@ -55,14 +67,23 @@ class Current(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        for name, (causality, start, _, text) in VARIABLES.items():
+        file = Path(str(arguments.get("resources")), "shape.json")
+        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        self.times: list[float] = [time for time, _ in shape.get("rows", ())]
+        self.profiles: list[Rows] = [rows for _, rows in shape.get("rows", ())]
+        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
+        self.levels = profile(max(LEVELS, shape.get("levels", 0)))
+        self.variables = place("") | VARIABLES | self.levels
+        self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = [("profile", [*self.levels], ())]
+        for suffix in self.suffixes:
+            self.variables |= place(suffix)
+            for port, names in self.places:
+                self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
+        for name, (causality, start, _, text) in self.variables.items():
             setattr(self, name, start)
             changes = Fmi2Variability.tunable if causality == "parameter" else Fmi2Variability.continuous
             kind = {"causality": Fmi2Causality[causality], "variability": changes}
             self.register_variable(Real(name, description=text, **kind))
-        table = Path(str(arguments.get("resources")), "table.json")
-        rows: list[tuple[float, Rows]] = json.loads(table.read_text("utf-8")) if table.is_file() else []
-        self.times, self.profiles = [time for time, _ in rows], [profile for _, profile in rows]
 
     def exit_initialization_mode(self) -> None:
         """Begin with the water at the start."""
@@ -74,23 +95,46 @@ class Current(Fmi2Slave):  # type: ignore[misc]
         return True
 
     def _set(self, t: float) -> None:
-        self.V_N, self.V_E = self._velocity(t, self.z)
-        for n in LEVELS:
-            depth = self.seabed * (n - 1) / (len(LEVELS) - 1)
-            for name, value in zip(("depth", "V_N", "V_E"), (depth, *self._velocity(t, depth)), strict=True):
-                setattr(self, f"{name}_{n}", value)
+        for suffix in self.suffixes:
+            self._put(suffix, self._velocity(t, getattr(self, f"z{suffix}")))
+        depths = self._depths(t)
+        for n in range(1, len(self.levels) // 4 + 1):
+            depth = depths[min(n, len(depths)) - 1]
+            setattr(self, f"depth_{n}", depth)
+            self._put(f"_{n}", self._velocity(t, depth))
+
+    def _put(self, suffix: str, velocity: list[float]) -> None:
+        for (name, _), value in zip(WATER, velocity, strict=True):
+            setattr(self, f"{name}{suffix}", value)
+
+    def _depths(self, t: float) -> list[float]:
+        """Return the depths of the levels, from above to the seabed."""
+        if not self.times:  # the profile bends most at the seabed
+            return [self.seabed * (1.0 - (1.0 - n / (LEVELS - 1)) ** 4) for n in range(LEVELS)]
+        before, after = self._around(t)
+        depths = depths_of(self.profiles[before], self.profiles[after])
+        return [*(z for z in depths if z < self.seabed), self.seabed]
+
+    def _around(self, t: float) -> tuple[int, int]:
+        """Return the numbers of the times before and after a time."""
+        n = bisect_right(self.times, t)
+        return max(n - 1, 0), min(n, len(self.times) - 1)
 
     def _velocity(self, t: float, z: float) -> list[float]:
-        """Return the velocity of the water at a depth, north and east."""
+        """Return the velocity of the water at a depth, north, east and down."""
         if not self.times:
             share = max(0.0, 1.0 - max(z, 0.0) / self.seabed) ** self.exponent
             speed = self.speed * share * (min(1.0, t / self.rise) if self.rise > 0.0 else 1.0)
-            return [speed * cos(self.direction), speed * sin(self.direction)]
-        n = bisect_right(self.times, t)
-        before, after = max(n - 1, 0), min(n, len(self.times) - 1)
+            return [speed * cos(self.direction), speed * sin(self.direction), 0.0]
+        before, after = self._around(t)
         return between(
             self.times[before], at(self.profiles[before], z), self.times[after], at(self.profiles[after], z), t
         )
+
+
+def depths_of(*profiles: Rows) -> list[float]:
+    """Return the depths of the rows of some profiles, from above."""
+    return sorted({depth for rows in profiles for depth, *_ in rows})
 
 
 def at(profile: Rows, z: float) -> list[float]:

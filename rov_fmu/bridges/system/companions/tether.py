@@ -3,23 +3,29 @@
 Each end is a port: place and velocity over ground go in, and the force that the tether exerts there comes out. An end
 that is not connected stays where it starts. The tether hangs at rest when the first step begins, and pulls from the
 second step on. Places are north, east and down from the surface; in MoorDyn x is north, y west, z up.
+
+The seabed pushes with GROUND for each metre of depth and diameter, and damps as much as brings a node to rest soonest:
+MoorDyn's own damping is so large that a node would need some 100 times smaller substeps.
 """
 
-from itertools import pairwise
-from math import ceil, hypot, sqrt
+import json
+from bisect import bisect_right
+from math import ceil, hypot, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pythonfmu import DefaultExperiment, Fmi2Slave, Real
+from pythonfmu import Boolean, DefaultExperiment, Fmi2Slave, Real
 from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
 
-SEGMENTS, SHOWN, LEVELS = 20, 11, range(1, 7)  # of the line, the points of its shape, the levels of the water
+SEGMENTS, SHOWN, LEVELS = 20, 11, 16  # of the line, the points of its shape, the levels of the water at least
 SUBSTEP = 0.2  # of the time in which a wave of tension passes a segment: twice as much can be unstable
+GROUND = 1e5  # stiffness of the seabed, Pa/m
+DEPTH = 100.0  # of the seabed, where nothing tells it, m
 ENDS = {"top": "upper", "bottom": "lower"}
 AXES = (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down"))
 
 # name: causality, start, unit, description
-VARIABLES: dict[str, tuple[str, float, str, str]] = {
+VARIABLES: dict[str, tuple[str, float | bool, str, str]] = {
     "length": ("parameter", 60.0, "m", "Length without tension"),
     "diameter": ("parameter", 0.0076, "m", "Diameter"),
     "mass": ("parameter", 0.0465, "kg/m", "Mass over length; 0.0465 floats with the default diameter"),
@@ -27,23 +33,30 @@ VARIABLES: dict[str, tuple[str, float, str, str]] = {
     "C_d": ("parameter", 1.2, "1", "Drag coefficient across the tether"),
     "C_d_along": ("parameter", 0.02, "1", "Drag coefficient along the tether"),
     "rho": ("parameter", 1025.0, "kg/m3", "Density of the water"),
-    "seabed": ("parameter", 100.0, "m", "Depth of the seabed"),
+    "seabed": ("parameter", 0.0, "m", f"Depth of the seabed; 0: of the lowest level, or {DEPTH:g} m without levels"),
 }
 for end, words in ENDS.items():
     VARIABLES |= {f"F_{d}_{end}": ("output", 0.0, "N", f"Force at the {words} end, positive {to}") for d, _, to in AXES}
     VARIABLES |= {f"{x}_{end}": ("input", 0.0, "m", f"Position of the {words} end, {to}") for _, x, to in AXES}
     VARIABLES |= {f"vg_{d}_{end}": ("input", 0.0, "m/s", f"Velocity of the {words} end, {to}") for d, _, to in AXES}
     VARIABLES[f"tension_{end}"] = ("output", 0.0, "N", f"Size of the force at the {words} end")
-PROFILE = {
-    f"{name}_{n}": ("input", 0.0, unit, f"{what} at level {n} of the water, level 1 at the top")
-    for n in LEVELS
-    for name, unit, what in (("depth", "m", "Depth"), ("V_N", "m/s", "Current north"), ("V_E", "m/s", "Current east"))
-}
-VARIABLES |= PROFILE | {
+    about = f"The velocity of the {words} end is the change of its position, and vg is not read"
+    VARIABLES[f"difference_{end}"] = ("parameter", False, "1", about)
+VARIABLES |= {
     f"{x}_{n}": ("output", 0.0, "m", f"Shape: {to}, {n}/{SHOWN - 1} along from the upper end")
     for n in range(SHOWN)
     for _, x, to in AXES
 }
+
+
+def profile(levels: int) -> dict[str, tuple[str, float | bool, str, str]]:
+    """Return the variables of the levels of the water. The last one is that above the first one which is no deeper."""
+    found: dict[str, tuple[str, float | bool, str, str]] = {}
+    for n in range(1, levels + 1):
+        found[f"depth_{n}"] = ("input", 0.0, "m", f"Depth of level {n} of the water, level 1 at the top")
+        found |= {f"V_{d}_{n}": ("input", 0.0, "m/s", f"Velocity of the water at level {n}, {to}") for d, _, to in AXES}
+    return found
+
 
 FILE = """tether
 --- LINE TYPES ---
@@ -62,7 +75,9 @@ Line LineType NodeA NodeB UnstrLen NumSegs Outputs
 --- OPTIONS ---
 {substep} dtM
 1 disableOutput
-{seabed} WtrDpth
+{ground} WtrDpth
+{stiffness} kBot
+{damping} cBot
 {rho} rho
 1 WaveKin
 --- END ---
@@ -75,34 +90,38 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
     author = "rov-fmu"
     description = "A tether between two points in flowing water (MoorDyn)"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
-    variables = VARIABLES
     needs = "moordyn"
     points = tuple(ENDS)
-    terminals = (("profile", tuple(PROFILE)),)
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
         self.system: object = None
-        for name, (causality, start, _, text) in VARIABLES.items():
+        self.history: list[list[float]] = []
+        file = Path(str(arguments.get("resources")), "shape.json")
+        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        self.levels = max(LEVELS, shape.get("levels", 0))
+        self.variables = VARIABLES | profile(self.levels)
+        self.terminals = (("profile", tuple(profile(self.levels))),)
+        for name, (causality, start, _, text) in self.variables.items():
             setattr(self, name, start)
             changes = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
             kind = {"causality": Fmi2Causality[causality], "variability": changes}
-            self.register_variable(Real(name, description=text, **kind))
+            self.register_variable((Boolean if start is False else Real)(name, description=text, **kind))
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
         # Steps of an importer that counts in ns differ in their last bits: MoorDyn would do one substep more or less.
         t, h = round(current_time, 9), round(step_size, 9)
         places = self._of_ends("xyz", "{}_{}")
+        levels = self._levels()
         try:
             if self.system is None:
-                self._begin(places, h)
+                self._begin(places, levels, h)
             own, moordyn = self.__dict__, self.moordyn
             nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)
-            levels = [[getattr(self, f"{name}_{n}") for name in ("depth", "V_N", "V_E")] for n in LEVELS]
             water = [current(levels, -z) for _, _, z in nodes]
             moordyn.ExternalWaveKinSet(self.system, water, [[0.0, 0.0, 0.0]] * len(nodes), t)
-            forces = moordyn.Step(self.system, places, self._of_ends("NED", "vg_{}_{}"), t, h)
+            forces = moordyn.Step(self.system, places, self._velocities(places, h), t, h)
         except (ImportError, RuntimeError) as error:
             self.log(f"MoorDyn: {error}", Fmi2Status.error)
             return False
@@ -120,20 +139,58 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         if self.system is not None:
             self.moordyn.Close(self.system)
 
-    def _begin(self, ends: list[float], h: float) -> None:
+    def _begin(self, ends: list[float], levels: list[list[float]], h: float) -> None:
         """Find the tether at rest between its ends."""
         import moordyn
 
         self.moordyn = moordyn
         own = self.__dict__
-        substep = h / ceil(h / (SUBSTEP * own["length"] / SEGMENTS * sqrt(own["mass"] / own["EA"])))
+        if wrong := [name for name in ("length", "diameter", "mass", "EA") if not own[name] > 0.0]:
+            raise RuntimeError(f"{wrong[0]} must be more than 0")
+        ground = own["seabed"] or levels[-1][0] or DEPTH
+        for n, end in enumerate(ENDS.values()):
+            if -ends[3 * n + 2] > ground:
+                words = f"the {end} end begins {-ends[3 * n + 2]:.4g} m deep, below the seabed at {ground:.4g} m"
+                self.log(words, Fmi2Status.warning)
+        moved = own["mass"] + own["rho"] * pi / 4.0 * own["diameter"] ** 2  # with the water that moves across, kg/m
+        stiffness = GROUND * own["diameter"]
+        times = own["length"] / SEGMENTS * sqrt(own["mass"] / own["EA"]), sqrt(moved / stiffness)
+        file_of = {
+            "ends": ends,
+            "segments": SEGMENTS,
+            "substep": h / ceil(h / (SUBSTEP * min(times))),
+            "ground": ground,
+            "stiffness": GROUND,
+            "damping": 2.0 * sqrt(stiffness * moved) / own["diameter"],
+        }
         with TemporaryDirectory() as folder:
             file = Path(folder, "tether.txt")
-            file.write_text(FILE.format(**own, ends=ends, segments=SEGMENTS, substep=substep), encoding="utf-8")
+            file.write_text(FILE.format(**own, **file_of), encoding="utf-8")
             self.system = moordyn.Create(str(file))
             moordyn.SetVerbosity(self.system, moordyn.LEVEL_NONE)
             moordyn.Init(self.system, ends, [0.0] * 6)
         moordyn.ExternalWaveKinInit(self.system)
+
+    def _levels(self) -> list[list[float]]:
+        """Return depth and velocity of each level that is deeper than the one above it."""
+        found: list[list[float]] = []
+        for n in range(1, self.levels + 1):
+            level = [getattr(self, f"{name}_{n}") for name in ("depth", "V_N", "V_E", "V_D")]
+            if found and level[0] <= found[-1][0]:
+                break
+            found.append(level)
+        return found
+
+    def _velocities(self, places: list[float], h: float) -> list[float]:
+        """Return the velocities of both ends in the frame of MoorDyn; three places give them to 2nd order."""
+        self.history = [*self.history, places][-3:]
+        factors = {1: (0.0,), 2: (-1.0, 1.0), 3: (0.5, -2.0, 1.5)}[len(self.history)]
+        found = self._of_ends("NED", "vg_{}_{}")
+        for n, end in enumerate(ENDS):
+            if getattr(self, f"difference_{end}"):
+                for k in range(3 * n, 3 * n + 3):
+                    found[k] = sum(factor * past[k] for factor, past in zip(factors, self.history, strict=True)) / h
+        return found
 
     def _of_ends(self, axes: str, name: str) -> list[float]:
         """Return a vector of both ends in the frame of MoorDyn."""
@@ -143,8 +200,8 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
 
 def current(levels: list[list[float]], depth: float) -> list[float]:
     """Return the velocity of the water at a depth in the frame of MoorDyn, on straight lines between the levels."""
-    V_N, V_E = levels[-1][1:] if depth > levels[0][0] else levels[0][1:]
-    for (a, *above), (b, *below) in pairwise(levels):
-        if a < depth <= b:
-            V_N, V_E = (p + (depth - a) / (b - a) * (q - p) for p, q in zip(above, below, strict=True))
-    return [V_N, -V_E, 0.0]
+    n = bisect_right([level[0] for level in levels], depth)
+    (a, *above), (b, *below) = levels[max(n - 1, 0)], levels[min(n, len(levels) - 1)]
+    share = (depth - a) / (b - a) if b > a else 0.0
+    V_N, V_E, V_D = (p + share * (q - p) for p, q in zip(above, below, strict=True))
+    return [V_N, -V_E, -V_D]
