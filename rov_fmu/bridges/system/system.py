@@ -20,6 +20,7 @@ from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
 from rov_fmu.build import build
+from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.interrupts import temporary_folder
@@ -58,6 +59,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         connections += _depths(served, parts, values, connections)
         wrong += _seabeds(parts, values, connections)
         wrong += _differences(parts, values, connections)
+        wrong += _waves_that_pass(plan, parts, connections)
     if not wrong and (around := loop(connections, parts)):
         reason = "is a loop without delay, for each output follows its input at once: put an FMU with a state into it"
         wrong.append(f"connect: {' -> '.join(around)} {reason}")
@@ -286,6 +288,15 @@ def _differences(
             values[component][flag] = True
         else:
             yield f"connect: {component}.{port} is connected by half: nothing is connected to {lacking}"
+
+
+def _waves_that_pass(plan: SystemPlan, parts: Mapping[str, Part], connections: Sequence[Connection]) -> Iterator[str]:
+    """Yield a line for each vehicle in a seaway that keeps its velocity over ground where the water's changes."""
+    for one in connections:
+        (sea, _), (rov, name) = one.start, one.end
+        if plan.component[sea].companion == "seaway" and name == "V_N" and before_name(name) in parts[rov].variables:
+            reason = 'has current = "passes", which would lose the load of the waves: leave it out'
+            yield f"connect: {sea}.current moves {rov}, whose vehicle file {reason}"
 
 
 def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:

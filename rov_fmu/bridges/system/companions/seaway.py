@@ -1,0 +1,185 @@
+"""A seaway as a PythonFMU slave: linear waves with a JONSWAP spectrum, as vehicles feel them.
+
+Each vehicle has a place in the water, where it gets the velocity and the acceleration of the water and the elevation of
+the surface. It holds them over the next step, so they are those of the middle of that step, where the vehicle then is
+if it moves on as in the last step. The waves add to the current that is connected.
+
+A wave a cos(phase) of the surface has the phase omega t - k (x cos theta + y sin theta) + epsilon, and omega^2 =
+g k tanh(k d) in water of the depth d (Airy's theory; DNV-RP-C205, 3.2.2). The frequencies are drawn within equal parts
+of the range that has the energy of the spectrum, so that the sea does not repeat, and 4 sqrt(m_0) is H_s. Above the
+mean level, the water moves as there.
+"""
+
+import json
+from math import cos, exp, pi, sin, sqrt, tanh
+from pathlib import Path
+from random import Random
+
+from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+
+G = 9.80665
+RANGE = (0.5, 4.0)  # of the frequencies over that of the peak: 99.7 % of the energy for gamma = 3.3
+MOST = 1000  # components
+WORDS = ("northward", "eastward", "downward")
+PLACE, STEADY = ("x", "y", "z"), ("U_N", "U_E", "U_D")
+VELOCITY, ACCELERATION = ("V_N", "V_E", "V_D"), ("A_N", "A_E", "A_D")
+
+# name: causality, start, unit, description
+VARIABLES: dict[str, tuple[str, float, str, str]] = {
+    "H_s": ("parameter", 0.5, "m", "Significant wave height; of one component, the height from trough to crest"),
+    "T_p": ("parameter", 6.0, "s", "Period of the peak of the spectrum"),
+    "gamma": ("parameter", 3.3, "1", "Peak enhancement factor of JONSWAP; 1 is Pierson and Moskowitz"),
+    "direction": ("parameter", 0.0, "rad", "Direction that the waves run to, from north to east"),
+    "spreading": ("parameter", 0.0, "1", "Exponent n of the spreading cos^n around it; 0: all run alike"),
+    "components": ("parameter", 100.0, "1", f"Number of components, 1 to {MOST}; 1 is a regular wave"),
+    "seed": ("parameter", 1.0, "1", "Which sea of this spectrum: a whole number"),
+    "seabed": ("parameter", 1000.0, "m", "Depth of the water"),
+    "step": ("parameter", 0.02, "s", "Step at the start, of whose middle the first values are"),
+}
+
+
+def place(suffix: str) -> dict[str, tuple[str, float, str, str]]:
+    """Return the variables of a place in the water."""
+    groups = (
+        (PLACE, "input", "m", "Position of the vehicle"),
+        (STEADY, "input", "m/s", "Current to which the waves add"),
+        (VELOCITY, "output", "m/s", "Velocity of the water there"),
+        (ACCELERATION, "output", "m/s2", "Acceleration of the water there"),
+    )
+    found = {
+        f"{name}{suffix}": (causality, 0.0, unit, f"{what}, {to}")
+        for names, causality, unit, what in groups
+        for name, to in zip(names, WORDS, strict=True)
+    }
+    return found | {f"elevation{suffix}": ("output", 0.0, "m", "Elevation of the surface there, positive upward")}
+
+
+class Seaway(Fmi2Slave):  # type: ignore[misc]
+    """The slave."""
+
+    author = "rov-fmu"
+    description = "A seaway: linear waves with a JONSWAP spectrum"
+    default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
+    places = (("pose", PLACE), ("current", VELOCITY), ("waves", (*ACCELERATION, "elevation")))
+    """The terminals that each vehicle has for itself; those of all but the first end with its name."""
+
+    H_s: float
+    T_p: float
+    gamma: float
+    direction: float
+    spreading: float
+    components: float
+    seed: float
+    seabed: float
+    step: float
+
+    def __init__(self, **arguments: object) -> None:
+        super().__init__(**arguments)
+        file = Path(str(arguments.get("resources")), "shape.json")
+        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        self.before: dict[str, list[float]] = {}
+        self.waves: list[tuple[float, ...]] = []
+        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
+        self.variables = place("") | VARIABLES
+        self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = []
+        for suffix in self.suffixes:
+            self.variables |= place(suffix)
+            for port, names in self.places:
+                self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
+            self.terminals.append((f"steady{suffix}", [f"{name}{suffix}" for name in STEADY], VELOCITY))
+        for name, (causality, start, _, text) in self.variables.items():
+            setattr(self, name, start)
+            changes = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
+            kind = {"causality": Fmi2Causality[causality], "variability": changes}
+            self.register_variable(Real(name, description=text, **kind))
+
+    def exit_initialization_mode(self) -> None:
+        """Draw the waves, and begin with the middle of the first step. Raises ValueError for a sea that cannot be."""
+        least = {
+            "H_s": 0.0,
+            "T_p": 0.01,
+            "gamma": 1.0,
+            "spreading": 0.0,
+            "components": 1.0,
+            "seabed": 0.01,
+            "step": 0.0,
+        }
+        for name, low in least.items():
+            if not low <= getattr(self, name) < 1e6:
+                raise ValueError(f"{name} must be from {low:g} to 1e6: {getattr(self, name):g}")
+        self.waves = self._drawn()
+        for suffix in self.suffixes:
+            self._put(suffix, 0.5 * self.step, self._place(suffix))
+
+    def do_step(self, current_time: float, step_size: float) -> bool:
+        """Compute the water in the middle of the next step."""
+        for suffix in self.suffixes:
+            now = self._place(suffix)
+            before = self.before.get(suffix, now)
+            ahead = [x + 1.5 * (x - was) for x, was in zip(now, before, strict=True)]
+            self._put(suffix, current_time + 1.5 * step_size, ahead)
+            self.before[suffix] = now
+        return True
+
+    def _place(self, suffix: str) -> list[float]:
+        return [getattr(self, f"{x}{suffix}") for x in PLACE]
+
+    def _drawn(self) -> list[tuple[float, ...]]:
+        """Return amplitude, angular frequency, wave number, direction and phase of each component."""
+        count, peak = min(MOST, round(self.components)), 2.0 * pi / self.T_p
+        if count == 1:
+            return [(0.5 * self.H_s, peak, self._wave_number(peak), self.direction, 0.0)]
+        random, (low, high) = Random(round(self.seed)), RANGE
+        width = (high - low) * peak / count
+        found = []
+        for n in range(count):
+            omega = low * peak + (n + random.random()) * width
+            found.append((self._density(omega / peak), omega, self._direction(random), 2.0 * pi * random.random()))
+        energy = sum(density for density, *_ in found)
+        return [
+            (self.H_s * sqrt(density / (8.0 * energy)), omega, self._wave_number(omega), direction, phase)
+            for density, omega, direction, phase in found
+        ]
+
+    def _density(self, ratio: float) -> float:
+        """Return the spectral density at omega/omega_p but for a factor (JONSWAP; DNV-RP-C205, 3.5.5)."""
+        sigma = 0.07 if ratio <= 1.0 else 0.09
+        enhanced = self.gamma ** exp(-0.5 * ((ratio - 1.0) / sigma) ** 2)
+        return float(ratio**-5 * exp(-1.25 * ratio**-4) * enhanced)
+
+    def _direction(self, random: Random) -> float:
+        """Return a direction that is drawn from cos^n around the main one, by rejection."""
+        while self.spreading > 0.0:
+            off = pi * (random.random() - 0.5)
+            if random.random() <= cos(off) ** self.spreading:
+                return self.direction + off
+        return self.direction
+
+    def _wave_number(self, omega: float) -> float:
+        """Return k with omega^2 = g k tanh(k d), by Newton's method from above."""
+        deep = omega**2 / G
+        k = deep / sqrt(tanh(deep * self.seabed))
+        for _ in range(20):
+            t = tanh(k * self.seabed)
+            k -= (k * t - deep) / (t + k * self.seabed * (1.0 - t * t))
+        return k
+
+    def _put(self, suffix: str, t: float, at: list[float]) -> None:
+        """Set the outputs of a place: sums over the components."""
+        x, y, z = at
+        V, A, elevation = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0.0
+        depth = min(max(z, 0.0), self.seabed)
+        for a, omega, k, direction, phase in self.waves:
+            north, east = cos(direction), sin(direction)
+            down, up = exp(-k * depth), exp(-k * (2.0 * self.seabed - depth))
+            along, across = ((down + s * up) / (1.0 - exp(-2.0 * k * self.seabed)) for s in (1.0, -1.0))
+            p = omega * t - k * (x * north + y * east) + phase
+            c, s = a * cos(p), a * sin(p)
+            for n, (share, value, rate) in enumerate(((north * along, c, -s), (east * along, c, -s), (across, s, c))):
+                V[n] += omega * share * value
+                A[n] += omega**2 * share * rate
+            elevation += c
+        for n, (velocity, acceleration, steady) in enumerate(zip(VELOCITY, ACCELERATION, STEADY, strict=True)):
+            setattr(self, f"{velocity}{suffix}", getattr(self, f"{steady}{suffix}") + V[n])
+            setattr(self, f"{acceleration}{suffix}", A[n])
+        setattr(self, f"elevation{suffix}", elevation)

@@ -1,0 +1,170 @@
+"""The companion `seaway` against the theory of waves, and vehicles in its water against theirs (docs/waves.md)."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from math import pi, sqrt, tanh
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from rov_fmu.bridges.system.companions.seaway import Seaway
+from rov_fmu.c.stepper import Stepper
+from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
+from rov_fmu.vehicle.writer import vehicle_text
+from tests.vehicles import a_vehicle, in_waves, passed, tied
+
+Array = NDArray[np.float64]
+G = 9.80665
+HEAVY, BLUEROV2, VIDEORAY = (load_vehicle(SHIPPED[name]) for name in ("bluerov2_heavy", "bluerov2", "videoray"))
+OUTPUTS = ("V_N", "V_E", "V_D", "A_N", "A_E", "A_D", "elevation")
+
+
+def sea(**parameters: float) -> Any:
+    made = Seaway(instance_name="sea", resources="")
+    for name, value in parameters.items():
+        setattr(made, name, value)
+    made.exit_initialization_mode()
+    return made
+
+
+def water(sea: Any, t: float, *place: float) -> Array:
+    """Return the velocity, the acceleration and the elevation of the water at a time and a place."""
+    sea._put("", t, [*place])
+    return np.array([getattr(sea, name) for name in OUTPUTS])
+
+
+@pytest.mark.parametrize(("T_p", "seed"), [(3.0, 1), (6.0, 2), (12.0, 3)])
+def test_the_sea_has_its_significant_height_and_its_mean_period(T_p: float, seed: int) -> None:
+    a, omega, _, _, phase = np.array(sea(H_s=1.5, T_p=T_p, seed=seed).waves).T
+    t = np.arange(0.0, 3600.0, 0.05 * T_p)
+    height = (a * np.cos(omega * t[:, None] + phase)).sum(axis=1)
+    assert 4.0 * height.std() == pytest.approx(1.5, rel=0.02)
+    crossings = np.count_nonzero((height[1:] > 0.0) & (height[:-1] <= 0.0))
+    # DNV-RP-C205, 3.5.5.4, has 0.7775 for gamma = 3.3; without the frequencies above 4 omega_p it is 3 % more
+    assert 3600.0 / crossings == pytest.approx(1.03 * 0.7775 * T_p, rel=0.02)
+
+
+def test_two_seeds_are_two_seas_of_one_spectrum_and_spreading_turns_the_waves() -> None:
+    one, same, other = (sea(seed=seed, spreading=4.0, direction=0.3).waves for seed in (1, 1, 2))
+    assert one == same != other
+    directions = np.array(one)[:, 3] - 0.3
+    assert np.std(directions) == pytest.approx(0.44, abs=0.08)  # of cos^4, between ±pi/2
+    assert np.mean(directions) == pytest.approx(0.0, abs=0.1)
+    assert {wave[3] for wave in sea(direction=0.3).waves} == {0.3}
+
+
+@pytest.mark.parametrize("depth", [2.0, 20.0, 1e4])
+def test_waves_of_any_depth_obey_airys_equations(depth: float) -> None:
+    """The water is incompressible, does not pass the bed, and moves with its surface; A is the change of V."""
+    made, (t, *place), h = sea(components=20, spreading=2.0, seabed=depth, T_p=5.0), (3.0, 2.0, -1.0, 1.5), 1e-4
+    for _, omega, k, *_ in made.waves:
+        assert G * k * tanh(k * depth) == pytest.approx(omega**2, rel=1e-12)
+    change = [
+        (water(made, t, *(np.array(place) + h * e)) - water(made, t, *(np.array(place) - h * e))) / (2.0 * h)
+        for e in np.eye(3)
+    ]
+    assert sum(change[n][n] for n in range(3)) == pytest.approx(0.0, abs=1e-8)
+    rate = (water(made, t + h, *place) - water(made, t - h, *place)) / (2.0 * h)
+    assert rate[:3] == pytest.approx(water(made, t, *place)[3:6], abs=1e-7)
+    assert water(made, t, *place[:2], depth)[2] == pytest.approx(0.0, abs=1e-12)
+    surface = (water(made, t + h, *place[:2], 0.0) - water(made, t - h, *place[:2], 0.0)) / (2.0 * h)
+    assert -water(made, t, *place[:2], 0.0)[2] == pytest.approx(surface[6], abs=1e-7)
+
+
+def test_the_wave_number_has_its_deep_and_shallow_limits() -> None:
+    omega = 2.0 * pi / 8.0
+    assert sea(components=1, T_p=8.0, seabed=1e4).waves[0][2] == pytest.approx(omega**2 / G, rel=1e-12)
+    assert sea(components=1, T_p=8.0, seabed=0.01).waves[0][2] == pytest.approx(omega / sqrt(G * 0.01), rel=1e-3)
+
+
+def flown(
+    rov: Vehicle,
+    made: Any,
+    h: float,
+    seconds: float,
+    start: dict[str, float],
+    pull: Callable[[Array], dict[str, float]] = lambda _: {},
+) -> Array:
+    """Return position, then velocity over ground, of a vehicle in a sea: both exchange their outputs once per step."""
+    names = [name for name in ("x", "y", "z", "vg_N", "vg_E", "vg_D") if name in rov.layout.places]
+    stepper, inputs = Stepper(rov, start, names), rov.layout.usual_inputs
+    now, path = np.array([0.0, 0.0, start["z"], 0.0, 0.0, 0.0]), []
+    made.x, made.y, made.z = now[:3]
+    made.step = h
+    made.exit_initialization_mode()
+    for n in range(round(seconds / h)):
+        path.append(now)
+        given = {name: getattr(made, name) for name in OUTPUTS if name in inputs}
+        made.x, made.y, made.z = now[:3]
+        made.do_step(n * h, h)
+        now = np.array(stepper.step([*(inputs | given | pull(now)).values()], h))
+    return np.array([*path, now])
+
+
+@pytest.mark.parametrize(("h", "limit"), [(0.02, 1e-4), (0.1, 3e-3)])
+def test_a_neutral_vehicle_follows_the_particle_of_water(h: float, limit: float) -> None:
+    rov = in_waves(without_surface(HEAVY)).with_(m_rov=13.4, W=13.4 * G, B=13.4 * G)
+    made = sea(components=1, H_s=0.5, T_p=6.0, direction=0.4)
+    path = flown(rov, made, h, 30.0, {"z": 3.0})[:, :3]
+    times = h * np.arange(len(path))
+    other = sea(components=1, H_s=0.5, T_p=6.0, direction=0.4)
+    particle = solve_ivp(
+        lambda t, y: water(other, t, *y)[:3], (0.0, times[-1]), [0.0, 0.0, 3.0], t_eval=times, rtol=1e-9, atol=1e-10
+    ).y.T
+    assert np.linalg.norm(path - particle, axis=1).max() < limit
+
+
+@pytest.mark.parametrize("rov", [HEAVY, BLUEROV2, VIDEORAY], ids=["Heavy", "BlueROV2", "VideoRay"])
+def test_a_held_vehicle_feels_the_load_of_morison(rov: Vehicle) -> None:
+    """A stiff spring holds it. The load in phase with A is that of the displaced and the added mass."""
+    layout = rov.layout
+    if "W" in rov.coefficients:
+        rov = rov.with_(W=rov["m_rov"] * G, B=rov["m_rov"] * G)
+    elif "F_0_w" in rov.coefficients:
+        rov = rov.with_(F_0_w=0.0)
+    rov = tied(in_waves(rov.with_(replace(layout, surface=False))), hook=(0.0, 0.0, 0.0))
+    made, K, h = sea(components=1, H_s=0.02, T_p=2.0), 4000.0, 0.004
+    path = flown(rov, made, h, 12.0, {"z": 3.0}, lambda now: {"F_N_hook": -K * (now[0] + 0.5 * h * now[3])})
+    t, omega = h * np.arange(len(path)), 2.0 * pi / 2.0
+    late = t > 8.0 - 1e-9
+    inertia = rov["m_rov"] + rov.coefficients.get("m_a_u", 0.0)
+    load = (K - inertia * omega**2) * path[late, 0]  # what the spring pulls, and what the motion that it allows takes
+    basis = np.stack([np.cos(omega * t[late]), np.sin(omega * t[late]), np.ones(late.sum())], axis=1)
+    _, in_phase, _ = np.linalg.lstsq(basis, load, rcond=None)[0]
+    acceleration = 0.01 * omega**2 * np.exp(-3.0 * omega**2 / G)  # A_N = -a omega^2 e^(-kz) sin(omega t)
+    assert -in_phase == pytest.approx(inertia * acceleration, rel=0.01)
+
+
+def test_a_floating_vehicle_rides_a_long_wave() -> None:
+    path = flown(in_waves(BLUEROV2), sea(components=1, H_s=0.5, T_p=12.0), 0.02, 48.0, {"z": 0.0})
+    other = sea(components=1, H_s=0.5, T_p=12.0)
+    late = range(1200, len(path), 10)
+    surface = np.array([water(other, 0.02 * n, *path[n, :3])[6] for n in late])
+    assert np.ptp(path[[*late], 2]) == pytest.approx(np.ptp(surface), rel=0.02)
+    assert np.abs(path[[*late], 2] + surface - np.mean(path[[*late], 2] + surface)).max() < 0.02 * np.ptp(surface)
+
+
+@pytest.mark.parametrize(("name", "value"), [("T_p", 0.0), ("H_s", -1.0), ("seabed", float("nan"))])
+def test_a_sea_that_cannot_be_is_refused(name: str, value: float) -> None:
+    with pytest.raises(ValueError, match=f"{name} must be from"):
+        sea(**{name: value})
+
+
+def test_a_vehicle_that_the_current_passes_is_refused_in_a_sea(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It would lose the load of the waves, (m + M_A) A."""
+    monkeypatch.chdir(tmp_path)
+    Path("rov.toml").write_text(vehicle_text(passed(a_vehicle(without_surface(HEAVY)))))
+    Path("sea.toml").write_text(
+        'step = 0.1\nstop_time = 1\nconnect = [["sea.current", "rov.current"]]\n'
+        '[component.rov]\nvehicle = "rov.toml"\n[component.sea]\ncompanion = "seaway"\n'
+    )
+    assert main(["system", "sea.toml", "-o", "sea.ssp"]) == 2
+    assert 'sea.current moves rov, whose vehicle file has current = "passes"' in capsys.readouterr().err
