@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.gym import RovVectorEnv
-from rov_fmu.bridges.mujoco import load, mujoco_files
+from rov_fmu.bridges.mujoco import load, mujoco_files, mujoco_texts
 from rov_fmu.bridges.mujoco.plugin import show
 from rov_fmu.c.compile import host_platform
 from rov_fmu.cli import main
@@ -34,7 +34,7 @@ from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, without_surface
 from tests.commands import BARE, ROOT
 from tests.often import spread
-from tests.vehicles import VEHICLES, frictionless, passed, tied
+from tests.vehicles import VEHICLES, frictionless, in_waves, passed, tied
 from verification.references.rigid_body import Body
 from verification.references.rigid_vehicle import body
 
@@ -181,6 +181,12 @@ def test_it_moves_as_the_fmu_with_errors_of_second_order(name: str) -> None:
     coarse, fine = error(name, 0.005, 2.0), error(name, 0.0025, 2.0)
     assert coarse < 1e-3
     assert coarse / fine == pytest.approx(4.0, rel=0.3)
+
+
+def test_it_has_no_inputs_of_waves() -> None:
+    vehicle, _ = loaded("bluerov2_heavy")
+    texts, plain = (mujoco_texts(rov, "heavy", {}, {}) for rov in (in_waves(vehicle), vehicle))
+    assert texts == plain
 
 
 def test_a_current_that_changes_passes_it_as_the_fmu_of_such_a_vehicle() -> None:

@@ -108,7 +108,7 @@ def mujoco_texts(
     """Return the files of the folder without its libraries, as `mujoco_files` does."""
     sdf.check_body(vehicle, "MuJoCo")
     points = [_point(vehicle, point) for point in vehicle.layout.points]
-    vehicle = _without_points(vehicle)
+    vehicle = _in_mujoco(vehicle)
     layout = vehicle.layout
     example = layout.example(layout.axes[0].axis)
     hull = hull_size(vehicle) / 2.0
@@ -193,9 +193,12 @@ def _c_of(files: Mapping[str, str]) -> dict[str, str]:
     return {name: text for name, text in files.items() if name.endswith((".c", ".h"))}
 
 
-def _without_points(vehicle: Vehicle) -> Vehicle:
-    """Return the vehicle without its points. MuJoCo has sites there, at which tendons and forces act on the body."""
-    return vehicle.with_(replace(vehicle.layout, points=()))
+def _in_mujoco(vehicle: Vehicle) -> Vehicle:
+    """Return the vehicle without its points, where MuJoCo has sites at which forces act on the body, and without waves.
+
+    Where the velocity of the water changes, the body keeps its velocity over ground, which loses what A does with it.
+    """
+    return vehicle.with_(replace(vehicle.layout, points=(), waves=False))
 
 
 def _point(vehicle: Vehicle, point: Point) -> dict[str, object]:
@@ -215,7 +218,7 @@ def _notes(vehicle: Vehicle) -> list[str]:
     layout = vehicle.layout
     notes = [
         "Steps of `Euler`, `implicit` or `implicitfast` are taken; with `RK4`, those of `Euler`",
-        "The water has no surface",
+        "The water has no surface and no waves",
     ]
     if lacking := [name for name in AXES if name not in layout.by_name]:
         notes.append(

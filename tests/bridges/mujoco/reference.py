@@ -12,7 +12,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from rov_fmu.bridges.mujoco import _without_points
+from rov_fmu.bridges.mujoco import _in_mujoco
 from rov_fmu.bridges.mujoco.plugin import Numbers, _rigid_mass, _step_by_parts
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.expression import PYTHON, written
@@ -29,7 +29,7 @@ _HEAVY, _REST = 1e6, 0.1
 
 def equation_in_python(vehicle: Vehicle) -> Any:
     """Return the equation of a vehicle and its names."""
-    layout = _without_points(vehicle).layout
+    layout = _in_mujoco(vehicle).layout
     module = {name: getattr(math, name) for name in printed._IMPORTED} | {"interpolated": interpolated}
     exec(compile(_accelerations_text(layout), "<equation>", "exec"), module)
     return SimpleNamespace(
