@@ -15,7 +15,6 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import push_along
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -50,10 +49,8 @@ def tested_commands(objective: Objective, z: Array) -> dict[Axis, Tested]:
         if not isinstance(row.subject, Curve) and row.quantity == "V_ss":
             ends[row.subject][row.command > 0.0] = max(ends[row.subject][row.command > 0.0], abs(row.command))
     for n, sampled in enumerate(objective.logs):
-        commands = dict(zip(sampled.layout.inputs, objective.table.followed(z, sampled).T, strict=True))
-        of_thrusters = {t.name: commands[f"u_{t.name}"] for t in sampled.layout.thrusters}
         for axis, speeds in objective.reached(z, n).items():
-            push = push_along(sampled.layout, axis, of_thrusters)
+            push = objective.table.push(z, sampled, axis)
             for is_ahead, (sign, reached) in enumerate(zip((-1.0, 1.0), speeds, strict=True)):
                 if reached:
                     held = sign * shapes.motions(vehicle, axis, sign * _GRID).response()[0]

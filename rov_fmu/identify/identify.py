@@ -172,6 +172,7 @@ def _axis(
         next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
+        soon=fit.structure[axis].soon if axis in fit.structure else 0.0,
         disturbances=[d for d in found.disturbances if d.concerns(axis)],
         effects=acting,
         slips=[s for s in found.slips if s.file in files],

@@ -48,6 +48,17 @@ CONSTANTS = {
         "errors over 10 s beyond the noise, as a standard error of ln of an answer",
         "without it, 14 of 19 *good* axes of vehicles that break the equation had an answer outside its interval",
     ),
+    "soon": Constant(
+        1.15,
+        "errors over 2 s, relative to the noise, from which they widen intervals",
+        "0.85 to 1.16 along 45 right axes, and up to 2.98 along wrong ones",
+    ),
+    "steps": Constant(
+        1.25,
+        "χ² per degree of freedom from which steps differ in predictions over 2 s",
+        "with both, 14 of 64 axes that break the equation had an answer outside its interval, and then 4",
+    ),
+    "late steps": Constant(2.0, "the same over 10 s", "the same"),
     "contrast": Constant(
         0.2,
         "standard error of the health of a thruster by the data alone, up to which a hypothesis is about it",
@@ -511,7 +522,9 @@ class AxisResult:
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
     structure: float = 0.0
-    """The error R of the fit to all data, relative to what noise explains (`search.structure`)."""
+    """The error R of the fit to all data over 10 s, relative to what noise explains (`search.structure`)."""
+    soon: float = 0.0
+    """That over 2 s, relative to the noise alone (`search.with_steps`); 0 where nothing tells it."""
     disturbances: Sequence[Disturbance] = ()
     effects: Sequence[Effect] = ()
     slips: Sequence[Slip] = ()

@@ -25,6 +25,7 @@ from rov_fmu.identify.likelihood.search import (
     unseen_errors,
     windows,
     with_shared,
+    with_steps,
 )
 from rov_fmu.identify.likelihood.solve import (
     MOST_STEPS,
@@ -77,7 +78,7 @@ class Fit:
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the data do not tell apart."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
-    """The errors of predictions over 10 s along each axis."""
+    """The errors of predictions along each axis."""
 
     @property
     def known(self) -> Prior:
@@ -179,8 +180,8 @@ def fit_all(
     if full.table.known.bent:
         other, show = _bending(full, frozenset()), work.steps("quadratic thrust")
         file = other, minimise(other, best.z, show, near=best.data, enough=QUICK)
-    misfits = with_shared(full.table.layout, structure(full, best))
-    ratios = {axis: one.ratio for axis, one in misfits.items()}
+    misfits = with_shared(full.table.layout, with_steps(full, best, structure(full, best)))
+    ratios = {axis: one.widens for axis, one in misfits.items()}
     unseen = unseen_errors(full, best.z, before, misfits)
     posterior = posterior.widened(ratios, unseen)
     # Time constants of tables contain the lag, so that tables alone need none.

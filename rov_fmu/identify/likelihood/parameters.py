@@ -39,6 +39,7 @@ from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
+from rov_fmu.tank.columns import push_along
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _QUIETER = 2.0
@@ -386,6 +387,11 @@ class Table:
         if (numbers == numbers[0]).all():
             return _followed(sampled, *numbers[0].tolist())
         return np.array([_followed(sampled, *each) for each in numbers.tolist()])
+
+    def push(self, z: Array, sampled: SampledLog, axis: Axis) -> Array:
+        """Return the command along an axis that thrusters follow at each row, relative to all at full command."""
+        commands = dict(zip(sampled.layout.inputs, self.followed(z, sampled).T, strict=True))
+        return push_along(sampled.layout, axis, {t.name: commands[f"u_{t.name}"] for t in sampled.layout.thrusters})
 
 
 @lru_cache(64)

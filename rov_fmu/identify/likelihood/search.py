@@ -8,7 +8,7 @@ factor (Laplace approximation), with the prior probability, decides. What wins i
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import astuple, dataclass, replace
 from functools import cache, cached_property, reduce
 from itertools import islice
 from math import hypot, inf, isnan, log, nan, sqrt
@@ -36,8 +36,8 @@ from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, total
-from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, least_error, moves
-from rov_fmu.tank.arrays import Array, rms
+from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, WRONG, least_error, moves
+from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, held
 
 WINS, CLOSE = KEPT, VERY_STRONG
@@ -55,6 +55,16 @@ _FORCE, _LOUD = 0.03, 1.0
 its mean where J compares hypotheses before any fit."""
 _FARTHEST = 3.0
 """The most by which parameters adapt to a hypothesis there, in deviations of their priors."""
+_SOON = 2.0
+"""The time of predictions that tell what a fast axis does, and after a step of the commands, s."""
+_LEAST_CHANCE = {_SOON: CONSTANTS["steps"].value, AHEAD: CONSTANTS["late steps"].value}
+"""χ² per degree of freedom from which steps of the commands differ by more than noise, by the time of predictions."""
+_LEAST_STEP, _APART, _FEWEST_STEPS = 0.08, 0.6, 4
+"""The least step of a command along an axis, the time between two, s, and the fewest steps that tell their spread."""
+_FEWEST, _FEWEST_IN_STEP = 10, 6
+"""The fewest samples of a sensor that tell its errors, and those after a step."""
+_LOG_STEP, _LEAST_WEIGHT = 0.01, 0.5**-2
+"""The step of a derivative by ln of the inertia, and the least weight of what a step tells about it."""
 _BESIDE = 1e-3
 """How near the number of a hypothesis may be to its bounds, relative to the range between them."""
 _HALF = 0.5
@@ -77,17 +87,27 @@ _LONGEST_IDLE = 0.5
 
 @dataclass(frozen=True)
 class Misfit:
-    """The errors of predictions over 10 s along an axis, the largest ones of its sensors."""
+    """The errors of predictions along an axis, the largest ones of its sensors."""
 
     ratio: float = 0.0
-    """R: relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells it."""
+    """R: over 10 s, relative to the noise of the sensor. It is near 1 for a right structure, and 0 where nothing tells
+    it."""
     lack: float = 0.0
-    """Beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves. The motion
-    is that of the log in which the axis moves most: one in which it hardly moves tells little of a scale."""
+    """Over 10 s, beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves. The
+    motion is that of the log in which the axis moves most: one in which it hardly moves tells little of a scale."""
+    soon: float = 0.0
+    """R₂: over 2 s, relative to the noise alone; 0 where nothing tells it."""
+    spread: float = 0.0
+    """The standard deviation of ln of the inertia from step to step of the commands, beyond the noise."""
 
     def or_larger(self, other: "Misfit") -> "Misfit":
         """Return the larger one of each number."""
-        return Misfit(max(self.ratio, other.ratio), max(self.lack, other.lack))
+        return Misfit(*map(max, astuple(self), astuple(other)))
+
+    @property
+    def widens(self) -> float:
+        """The error by which intervals become wider."""
+        return max(self.ratio, min(self.soon, WRONG) if self.soon > CONSTANTS["soon"].value else 0.0)
 
 
 def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> dict[Axis, Misfit]:
@@ -104,10 +124,9 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     found: dict[Axis, Misfit] = {}
     errors_of = dict[tuple[Axis, bool], list[tuple[float, float]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        begin = SETTLING + _late(record)
-        usual = (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
+        begin, usual = _usual(best, n, record)
         masks = [usual & (record.sensor == number) for number in range(len(sampled.measured))]
-        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= 10 else nan for at in masks]
+        motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= _FEWEST else nan for at in masks]
         noise_of = (hypot(m.noise, objective.table.wander(best.z, sampled, m.sensor)) for m in sampled.measured)
         least = [least_error(noise, change) for noise, change in zip(noise_of, motion, strict=True)]
         is_motion = not (sampled.is_momentary or (sampled.lost and not ahead))
@@ -121,7 +140,7 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         except DivergedError:
             errors = np.full(len(record.time), inf)
         for m, at, noise, change in zip(sampled.measured, masks, least, motion, strict=True):
-            if at.sum() >= 10:
+            if at.sum() >= _FEWEST:
                 R = rms(errors[at])
                 found[m.sensor.axis] = Misfit(R).or_larger(found.get(m.sensor.axis, Misfit()))
                 if is_motion and moves(noise, change):
@@ -131,6 +150,93 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         most, motion = np.max(some, axis=0).tolist()
         found[axis] = found[axis].or_larger(Misfit(0.0, most / motion))
     return found
+
+
+def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfit]) -> dict[Axis, Misfit]:
+    """Return the misfits with what predictions over 2 s tell, and the steps of the commands within them.
+
+    Over 10 s, the noise of the sensor is at least 1 % of the motion, which hides what a fast axis does. Over 2 s, it is
+    the noise alone. Logs whose commands change between the rows tell nothing about it.
+
+    What makes each step of the commands another one, such as a wake, an inertia that grows, or lags that differ, is
+    seen by regressing the errors after a step on their derivative by ln of the inertia. If the results differ by more
+    than noise, their standard deviation beyond it (DerSimonian and Laird 1986, doi:10.1016/0197-2456(86)90046-2) is an
+    error of the inertia in any other step, which does not become smaller with the number of steps.
+    """
+    table, found = objective.table, {**misfits}
+    inertias = {axis: n for axis in table.layout.bare_axes if (n := table.index(INERTIA, axis.name)) is not None}
+    axes, indices = [*inertias], [*inertias.values()]
+    results: dict[tuple[Axis, float], list[tuple[float, float]]] = {}
+    for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
+        if sampled.is_momentary or sampled.lost:
+            continue
+        begin, usual = _usual(best, n, record)
+        for span in _LEAST_CHANCE:
+            try:
+                run = objective.run(best.z, n, begin=begin, span=span)
+                steps = np.full(len(indices), _LOG_STEP)
+                slopes = objective.changes(best.z, n, indices, steps, run, begin, span)
+            except DivergedError:
+                continue
+            part = np.floor((record.time - record.time[0] - begin) / span)
+            for number, m in enumerate(sampled.measured):
+                own, axis = record.sensor == number, m.sensor.axis
+                noise = hypot(m.noise, table.wander(best.z, sampled, m.sensor))
+                if span == _SOON and (usual & own).sum() >= _FEWEST:
+                    soon = Misfit(soon=rms(run.innovations[usual & own]) / noise)
+                    found[axis] = soon.or_larger(found.get(axis, Misfit()))
+                if axis in inertias:
+                    pairs = np.column_stack([run.innovations, slopes[:, axes.index(axis)]]) / noise
+                    drifts = 1 if m.sensor.is_velocity else 2
+                    after = _after_steps(table.push(best.z, sampled, axis), sampled.record.told, record.time)
+                    chosen = (own & (part >= 0.0) & one for one in after)
+                    every = (_of_step(pairs[at], record.time[at], part[at], drifts) for at in chosen)
+                    results.setdefault((axis, span), []).extend(one for one in every if one[1] > _LEAST_WEIGHT)
+    for (axis, span), steps_of in results.items():
+        values, weights = np.reshape(steps_of, (-1, 2)).T
+        spread = Misfit(spread=min(_spread(values, weights, _LEAST_CHANCE[span]), 1.0))
+        found[axis] = spread.or_larger(found.get(axis, Misfit()))
+    return found
+
+
+def _after_steps(push: Array, told: Array, time: Array) -> Iterator[Flags]:
+    """Yield, for each step of a command along an axis, which samples follow it within 2 s and before the next one."""
+    at = list[float]()
+    for after in told[1:][np.abs(np.diff(push)) > _LEAST_STEP].tolist():
+        if not at or after - at[-1] > _APART:
+            at.append(after)
+    for after, end in zip(at, [*at[1:], inf], strict=False):
+        yield (time >= after) & (time < min(after + _SOON, end))
+
+
+def _of_step(pairs: Array, time: Array, part: Array, drifts: int) -> tuple[float, float]:
+    """Return the change of a parameter that explains the errors after a step, and its weight; 0 where it tells nothing.
+
+    `pairs` has n errors and their derivatives, relative to the noise. A prediction does not know the velocity from
+    which it begins, nor where it is about a position. So a constant in each part of the samples is left out, and the
+    time where `drifts` is 2.
+    """
+    X = np.array([(part == one) * (time - time[0]) ** power for one in np.unique(part) for power in range(drifts)]).T
+    if len(time) < max(X.shape[-1] + 3, _FEWEST_IN_STEP):
+        return 0.0, 0.0
+    error, slope = (pairs - X @ np.linalg.lstsq(X, pairs, rcond=None)[0]).T
+    weight = float(slope @ slope)
+    return float(slope @ error) / max(weight, 1e-300), weight
+
+
+def _spread(values: Array, weights: Array, most: float) -> float:
+    """Return the standard deviation of values beyond their errors; 0 if χ² per degree of freedom is at most `most`."""
+    free, total_weight = len(values) - 1, weights.sum()
+    if free < _FEWEST_STEPS - 1:
+        return 0.0
+    chi2 = float(weights @ (values - weights @ values / total_weight) ** 2)
+    return sqrt((chi2 - free) / (total_weight - weights @ weights / total_weight)) if chi2 > most * free else 0.0
+
+
+def _usual(best: Minimum, n: int, record: Record) -> tuple[float, Flags]:
+    """Return when the predictions of a log begin, s after its first sample, and which of its samples count."""
+    begin = SETTLING + _late(record)
+    return begin, (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
 
 
 def _late(record: Record) -> float:
@@ -174,7 +280,7 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
 
     What the structure of an axis lacks acts on speeds and distances as a scale s, with which the drag is a/s² and b/s,
     and the inertia m/s. It acts on times as a scale of the inertia alone. It is as large in unseen data, so it has the
-    size of the errors over 10 s.
+    size of the errors over 10 s. The inertia also has the spread of the steps.
 
     Where commands change between the rows of a log, or rows are means, they act a small part of their window earlier or
     later along each axis, because a stick and a controller change them at other times. The axis then answers earlier or
@@ -196,7 +302,7 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
         lack = hypot(LEAST_LACK, min(CONSTANTS["lack"].value * misfit.lack, 1.0))
         scale = np.array([p.of_kind.speed_power * (p.of == axis.name) for p in parameters])
         is_inertia = np.array([p.of == axis.name and p.kind == INERTIA for p in parameters])
-        found += lack**2 * (np.outer(scale, scale) + np.diag(is_inertia))
+        found += lack**2 * np.outer(scale, scale) + np.diag((lack**2 + misfit.spread**2) * is_inertia)
         time = float(shapes.motions(vehicle, axis, np.array([_HALF])).response()[1][0])
         if widths and 0.0 < time < inf:
             found += np.diag(is_inertia * (CONSTANTS["late"].value * max(widths) / time) ** 2)

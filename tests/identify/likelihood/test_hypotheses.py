@@ -36,6 +36,8 @@ from rov_fmu.identify.likelihood.search import (
     Misfit,
     StructureFit,
     StructureSearch,
+    _after_steps,
+    _spread,
     comparison,
     fitted,
     rough,
@@ -45,6 +47,7 @@ from rov_fmu.identify.likelihood.search import (
     unseen_errors,
     windows,
     with_shared,
+    with_steps,
     worst,
 )
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise, start_of
@@ -90,6 +93,8 @@ class Fault:
     """The time constant of the rotors' speeds, s."""
     settled: float = 0.0
     """Until when the measured velocities drift away, s."""
+    inertia: float = 1.0
+    """The factor of the inertia."""
     turned: float = 0.0
     """How far the velocity sensor is turned to starboard, rad."""
 
@@ -144,6 +149,9 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
     logged = {name: rng.choice([-0.8, -0.5, -0.3, 0.0, 0.0, 0.3, 0.5, 0.8], parts[-1] + 1)[parts] for name in names}
     if fault.health != 1.0:
         whole = whole.with_(**{f"health_{fault.of}": fault.health})
+    if fault.inertia != 1.0:
+        names_of = [axis.coefficient("beta") for axis in whole.layout.bare_axes]
+        whole = whole.with_(**{name: whole[name] / fault.inertia for name in names_of})
     if fault.rotor_lag:
         whole = with_rotors(whole, fault.rotor_lag)
     acting = fault.acting(logged)
@@ -491,6 +499,48 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
 
             _, covariance, _ = replace(exact, covariance=found).numbers(logarithms)
             assert np.sqrt(np.diag(covariance)) == pytest.approx([error, error], rel=0.01)
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.15])
+def test_the_spread_of_the_inertia_from_step_to_step_is_seen(factor: float, tmp_path: Path) -> None:
+    """A dive with a larger and one with a smaller inertia, by a vehicle between both. Noise alone has next to none."""
+    random = np.random.default_rng(4)
+    some = {f"{n}.csv": dive("videoray", Fault("", inertia=factor**power), random) for n, power in enumerate((1, -1))}
+    objective = Objective.of_known(*begin(load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', some))))
+    z = objective.mean.copy()
+    kinds = np.array([p.kind for p in objective.table.parameters])
+    z[kinds == "lag"] = KINDS["lag"].low
+    z[kinds == "logging offset"] = -KINDS[
+        "lag"
+    ].low  # the vehicle has no lag, and each row is at the time of its command
+    runs = objective.runs(z)
+    best = Minimum(z, 0.0, runs, [Data.of(run, [], len(z)) for run in runs], np.eye(len(z)))
+    before = structure(objective, best)
+    after = with_steps(objective, best, before)
+    for axis in (SURGE, YAW):
+        assert after[axis].ratio == before[axis].ratio
+        assert after[axis].spread == pytest.approx(np.log(factor), rel=0.2, abs=0.02)
+    error = np.diag(unseen_errors(objective, z, {}, {YAW: Misfit(spread=0.2)}))
+    own = [p.of == "yaw" and p.kind == "inertia" for p in objective.table.parameters]
+    assert error[own] == pytest.approx(2.0 * 0.01**2 + 0.2**2)
+
+
+def test_a_step_has_the_samples_of_2_s_and_before_the_next_one() -> None:
+    """A stick that moves slowly has none, and one that moves on within 0.6 s has one."""
+    told = np.arange(0.0, 10.0, 0.1)
+    push = np.where(told < 3.0, 0.0, np.where(told < 3.45, 0.2, np.where(told < 4.0, 0.5, 0.1)))
+    spans = [told[at] for at in _after_steps(push, told, told)]
+    assert [(at[0], at[-1]) for at in spans] == [pytest.approx((3.0, 3.9)), pytest.approx((4.0, 5.9))]
+    assert not [*_after_steps(0.05 * told, told, told)]
+
+
+def test_a_spread_is_what_exceeds_the_errors() -> None:
+    """For equal errors, it is the sample variance minus theirs."""
+    values, error = np.array([0.3, -0.2, 0.1, 0.5, -0.4]), 0.1
+    weights = np.full(5, error**-2)
+    assert _spread(values, weights, 1.25) == pytest.approx(np.sqrt(np.var(values, ddof=1) - error**2))
+    assert _spread(values, weights / 20.0, 1.25) == 0.0
+    assert _spread(values[:3], weights[:3], 1.25) == 0.0
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.06])

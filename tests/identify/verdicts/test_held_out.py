@@ -17,9 +17,9 @@ from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective, Part
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
-from rov_fmu.identify.likelihood.search import structure, worst
+from rov_fmu.identify.likelihood.search import structure, with_steps, worst
 from rov_fmu.identify.likelihood.solve import minimise
-from rov_fmu.identify.result import score_of
+from rov_fmu.identify.result import CONSTANTS, score_of
 from tests.folders import DOWN, SPEED, folder_of, pulled
 from tests.identify.conftest import SHORT, with_logs
 from tests.vehicles import VIDEORAY
@@ -97,6 +97,10 @@ def test_the_structure_is_right_where_the_simulation_has_it(fit: Fit) -> None:
     ratios = structure(fit.objective, fit.best)
     assert {*ratios} == {HEAVE, YAW}
     assert worst(ratios) < 1.3
+    for axis, one in with_steps(fit.objective, fit.best, ratios).items():
+        assert (one.ratio, one.spread) == (ratios[axis].ratio, 0.0)
+        assert 0.85 < one.soon < CONSTANTS["soon"].value
+        assert one.widens == one.ratio
 
 
 def test_a_log_in_which_an_axis_hardly_moves_tells_little_of_what_the_structure_lacks(tmp_path: Path) -> None:
