@@ -65,6 +65,12 @@ def strongest_of(tested: Tested, command: float) -> float:
     return max(own if own >= LEAST_TESTED else max(tested), LEAST_TESTED)
 
 
+def beyond_tests(commands: Sequence[float], tested: Tested) -> Array:
+    """Return the standard errors of ln V_ss because commands are stronger than those of the tests."""
+    ratios = [abs(command) / strongest_of(tested, command) for command in commands]
+    return np.asarray(_EXPONENT * np.log(np.maximum(ratios, 1.0)))
+
+
 def commands_of_answers(tested: Tested) -> list[float]:
     """Return the usual commands, and the strongest tested ones that differ from them, in whole percent."""
     strongest = [round(sign * end, 2) for sign, end in zip((-1.0, 1.0), tested, strict=True) if end >= LEAST_TESTED]
@@ -145,8 +151,7 @@ def answers(
     with np.errstate(divide="ignore", invalid="ignore"):
         own = np.log(np.abs(of_file))
     narrowest = np.array([least, EXACT, EXACT, EXACT])[: own.shape[1]]
-    ratios = [abs(push) / strongest_of(tested, push) for push in pushes or commands]
-    beyond = (_EXPONENT * np.log(np.maximum(ratios, 1.0))) ** 2
+    beyond = beyond_tests(pushes or commands, tested) ** 2
     ends = [own - narrowest, own + narrowest]
     of_table = partial(logarithms, axis=axis, commands=commands, pushes=pushes, with_lag=with_lag)
 

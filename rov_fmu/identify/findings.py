@@ -374,7 +374,7 @@ def _next_tests(identification: Identification) -> list[str]:
     nothing = (
         "no single test would make an interval up to half command a tenth narrower. The widest is that of {}: {}, {}."
     )
-    if not useful and repairs(identification):
+    if not useful and (repairs(identification) or any(one.structure > ALARM for one in identification.axes)):
         return ["first repair what disagrees, and identify again: these logs cannot tell which test is useful."]
     return useful or [nothing.format(test.axis.name, test.target, _known_to(test.now)) for test in tests[:1]]
 

@@ -169,7 +169,7 @@ def _axis(
         known=_those_of(coefficients, vehicle.layout.by_name[axis.name], "beta"),
         predictions=tuple(p for p in predicted if p.axis is axis),
         points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
-        next_test=next_test(fit.objective, shown, axis, limits, answers) if answers else None,
+        next_test=next_test(fit.objective, shown, axis, limits, answers, tested) if answers else None,
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
         soon=fit.structure[axis].soon if axis in fit.structure else 0.0,

@@ -9,12 +9,12 @@ import numpy as np
 
 from rov_fmu.equation.alone import AxisAlone
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.assess import EXACT
+from rov_fmu.identify.assess import EXACT, beyond_tests
 from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
 from rov_fmu.identify.likelihood.objective import Data, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import Answer, NextTest, half_width
+from rov_fmu.identify.result import Answer, NextTest, Tested, half_width
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.description import TankLimits
 
@@ -30,12 +30,18 @@ _RATE = 10.0
 
 
 def next_test(
-    objective: Objective, posterior: Posterior, axis: Axis, limits: TankLimits, answers: Sequence[Answer]
+    objective: Objective,
+    posterior: Posterior,
+    axis: Axis,
+    limits: TankLimits,
+    answers: Sequence[Answer],
+    tested: Tested = (1.0, 1.0),
 ) -> NextTest | None:
     """Return the test that narrows the least certain steady velocity of an axis most; None without a log of it.
 
     The intervals of the answers are those that people see. They may be wider than the posterior says, for example
-    because the thrust changes slowly; a test does not narrow this part.
+    because the thrust changes slowly; a test does not narrow this part, but for what a stronger command than those
+    `tested` adds.
     """
     number = next((n for n, one in enumerate(objective.logs) if axis.name in one.layout.by_name), None)
 
@@ -54,6 +60,7 @@ def next_test(
     shown = {a.command: half_width(a.steady) for a in answers}
     now = np.array([shown.get(c, one) for c, one in zip(_COMMANDS, known, strict=True)])
     rest = np.maximum(now**2 - known**2, 0.0)
+    beyond = QUANTILE**2 * beyond_tests(_COMMANDS, tested) ** 2
     worst = int(np.argmax(now))
     scale = np.where(posterior.errors > 0.0, posterior.errors, 1.0)
     values, vectors = np.linalg.eigh(posterior.covariance / np.outer(scale, scale))
@@ -70,7 +77,8 @@ def next_test(
             continue
         covariance = root @ np.linalg.solve(np.eye(len(root)) + 0.5 * root.T @ more @ root, root.T)
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
-        then = np.sqrt(_widths(slopes, covariance) ** 2 + rest)
+        shorter = beyond - QUANTILE**2 * beyond_tests(_COMMANDS, _at_least(tested, strength)) ** 2
+        then = np.sqrt(_widths(slopes, covariance) ** 2 + np.maximum(rest - shorter, 0.0))
         target = f"the speed at {_COMMANDS[worst]:.0%}"
         tests.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
     return min(tests, key=lambda test: test.then, default=None)
@@ -79,6 +87,12 @@ def next_test(
 def _widths(slopes: Array, covariance: Array) -> Array:
     """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
     return np.asarray(np.maximum(QUANTILE * np.sqrt(variances_of(slopes, covariance)), EXACT))
+
+
+def _at_least(tested: Tested, strength: float) -> Tested:
+    """Return the strongest commands after a test of both directions."""
+    astern, ahead = tested
+    return max(astern, strength), max(ahead, strength)
 
 
 def _hold(motions: Sequence[AxisAlone], axis: Axis, limits: TankLimits) -> float:

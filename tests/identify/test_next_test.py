@@ -106,3 +106,22 @@ def test_what_is_shown_too_wide_for_another_reason_stays_so(fit: Fit) -> None:
     assert test.target == wider.target == "the speed at -50%"
     assert wider.now == pytest.approx(0.3)
     assert wider.then == pytest.approx(np.sqrt(test.then**2 + 0.3**2 - test.now**2))
+
+
+def test_a_stronger_command_removes_what_is_allowed_beyond_the_tests(fit: Fit) -> None:
+    """Dives up to 25 % leave the speed at 50 % uncertain by 0.15 ln 2, which a test of 60 % does not."""
+    posterior = replace(fit.posterior, z=fit.file.posterior.z)
+    test, allowed = proposed(fit), QUANTILE * 0.15 * np.log(2.0)
+    assert test
+    half = float(np.hypot(test.now, allowed))
+    answer = Answer(
+        HEAVE, -0.5, (-0.2, (-0.2 * (1.0 + half), -0.2 / (1.0 + half))), (1.0, (1.0, 1.0)), (1.0, (1.0, 1.0))
+    )
+    wider = next_test(fit.objective, posterior, HEAVE, TankLimits(), [answer], (0.25, 0.25))
+    weaker = next_test(fit.objective, posterior, HEAVE, TankLimits(command_max=0.4), [answer], (0.25, 0.25))
+    assert wider
+    assert weaker
+    assert wider.now == pytest.approx(half)
+    assert max(abs(command) for command, _ in plan(wider)) >= 0.6
+    assert wider.then == pytest.approx(test.then, rel=0.3)
+    assert weaker.then > QUANTILE * 0.15 * np.log(0.5 / 0.4)
