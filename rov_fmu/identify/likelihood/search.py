@@ -552,11 +552,25 @@ class StructureSearch:
         """The hypotheses that were added and made a fit worse, with the fall of J that promised something else."""
         self.rivals = list[StructureFit]()
         """The fits with hypotheses that did not win, and whose odds are near even."""
-        self.nearest = dict[Suspect, Start]()
-        """The hypotheses that are more probable than others, but do not explain the errors over 10 s."""
+        self.refuted = dict[Suspect, Start]()
+        """The hypotheses that were more probable than others, but do not explain the errors over 10 s."""
 
     def run(self) -> None:
-        """Try the hypotheses where the alarm asks for it."""
+        """Try the hypotheses where the alarm asks for it.
+
+        Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
+        else. One that explains nothing leaves, and what it kept from being tried is tried without it.
+        """
+        while True:
+            self._search()
+            doubtful = {one: z for one, z in self.now.starts.items() if not self._explains(one)}
+            if not doubtful:
+                break
+            self.refuted |= doubtful
+            self.now = max(self._valid, key=lambda one: one.score - WINS * len(one.starts))
+
+    def _search(self) -> None:
+        """Add, drop and replace hypotheses as long as the fit becomes better."""
         for _ in range(_ROUNDS):
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
@@ -564,19 +578,24 @@ class StructureSearch:
                 self.rivals = [one for one in fits if one.score > self.now.score - CLOSE]
                 break
             self.now = self._with_needed(best)
-        # Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
-        # else.
-        while doubtful := {one: z for one, z in self.now.starts.items() if not self._explains(one)}:
-            self.nearest |= doubtful
-            self.now = self._best_of(self.now.starts.keys() - doubtful.keys())
 
     @property
     def odds(self) -> dict[Suspect, float]:
         """2 ln of the posterior odds of each hypothesis that won, against the best model without it."""
-        fits = [one for one in self.tried.values() if one]
         return {
-            one: self.now.score - max(fit.score for fit in fits if one not in fit.starts) for one in self.now.starts
+            one: self.now.score - max(fit.score for fit in self._valid if one not in fit.starts)
+            for one in self.now.starts
         }
+
+    @property
+    def nearest(self) -> Starts:
+        """The hypotheses that come nearest to what the model lacks, unless others explain it."""
+        return {} if self.now.starts and worst(self.now.misfits) <= USUAL else self.refuted
+
+    @property
+    def _valid(self) -> list[StructureFit]:
+        """The fits without hypotheses that were refuted."""
+        return [one for one in self.tried.values() if one and not one.starts.keys() & self.refuted]
 
     @cached_property
     def apart(self) -> dict[str, bool]:
@@ -717,7 +736,7 @@ class StructureSearch:
         (shown if filtered > ALARM else others).extend(self._smaller[1:])
         for suspect in self.suspects if predicted > min(one.alarm for one in HYPOTHESES.values()) else ():
             (kind, of), hypothesis = suspect, HYPOTHESES[suspect[0]]
-            if (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
+            if suspect in self.refuted or (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
             for some in self._smaller:
                 excludes = any(kind == other and (not of or {*of} & {*own}) for other, own in some)

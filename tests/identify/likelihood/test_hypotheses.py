@@ -674,6 +674,7 @@ def test_a_wrong_structure_widens_what_it_concerns_and_never_beyond_the_prior(mo
 REVERSED: Suspect = "reversed commands", ("r",)
 DEAD: Suspect = "health", ("r",)
 DROP: Suspect = "voltage drop", ()
+SLEW: Suspect = "slew limit", ()
 ROTORS: Suspect = "rotor lag", ()
 
 
@@ -804,6 +805,33 @@ def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.Monkey
     search.tried[frozenset(now.starts)] = now
     monkeypatch.setattr(search, "_round", list)
     return search
+
+
+@pytest.mark.parametrize("surge", [1.4, 9.0])
+def test_what_explains_nothing_keeps_no_other_hypothesis_from_being_named(
+    surge: float, reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A slew limit wins by far, and the errors stay. Without it, a lag of the rotors explains an axis, or both."""
+    scores = {frozenset[Suspect](): 0.0, frozenset({SLEW}): 50.0, frozenset({ROTORS}): 30.0}
+    scores[frozenset({SLEW, ROTORS})] = 52.0
+    errors = {one: {SURGE: surge, YAW: 1.4} if ROTORS in one else {SURGE: 9.0, YAW: 9.0} for one in scores}
+
+    def fit(_: object, __: object, starts: Starts, *___: object) -> StructureFit:
+        key = frozenset(starts)
+        return StructureFit(starts, reversed_model, cast("Minimum", key), scores[key], scores[key])
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.structure",
+        lambda _, of, **__: {axis: Misfit(error) for axis, error in errors[of].items()},
+    )
+    monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
+    search = StructureSearch(fit(None, None, {}))
+    search.suspects, search.apart = {SLEW: (1.0,), ROTORS: (None,)}, {}
+    monkeypatch.setattr(search, "_ranked", lambda sets: [(some, 1.0) for some in sets])
+    search.run()
+    assert search.odds == {ROTORS: 30.0}
+    assert [*search.nearest] == [SLEW] * (surge > USUAL)
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])
