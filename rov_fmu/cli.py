@@ -652,7 +652,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 @click.option(
     "--part", type=_part, metavar="K/N", help="Do part K of N alone, in RESULTS/parts/K-of-N, as in --part 3/64."
 )
-@click.option("--merge", is_flag=True, help="Do no run. Move those of all parts into RESULTS, and write the page.")
+@click.option("--merge", is_flag=True, help="Do no run. Copy those of all parts into RESULTS, and write the page.")
 @click.option(
     "--mcap",
     "run",
@@ -664,7 +664,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None, **options: Any) -> None:
     """Run a vehicle or any FMU for Co-Simulation many times, as PLAN (TOML) says: a sweep, or a sample of parameters.
 
-    RESULTS gets the tables runs and trajectories (Parquet) and the page study.html. Runs that are done are kept: the
+    RESULTS gets the table runs (Parquet) and the page study.html. Runs that are done are kept: the
     same command continues a study that was interrupted.
     """
     if workers and scheduler is not None:

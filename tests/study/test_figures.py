@@ -1,13 +1,10 @@
 """Figures of responses for which they are known in closed form, and the reasons for missing ones."""
 
-import sys
 from math import exp, log, nan, pi, sqrt
-from types import FrameType
 
 import numpy as np
 import pytest
 
-from rov_fmu.study.plan.expression import Expression, Function
 from rov_fmu.study.plan.figures import Figures, unusable
 
 T = np.linspace(0.0, 40.0, 4001)
@@ -91,14 +88,3 @@ def test_a_time_that_no_run_has_is_refused_before_the_first_run_by_one_rule(func
     assert Figures({"f": f"{function}(y, 0, m)"}, T).of({"y": FIRST, "m": 41.0})[1].endswith(reason.format("41"))
     assert unusable("at(y, 50)", ["y"], ["m"], T) == reason.format("50")
     assert unusable("at(y, m + 50)", ["y"], ["m"], T) == ""
-
-
-def test_the_code_of_an_expression_has_no_builtins() -> None:
-    def builtins(_: float) -> float:
-        frame: FrameType | None = sys._getframe()
-        while frame and frame.f_code.co_filename != "<figure>":
-            frame = frame.f_back
-        assert frame
-        return float(len(frame.f_builtins))
-
-    assert Expression("f(1)", {"f": Function(builtins)}).value({}) == 0.0

@@ -76,7 +76,17 @@ def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
         last = native.trajectories([int(str(number))]).iloc[-1]
         assert (last.t, last.u, last.psi) == pytest.approx((4.0, state["u"], state["psi"]), rel=1e-9)
     runs = pd.read_parquet(native.folder / "runs")  # other tools can read a folder of Parquet files as one table
-    assert sorted(runs.columns) == ["V_N", "alpha_u", "drift", "final_x", "m_rov", "reason", "run", "status"]
+    assert sorted(runs.columns) == [
+        "V_N",
+        "alpha_u",
+        "drift",
+        "final_x",
+        "m_rov",
+        "reason",
+        "run",
+        "status",
+        "trajectory",
+    ]
 
 
 def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were(

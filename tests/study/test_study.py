@@ -1,10 +1,13 @@
 """Complete studies: the rows are those of the closed form, also after workers, FMUs or the study itself have died."""
 
+import json
 import os
+import shutil
 import signal
 import subprocess
+import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
@@ -15,6 +18,7 @@ from typing import Any, cast
 import numpy as np
 import pandas as pd
 import psutil
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
@@ -26,7 +30,7 @@ from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.study.results.store import Store
+from rov_fmu.study.results.store import Part, Store, identity, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import run_study
 from rov_fmu.study.run.work import Spent, Work
@@ -202,12 +206,12 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     results = do(runs=24).folder
     progress: list[Progress] = []
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
-    for draft in ("trajectories/part-000000090-000000099.parquet", "runs/.part-000000090-000000099.parquet.abc.part"):
-        (results / draft).write_bytes(b"of a process that was killed")
+    draft = results / "runs" / ".part-000000090-000000099.parquet.abc.part"
+    draft.write_bytes(b"of a process that was killed")
     _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
     assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent()
-    assert not [*results.glob("*/*part-000000090*")]
+    assert not draft.exists()
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
     others = {
@@ -223,29 +227,161 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     _same(Results(results), whole)
 
 
-def test_a_folder_of_another_vehicle_or_without_its_description_is_refused(tmp_path: Path) -> None:
-    store = Store(tmp_path / "results")
-    study = {"plan": {}, "fmu": "1", "vehicle": "rov", "engine": "lanes", "runs": 9}
+COLUMNS = {"parameters": ["a"], "figures": ["end"], "outputs": ["y"]}
+STUDY: dict[str, Any] = {"plan": {"seed": 1}, "fmu": "1", "vehicle": "rov", "engine": "lanes", "runs": 9}
+STUDY |= {"columns": COLUMNS}
+
+
+def _rows(first: int, end: int, study: Mapping[str, Any] = STUDY, without: str = "") -> bytes:
+    """Return the file of some runs with a trajectory each."""
+    numbers = pa.array(np.linspace(0.0, 1.0, end - first))
+    lists = pa.array([{"t": [0.0, 1.0], "y": [0.0, float(n)]} for n in range(first, end)])
+    columns = {"run": np.arange(first, end), "a": numbers, "end": numbers, "trajectory": lists}
+    return parquet(
+        pa.table({name: column for name, column in columns.items() if name != without}), identity(study), first
+    )
+
+
+def _filled(folder: Path, *spans: tuple[int, int], **change: Any) -> Store:
+    store = Store(folder)
     with store.held():
-        store.describe(study)
-        store.write(2, 4, b"", None)
+        for first, end in spans:
+            store.write(first, end, _rows(first, end, {**STUDY, **change}))
+    return store
+
+
+def test_runs_of_another_study_are_refused_and_those_that_are_missing_are_told(tmp_path: Path) -> None:
+    store = _filled(tmp_path / "results", (2, 4))
+    with store.held():
+        store.describe(STUDY)
         assert (store.missing(0, 9), store.missing(0, 4)) == ([(0, 2), (4, 9)], [(0, 2)])
         assert (store.missing(1, 3), store.missing(2, 4), store.missing(3, 6)) == ([(1, 2)], [], [(4, 6)])
         for change, reason in (
             ({"fmu": "2"}, "another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"),
             ({"engine": "fmu"}, "results: holds runs of --engine lanes: choose another folder"),
+            ({"plan": {"seed": 2}}, r"results: holds runs of another plan \(seed changed\): choose another folder"),
         ):
             with pytest.raises(FileError, match=reason):
-                store.describe({**study, **change})
+                store.describe({**STUDY, **change})
         (store.folder / "study.json").unlink()
-        with pytest.raises(FileError, match=r"has runs, but study\.json, which describes them, is missing"):
-            store.describe(study)
-    for text in ("{", "[1]", '{"format": 0}', '{"format": 2}'):
+        store.describe(STUDY)
+    for text in ("{", "[1]", '{"format": 0}', '{"format": 3}'):
         (store.folder / "study.json").write_text(text)
         with pytest.raises(FileError, match="or was written by another version of this tool"):
             store.description()
-    (store.folder / "study.json").write_text('{"format": 1}')
-    assert store.description() == {"format": 1}
+    (store.folder / "study.json").write_text('{"format": 2}')
+    assert store.description() == {"format": 2}
+
+
+def _flipped(content: bytes, place: int) -> bytes:
+    changed = bytearray(content)
+    changed[place] ^= 4
+    return bytes(changed)
+
+
+DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
+    "rows of another part": (
+        lambda path: path.write_bytes(_rows(0, 4)),
+        "has the runs 0 to 3, and not those of its name",
+    ),
+    "rows of another part beside": (
+        lambda path: path.with_name("part-000000000-000000003.parquet").write_bytes(_rows(0, 4)),
+        "has runs that .*1-of-2.* has, too",
+    ),
+    "overlap": (
+        lambda path: path.with_name("part-000000003-000000005.parquet").write_bytes(_rows(3, 6)),
+        "has runs that .*, too",
+    ),
+    "no trajectories": (
+        lambda path: path.write_bytes(_rows(4, 9, without="trajectory")),
+        "lacks trajectory.t and trajectory.y",
+    ),
+    "no figure": (lambda path: path.write_bytes(_rows(4, 9, without="end")), "lacks end"),
+    "other numbers": (lambda path: path.write_bytes(_rows(5, 9)), "has the runs 5 to 8, and not those of its name"),
+    "cut": (lambda path: path.write_bytes(path.read_bytes()[:300]), "cannot be read: Parquet magic bytes not found"),
+    "empty": (lambda path: path.write_bytes(b""), "cannot be read: "),
+    "a flipped bit": (lambda path: path.write_bytes(_flipped(path.read_bytes(), 60)), "cannot be read: "),
+    "without a footer of ours": (
+        lambda path: pd.DataFrame({"run": range(4, 9)}).to_parquet(path),
+        "cannot be read: ",
+    ),
+    "another study": (
+        lambda path: path.write_bytes(_rows(4, 9, {**STUDY, "plan": {"seed": 3}})),
+        r"holds runs of another plan \(seed changed\)",
+    ),
+}
+"""What may have become of the file of the second part, and what is told."""
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_a_part_that_is_not_whole_is_refused_by_its_name_before_anything_moves(kind: str, tmp_path: Path) -> None:
+    store = Store(tmp_path / "results")
+    stores = [_filled(tmp_path / "results" / "parts" / f"{n}-of-2", span) for n, span in ((1, (0, 4)), (2, (4, 9)))]
+    damage, reason = DAMAGE[kind]
+    (path,) = (stores[1].folder / "runs").iterdir()
+    damage(path)
+    before = {path: path.read_bytes() for path in store.folder.rglob("part-*")}
+    with store.held(), pytest.raises(FileError, match=f"2-of-2.*{reason}"):
+        store.merge(STUDY)
+    assert {path: path.read_bytes() for path in store.folder.rglob("part-*")} == before
+    shutil.rmtree(stores[1].folder)
+    _filled(stores[1].folder, (4, 9))
+    with store.held():
+        store.merge(STUDY)
+    assert store.done() == [(0, 4), (4, 9)]
+    assert not (store.folder / "parts").exists()
+
+
+def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
+    store = _filled(tmp_path, (4, 9))
+    ((path, _),) = store.checked(STUDY, whole=True).items()
+    content, rows = path.read_bytes(), pq.read_table(path)
+    refused = 0
+    for place in range(0, len(content), 17):
+        path.write_bytes(_flipped(content, place))
+        try:
+            store.checked(STUDY, whole=True)
+        except FileError:
+            refused += 1
+        else:
+            assert pq.read_table(path).equals(rows)
+    assert refused > 60
+
+
+@posix
+@pytest.mark.parametrize("at", [pytest.param(n, marks=[] if n == 3 else pytest.mark.long) for n in range(8)])
+def test_a_merge_that_is_killed_loses_nothing(at: int, tmp_path: Path) -> None:
+    """It is killed before it puts a file into its place for the n-th time, or, for the last n, while it removes the
+    parts."""
+    folder = tmp_path / "results"
+    for n in range(1, 5):
+        _filled(folder / "parts" / f"{n}-of-4", Part(n, 4).runs(9))
+    program = """
+import json, os, signal, sys, pathlib, shutil
+from rov_fmu.study.results.store import Part, Store, identity, parquet
+left, replace, unlink = [int(sys.argv[3])], pathlib.Path.replace, os.unlink
+def count(then):
+    def counted(*given, **how):
+        if left[0] == 0:
+            os.kill(os.getpid(), signal.SIGKILL)
+        left[0] -= 1
+        return then(*given, **how)
+    return counted
+pathlib.Path.replace, os.unlink = count(replace), count(unlink)
+store = Store(pathlib.Path(sys.argv[1]))
+with store.held():
+    store.merge(json.loads(sys.argv[2]))
+"""
+    words = [sys.executable, "-c", program, str(folder), json.dumps(STUDY), str(at)]
+    assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
+    there = {int(name[5:14]) for name in (path.name for path in folder.rglob("part-*.parquet"))}
+    assert there == {Part(n, 4).runs(9)[0] for n in range(1, 5)}, "every run is there"
+    store = Store(folder)
+    with store.held():
+        store.merge(STUDY)
+    assert store.done() == [(0, 2), (2, 4), (4, 6), (6, 9)]
+    assert pd.read_parquet(folder / "runs").run.tolist() == [*range(9)]
+    assert not (folder / "parts").exists()
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
@@ -317,7 +453,6 @@ def test_an_interrupted_or_killed_study_goes_on_where_it_was(
         assert without_progress(error) == interrupted
     assert 0 < len(Results(results).runs) < SLOW["runs"]
     kept = {path: path.read_bytes() for path in _parts(results)}
-    (results / "trajectories" / "part-000000000-000009999.parquet").write_bytes(b"half of it, without its runs")
     (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
     _same(study(plan, results, scheduler=scheduler), slow)
     assert all(path.read_bytes() == content for path, content in kept.items())

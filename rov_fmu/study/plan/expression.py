@@ -1,19 +1,20 @@
 """The expressions of a study's figures: a small closed language over numbers and arrays.
 
 A plan may come from anyone, so an expression can compute and do nothing else. This holds by construction: `Expression`
-accepts only the kinds of syntax that `_Reader` lists, the operators of `_KEPT` and `_CALLED`, and calls of named
-functions with a fixed number of values. There are no attributes, texts, lists, comprehensions or statements. What is
-compiled is not the text, but a new syntax tree that the reader makes; it is evaluated without Python's builtins. Every
-value is a number or an array with one dimension, and no operation gives an array that is longer than those it was
-given, so sizes and times are bounded by the length of the text.
+turns the kinds of syntax that it lists into functions of the values, and refuses all else. There are no attributes,
+texts, lists, comprehensions or statements, and functions take a fixed number of values, because further ones of NumPy
+write into arrays. Every value is a number or an array with one dimension, and no operation gives an array that is
+longer than those it was given, so sizes and times are bounded by the length of the text.
 """
 
 import ast
+import operator
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import reduce
+from functools import partial, reduce
 from inspect import Parameter, signature
+from itertools import pairwise
 from math import e, inf, nan, pi
 from types import MappingProxyType
 from typing import Any
@@ -35,8 +36,8 @@ _ALLOWED = "an expression has numbers, variables, operators, indices and the fun
 
 _Value = Any
 """A number or an array with one dimension."""
-_VALUES = "_values"
-"""The name that the values of variables and constants have in the code."""
+_Compute = Callable[[Mapping[str, _Value]], _Value]
+"""Returns the value of a part of an expression for the values of all names."""
 
 
 class ExpressionError(RovError, ValueError):
@@ -123,24 +124,16 @@ FUNCTIONS: Mapping[str, Function] = MappingProxyType(
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
 
-_KEPT = (ast.Add, ast.Sub, ast.Mult, ast.Div, ast.FloorDiv, ast.Mod)
-"""Python's own operators that an expression may use, beside signs. Of two floats, they give a float."""
-_CALLED: Mapping[str, Callable[..., _Value]] = {
-    "Pow": np.float_power,  # always gives a float, never a huge integer or a complex number
-    "BitAnd": np.logical_and,
-    "BitOr": np.logical_or,
-    "BitXor": np.logical_xor,
-    "Invert": np.logical_not,
-    "Not": lambda value: np.bool_(not _truth(value)),
-    "Lt": np.less,
-    "LtE": np.less_equal,
-    "Gt": np.greater,
-    "GtE": np.greater_equal,
-    "Eq": np.equal,
-    "NotEq": np.not_equal,
+_OPERATORS: Mapping[type[ast.AST], Callable[..., _Value]] = {
+    **{ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv},
+    **{ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.UAdd: operator.pos, ast.USub: operator.neg},
+    ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
+    **{ast.BitAnd: np.logical_and, ast.BitOr: np.logical_or, ast.BitXor: np.logical_xor, ast.Invert: np.logical_not},
+    ast.Not: lambda value: np.bool_(not _truth(value)),
+    **{ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal},
+    **{ast.Eq: np.equal, ast.NotEq: np.not_equal},
 }
-"""Functions in place of operators, by the name of the operator in the syntax tree. Comparisons are NumPy's, because
-Python's True + True is an integer, and integers would grow without end."""
+"""Comparisons are NumPy's, because Python's True + True is an integer, and integers would grow without end."""
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
@@ -150,48 +143,36 @@ class Expression:
     """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
 
     def __init__(self, text: str, functions: Mapping[str, Function]) -> None:
-        reader = _Reader(functions)
+        self.names: set[str] = set()
+        """The variables and constants that it names."""
+        self._functions, self._depth = functions, 0
         try:
             with warnings.catch_warnings():  # Python's own about the text, such as "1if" without a space
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
-            code = ast.Expression(reader.read(tree.body))
         except (RecursionError, MemoryError) as error:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels") from error
-        except (SyntaxError, UnicodeError) as error:
+        except (SyntaxError, UnicodeError, ValueError) as error:
             raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
-        self.names = frozenset(reader.names)
-        """The variables and constants that it names."""
-        self._program = compile(ast.fix_missing_locations(code), "<figure>", "eval")
-        self._globals = {"__builtins__": {}, **_HELPERS, **functions}
+        self.value = self._read(tree.body)
+        """Returns the value, a number or an array, for the values of all names. May raise any exception."""
 
-    def value(self, values: Mapping[str, _Value]) -> _Value:
-        """Return the value, a number or an array, for the values of all names. May raise any exception."""
-        return eval(self._program, self._globals, {_VALUES: values})
-
-
-class _Reader:
-    """Turns the syntax tree of a text into that of the code. Whatever is not listed here is refused."""
-
-    def __init__(self, functions: Mapping[str, Function]) -> None:
-        self.names: set[str] = set()
-        self._functions = functions
-        self._depth = 0
-
-    def read(self, node: ast.expr) -> ast.expr:
-        """Return the code of a node. Raises ExpressionError."""
+    def _read(self, node: ast.expr | None) -> _Compute:
+        """Return the function that computes a node; for None, which an end of a slice may be, it returns None."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
-        try:
-            return self._read(node)
-        finally:
-            self._depth -= 1
+        found = self._computed(node)
+        self._depth -= 1
+        return found
 
-    def _read(self, node: ast.expr) -> ast.expr:  # noqa: C901, PLR0911, PLR0912 (a case for each kind of syntax)
+    def _computed(self, node: ast.expr | None) -> _Compute:  # noqa: C901, PLR0911, PLR0912 (a case for each kind)
         match node:
+            case None:
+                return lambda _: None
             case ast.Constant(value=int() | float() as value):
-                return _constant(value)
+                number = _constant(value)
+                return lambda _: number
             case ast.Name(id=name):
                 return self._variable(name)
             case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
@@ -201,32 +182,35 @@ class _Reader:
             case ast.Subscript(
                 value=ast.Call(func=ast.Name(id="where"), args=[condition], keywords=[]), slice=ast.Constant(value=0)
             ):
-                return _call("flatnonzero", self.read(condition))
+                return self._of(np.flatnonzero, condition)
             case ast.Subscript(value=value, slice=ast.Slice(lower=lower, upper=upper, step=step)):
-                ends = (ast.Constant(None) if part is None else self.read(part) for part in (lower, upper, step))
-                return _call("slice", self.read(value), *ends)
+                return self._of(_slice, value, lower, upper, step)
             case ast.Subscript(value=value, slice=index):
-                return _call("index", self.read(value), self.read(index))
-            case ast.UnaryOp(op=ast.UAdd() | ast.USub() as op, operand=value):
-                return ast.UnaryOp(op, self.read(value))
+                return self._of(_index, value, index)
             case ast.UnaryOp(op=op, operand=value):
-                return _call(_kind(op), self.read(value))
-            case ast.BinOp(left=left, op=op, right=right) if isinstance(op, _KEPT):
-                return ast.BinOp(self.read(left), op, self.read(right))
-            case ast.BinOp(left=left, op=op, right=right) if _kind(op) in _CALLED:
-                return _call(_kind(op), self.read(left), self.read(right))
-            case ast.Compare(left=left, ops=ops, comparators=others) if {*map(_kind, ops)} <= _CALLED.keys():
-                compared = ast.Tuple([_name(f"_{_kind(op)}") for op in ops], ast.Load())
-                return _call("compare", compared, *map(self.read, (left, *others)))
-            case ast.BoolOp(op=op, values=values):
-                return ast.BoolOp(op, [_call("truth", self.read(value)) for value in values])
+                return self._of(_OPERATORS[type(op)], value)
+            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+                return self._of(_OPERATORS[type(op)], left, right)
+            case ast.Compare(left=left, ops=ops, comparators=others) if {*map(type, ops)} <= _OPERATORS.keys():
+                return self._of(partial(_compare, [_OPERATORS[type(op)] for op in ops]), left, *others)
+            case ast.BoolOp(op=op, values=operands):
+                is_enough = any if isinstance(op, ast.Or) else all
+                parts = [self._read(operand) for operand in operands]
+                return lambda values: np.bool_(is_enough(_truth(part(values)) for part in parts))
             case ast.IfExp(test=test, body=body, orelse=otherwise):
-                return ast.IfExp(_call("truth", self.read(test)), self.read(body), self.read(otherwise))
+                condition_of, one, other = map(self._read, (test, body, otherwise))
+                return lambda values: (one if _truth(condition_of(values)) else other)(values)
             case ast.Call(func=ast.Name(id=name)):
-                return self._function(name, node)
+                return self._call(name, node)
             case ast.Call(func=function):
                 raise self._refused(function)
+        assert node
         raise self._refused(node)
+
+    def _of(self, function: Callable[..., _Value], *nodes: ast.expr | None) -> _Compute:
+        """Return the function that computes nodes, and a function of their values."""
+        parts = [*map(self._read, nodes)]
+        return lambda values: function(*[part(values) for part in parts])
 
     def _refused(self, node: ast.expr) -> ExpressionError:
         text = brief(ast.unparse(node), 40)
@@ -234,20 +218,20 @@ class _Reader:
             return ExpressionError(f"{text} is an attribute, which is not allowed: write {node.attr}(...)")
         return ExpressionError(f"{text} is not allowed; {_ALLOWED}")
 
-    def _variable(self, name: str) -> ast.expr:
+    def _variable(self, name: str) -> _Compute:
         self.names.add(name)
-        return ast.Subscript(_name(_VALUES), ast.Constant(name), ast.Load())
+        return operator.itemgetter(name)
 
-    def _function(self, name: str, node: ast.Call) -> ast.expr:
+    def _call(self, name: str, node: ast.Call) -> _Compute:
         function = self._functions.get(name)
         if function is None:
             near = did_you_mean(name, self._functions)
             raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{near}")
         if name == "where" and len(node.args) == 1:
             raise ExpressionError("where with one value gives a tuple of one array: write where(...)[0]")
-        by_name = [k.arg for k in node.keywords]
+        by_name = [k.arg or "**" for k in node.keywords]
         if strange := [key for key in by_name if key not in function.parameters]:
-            raise ExpressionError(f"{name} has no parameter named {strange[0] or '**'}")
+            raise ExpressionError(f"{name} has no parameter named {strange[0]}")
         given = [*function.parameters[: len(node.args)], *by_name]
         needed = {*function.parameters[: function.least]} - {*given}
         count = len(node.args) + len(by_name)
@@ -255,44 +239,34 @@ class _Reader:
             most = f" to {function.most}" if function.most > function.least else ""
             what = f" ({', '.join(function.parameters)})" if function.parameters else ""
             raise ExpressionError(f"{name} takes {function.least}{most} values{what}, each once, and not {count}")
-        keywords = [ast.keyword(k.arg, self.read(k.value)) for k in node.keywords]
-        return ast.Call(_name(name), [*map(self.read, node.args)], keywords)
+        first = len(node.args)
+        return self._of(
+            lambda *values: function(*values[:first], **dict(zip(by_name, values[first:], strict=True))),
+            *node.args,
+            *(k.value for k in node.keywords),
+        )
 
 
-# ---- Code ------------------------------------------------------------------------------------------------------------
+# ---- Computing -------------------------------------------------------------------------------------------------------
 
 
-def _constant(value: float) -> ast.Constant:
+def _constant(value: float) -> float:
     """Return a number as a float: whole numbers would grow without end, and turn into objects in NumPy."""
     try:
-        return ast.Constant(float(value))
+        return float(value)
     except OverflowError:
         raise ExpressionError("has a number that is too large") from None
 
 
-def _kind(operator: ast.AST) -> str:
-    return type(operator).__name__
-
-
-def _name(name: str) -> ast.Name:
-    return ast.Name(name, ast.Load())
-
-
-def _call(helper: str, *values: ast.expr) -> ast.Call:
-    """Return the call of a function of `_HELPERS`, whose names no function of an expression has."""
-    return ast.Call(_name(f"_{helper}"), [*values], [])
-
-
 def _compare(operators: Sequence[Callable[..., _Value]], *values: _Value) -> _Value:
     """Compare two values, or several element by element, as in 0 < y < 1."""
-    compared = map(lambda compare, a, b: compare(a, b), operators, values, values[1:])
-    return reduce(np.logical_and, compared)
+    return reduce(np.logical_and, (of(*two) for of, two in zip(operators, pairwise(values), strict=True)))
 
 
-def _truth(value: _Value) -> np.bool_:
+def _truth(value: _Value) -> bool:
     if isinstance(value, np.ndarray):
         raise ValueError("an array is neither true nor false: write any(...) or all(...), and & or | between arrays")
-    return np.bool_(value)
+    return bool(value)
 
 
 def elements(value: _Value) -> _Value:
@@ -325,14 +299,3 @@ def _whole_number(value: _Value) -> int:
     if isinstance(value, np.ndarray) or not np.isfinite(value) or value != int(value):
         raise IndexError("an index must be a whole number")
     return int(value)
-
-
-_HELPERS: Mapping[str, Callable[..., _Value]] = {
-    **{f"_{kind}": function for kind, function in _CALLED.items()},
-    "_compare": _compare,
-    "_flatnonzero": np.flatnonzero,
-    "_index": _index,
-    "_slice": _slice,
-    "_truth": _truth,
-}
-"""What the code calls in place of operators, comparisons and indices."""

@@ -29,8 +29,10 @@ from rov_fmu.io.toml_file import (
 )
 from rov_fmu.study.plan.figures import read_expression
 
-RUN, STATUS, REASON, TIME = "run", "status", "reason", "t"
+RUN, STATUS, REASON = "run", "status", "reason"
 """The columns that the results of every study have."""
+TRAJECTORY, TIME = "trajectory", "t"
+"""The column of the trajectories, and the part of it with their times."""
 _MOST_RUNS = 100_000_000
 _MOST_STEPS = 10_000_000
 _MOST_NAMED = 10_000
@@ -260,6 +262,12 @@ class Plan(Strict):
         Annotated[str, Field(min_length=1, max_length=2000), AfterValidator(_expression)],
     ] = Field({})
     """Expressions over the outputs, by the names of their columns."""
+
+    @property
+    def files(self) -> Iterator[str]:
+        """The files that it names, from its folder; a vehicle that ships is none."""
+        file = self.input_file and self.input_file.path
+        return (name for name in (self.fmu, self.vehicle, self.system, self.vary_from, file) if name)
 
     @property
     def steps(self) -> int:

@@ -1,7 +1,7 @@
 """Combine a plan with its FMU: report what does not fit, and collect what the workers must know."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -21,6 +21,7 @@ from rov_fmu.study.plan.plan import (
     RUN,
     STATUS,
     TIME,
+    TRAJECTORY,
     Plan,
     PlanError,
     Signal,
@@ -55,6 +56,8 @@ class Job:
     """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
     trials: Array
     """The values of the first runs, with which it is found out whether the FMU can be reset."""
+    study: Mapping[str, Any] = field(default_factory=dict)
+    """Everything that the rows depend on, which their files name."""
 
 
 @dataclass(frozen=True)
@@ -244,7 +247,7 @@ def _misplaced_jumps(signal: Signal, plan: Plan, before: float) -> Iterator[tupl
 
 def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], times: Array) -> Iterator[str]:
     for name, text in plan.figures.items():
-        if name in {RUN, STATUS, REASON} | varied:
+        if name in {RUN, STATUS, REASON, TRAJECTORY} | varied:
             yield key_line(f"figures.{name}", "the results have another column of this name")
             continue
         if strange := sorted(read_expression(text).names - CONSTANTS.keys() - {TIMES} - has.keys()):

@@ -1,6 +1,6 @@
 """The results of a study as pandas data frames."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cached_property
 from math import nan
 from pathlib import Path
@@ -8,14 +8,20 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
+import pyarrow.compute as pc
 import pyarrow.dataset as ds
 
-from rov_fmu.io.messages import FileError, shown
-from rov_fmu.study.plan.plan import RUN, STATUS, TIME
-from rov_fmu.study.results.store import RUNS, TRAJECTORIES, Store
+from rov_fmu.io.messages import FileError, brief, reason_of, shown
+from rov_fmu.study.plan.plan import RUN, STATUS, TIME, TRAJECTORY
+from rov_fmu.study.results.store import RUNS, Store, old_rows
 from rov_fmu.study.run.run import FAILED, INCOMPLETE
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+_ENDED = ds.field(STATUS) != FAILED
+_FORMAT = ds.ParquetFileFormat(
+    default_fragment_scan_options=ds.ParquetFragmentScanOptions(page_checksum_verification=True)
+)
 _AT_ONCE = 5_000_000
 """The number of trajectory values in memory at a time."""
 
@@ -29,7 +35,7 @@ class Results:
     def __init__(self, folder: Path | str) -> None:
         self.folder = Path(folder)
         self._store = Store(self.folder)
-        study = self._store.description()
+        self._study = study = self._store.description()
         self.parameters: tuple[str, ...] = tuple(study["columns"]["parameters"])
         """The varied variables, columns of `runs`."""
         self.figures: tuple[str, ...] = tuple(study["columns"]["figures"])
@@ -56,37 +62,33 @@ class Results:
         """Sentences about properties of the results that a reader may not expect."""
         self.made_by: str = study["made_by"]
         """The name and the version of this tool."""
-        self._points: int = study["points"]
 
     @cached_property
     def runs(self) -> pd.DataFrame:
         """The runs in order, indexed by their number: parameters, figures, status, reason."""
-        table = self._dataset(RUNS).to_table()
-        return table.to_pandas().sort_values(RUN).set_index(RUN)  # type: ignore[no-any-return]
+        columns = {name: ds.field(name) for name in self._rows.schema.names if name != TRAJECTORY}
+        return self._table(columns).to_pandas().set_index(RUN)  # type: ignore[no-any-return]
 
     def trajectories(self, runs: Sequence[int] | None = None) -> pd.DataFrame:
         """Return the kept outputs with a row for each `run` and time `t` (s), of the given runs, or of all runs that
         ended."""
-        rows = None if runs is None else ds.field(RUN).isin([*runs])
-        table = self._dataset(TRAJECTORIES).to_table(filter=rows)
-        return table.to_pandas().sort_values([RUN, TIME], kind="stable").reset_index(drop=True)  # type: ignore[no-any-return]
+        table = self._trajectories((TIME, *self.outputs), None if runs is None else ds.field(RUN).isin([*runs]))
+        counts = pc.list_value_length(table[TIME]).to_numpy()
+        lists = {name: pc.list_flatten(table[name]) for name in (TIME, *self.outputs)}
+        return pa.table({RUN: np.repeat(table[RUN].to_numpy(), counts), **lists}).to_pandas()  # type: ignore[no-any-return]
 
     def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
         """Return quantiles of an output over the runs (columns) at each time (s, the index). Raises FileError."""
         if output not in self.outputs:
             others = _others(self.outputs, "[keep]")
             raise FileError(f"{self.folder}: no trajectory of {shown(output)} is kept{others}")
-        trajectories = self._dataset(TRAJECTORIES)
-        times = np.unique(trajectories.head(self._points, columns=[TIME])[TIME].to_numpy())
-        ended = trajectories.count_rows() // max(len(times), 1)
-        block = max(1, _AT_ONCE // max(ended, 1))
-        found = []
+        ended = self.runs.index[self.runs[STATUS] != FAILED].tolist()
+        times = self.trajectories(ended[:1])[TIME].to_numpy()
+        block, found = max(1, _AT_ONCE // max(len(ended), 1)), []
         for start in range(0, len(times), block):
-            low, high = times[start], times[min(start + block, len(times)) - 1]
-            part = trajectories.to_table(
-                columns=[TIME, output], filter=(ds.field(TIME) >= low) & (ds.field(TIME) <= high)
-            )
-            values = part[output].to_numpy().reshape(ended, -1)  # each run has all times, one after another
+            part = pc.list_slice(ds.field(TRAJECTORY, output), start, start + block)
+            lists = self._table({output: part}, _ENDED)[output]
+            values = pc.list_flatten(lists).to_numpy().reshape(len(ended), -1)
             with np.errstate(all="ignore"):  # about numbers that are infinite, or nearly so
                 found.append(np.quantile(values, quantiles, axis=0).T)
         return pd.DataFrame(np.concatenate(found), pd.Index(times, name=TIME), pd.Index(quantiles, name="quantile"))
@@ -129,11 +131,27 @@ class Results:
         """The runs that ended but lack a figure, with their reasons."""
         return self.runs[self.runs[STATUS] == INCOMPLETE]
 
-    def _dataset(self, name: str) -> Any:
-        """Open the files of a table in the order of their runs."""
-        if not (paths := sorted(str(path) for path in (self.folder / name).glob("part-*.parquet"))):
-            raise FileError(f"{self.folder / name}: holds no results yet")
-        return ds.dataset(paths)
+    def _trajectories(self, names: Sequence[str], rows: Any = None) -> pa.Table:
+        """Return lists of the times and the outputs of the runs that ended, with their numbers."""
+        columns = {RUN: ds.field(RUN), **{name: ds.field(TRAJECTORY, name) for name in names}}
+        return self._table(columns, _ENDED if rows is None else _ENDED & rows)
+
+    @cached_property
+    def _rows(self) -> Any:
+        """The rows of all files, in the order of the runs. Raises FileError about a file that cannot count."""
+        if self._study["format"] == 1:
+            return ds.dataset(old_rows(self.folder, self.outputs))
+        if not (files := self._store.checked(self._study)):
+            raise FileError(f"{self.folder / RUNS}: holds no results yet")
+        return ds.dataset([*map(str, files)], format=_FORMAT)
+
+    def _table(self, columns: Mapping[str, Any], rows: Any = None) -> pa.Table:
+        """Return columns of rows. Raises FileError about a damaged file."""
+        try:
+            return self._rows.to_table(columns=columns, filter=rows)
+        except (pa.ArrowException, OSError) as error:
+            self._store.checked(self._study, whole=True)  # it names the file
+            raise FileError(f"{self.folder / RUNS}: {brief(reason_of(error))}") from error
 
 
 def statistics(values: Any, quantiles: Sequence[float]) -> tuple[list[float], float, float]:

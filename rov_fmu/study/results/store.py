@@ -1,30 +1,46 @@
-"""The folder of a study's results: a description of the study, and Parquet files that are written whole.
+"""The folder of a study's results: a description of the study, and Parquet files with the rows of its runs.
 
-The part 3/64 of a study is such a folder of its own in it, parts/3-of-64, until all parts are merged.
+A file is written whole, and says in its footer which study it belongs to and which runs it has. It counts only if that
+is true: if its rows are those of its name, with their trajectories, if no other file has them, and if the checksums of
+its pages are right. The part 3/64 of a study is such a folder of its own in it, parts/3-of-64. To merge is to copy.
 """
 
+import hashlib
 import json
 import re
 import shutil
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
+import pyarrow as pa
+import pyarrow.parquet as pq
+
 from rov_fmu import __version__
 from rov_fmu.io.interrupts import cleaned_up
-from rov_fmu.io.messages import FileError, first_of, listed
+from rov_fmu.io.messages import FileError, brief, first_of, listed, reason_of
 from rov_fmu.io.output import Output, WriteError, put_whole, write_whole
 from rov_fmu.io.reading import read_text
+from rov_fmu.study.plan.plan import RUN, TIME, TRAJECTORY
 
-PAGE, STUDY, RUNS, TRAJECTORIES, PARTS = "study.html", "study.json", "runs", "trajectories", "parts"
-_FORMAT = 1
+PAGE, STUDY, RUNS, PARTS = "study.html", "study.json", "runs", "parts"
+_FORMAT = 2
 _LOCK = ".lock"
+_ABOUT = "rov-fmu"
+"""The key of what a file says of itself in its footer."""
 _FILE = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
 _PART = re.compile(r"([1-9]\d{0,7})-of-([1-9]\d{0,7})")
 _SHOWN = 10
 """The number of parts that a message names."""
+
+Span = tuple[int, int]
+"""The first of consecutive runs, and the one after the last."""
 
 
 @dataclass(frozen=True)
@@ -35,8 +51,8 @@ class Part:
     """From 1 to the count."""
     count: int
 
-    def runs(self, total: int) -> tuple[int, int]:
-        """Return the first run of this part, and the one after its last one. The sizes of parts differ by at most 1."""
+    def runs(self, total: int) -> Span:
+        """Return the runs of this part. The sizes of parts differ by at most 1."""
         return (self.number - 1) * total // self.count, self.number * total // self.count
 
     @staticmethod
@@ -48,6 +64,43 @@ class Part:
     def store(self, whole: Path, *, force: bool = False) -> "Store":
         """Return the folder of this part in the folder of the whole study."""
         return Store(whole / PARTS / f"{self.number}-of-{self.count}", force=force)
+
+
+def identity(study: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a study's description that its rows depend on."""
+    return {key: study[key] for key in ("plan", "fmu", "engine")}
+
+
+def parquet(table: pa.Table, study: Mapping[str, Any], first: int) -> bytes:
+    """Return the file with the rows of runs from a first one on, which belong to a study of an identity."""
+    about = {"digest": _digest(study), "first": first, "end": first + len(table), "study": study}
+    sink = pa.BufferOutputStream()
+    told = table.replace_schema_metadata({_ABOUT: json.dumps(about)})
+    pq.write_table(told, sink, compression="zstd", write_page_checksum=True)
+    return sink.getvalue().to_pybytes()  # type: ignore[no-any-return]
+
+
+def nested(ended: npt.NDArray[np.bool_], columns: Mapping[str, Any]) -> pa.StructArray:
+    """Return lists of equal length in the rows of those runs that ended, and null in the others, from columns with the
+    lists one after another."""
+    length = len(next(iter(columns.values()))) // max(ended.sum(), 1)
+    ends = pa.array(np.cumsum([0, *np.where(ended, length, 0)]).astype(np.int32))
+    lists = [pa.ListArray.from_arrays(ends, pa.array(own)) for own in columns.values()]
+    return pa.StructArray.from_arrays(lists, [*columns], mask=pa.array(~ended))
+
+
+def old_rows(folder: Path, outputs: Sequence[str]) -> pa.Table:
+    """Return the rows of a study of format 1, whose trajectories are in a folder of their own, a row for each time."""
+    table = pq.read_table(folder / RUNS).sort_by(RUN)
+    if not outputs:
+        return table
+    long = pq.read_table(folder / "trajectories").sort_by([(RUN, "ascending"), (TIME, "ascending")])
+    ended = np.isin(table[RUN].to_numpy(), long[RUN].to_numpy())
+    return table.append_column(TRAJECTORY, nested(ended, {name: long[name].to_numpy() for name in (TIME, *outputs)}))
+
+
+def _digest(study: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(study, sort_keys=True).encode()).hexdigest()
 
 
 def is_description(path: Path) -> bool:
@@ -73,7 +126,7 @@ class Store:
 
         is_new = not self.folder.exists()
         try:
-            for each in (self.folder, self.folder / RUNS, self.folder / TRAJECTORIES):
+            for each in (self.folder, self.folder / RUNS):
                 each.mkdir(parents=each.parent.name == PARTS, exist_ok=True)
             lock = locket.lock_file(str(self.folder / _LOCK), timeout=0)
             try:
@@ -91,36 +144,35 @@ class Store:
         with cleaned_up(leave, "the same command continues the study"):
             yield
 
-    def check(self, study: Mapping[str, Any]) -> None:
-        """Check that the runs in the folder, if there are any, belong to a study. Raises FileError."""
-        if not (done := self.done()):
-            return
-        if not (self.folder / STUDY).exists():
-            raise FileError(f"{self.folder}: has runs, but {STUDY}, which describes them, is missing")
-        old, new = self.description(), study
-        reason = ""
-        if (engine := old.get("engine", "fmu")) != new["engine"]:
-            reason = f"holds runs of --engine {engine}"
-        elif old["fmu"] != new["fmu"]:
-            why = (
-                f", for the vehicle {name} has changed, or rov-fmu, which builds it" if (name := new["vehicle"]) else ""
-            )
-            reason = f"holds runs of another FMU{why}"
-        elif changed := sorted(
-            key for key in {*old["plan"], *new["plan"]} if old["plan"].get(key) != new["plan"].get(key)
-        ):
-            reason = f"holds runs of another plan ({', '.join(changed)} changed)"
-        elif old["runs"] != new["runs"] and self.folder.parent.name == PARTS:
-            reason = f"is a part of {old['runs']} runs, and not of {new['runs']}"
-        if reason:
-            raise FileError(f"{self.folder}: {reason}: choose another folder")
-        if (end := done[-1][1]) > new["runs"]:
-            raise FileError(f"{self.folder}: has runs up to number {end - 1}, but the plan has only {new['runs']} runs")
+    def checked(self, study: Mapping[str, Any], *, whole: bool = False) -> dict[Path, Span]:
+        """Return the files in the order of their runs, once they are found to be those of a study.
+
+        Each file is opened; `whole`: every page is read. Raises FileError with a line for each file that cannot count.
+        """
+        found, wrong = dict[Path, Span](), list[str]()
+        for path in sorted((self.folder / RUNS).glob("part-*.parquet")):
+            try:
+                found[path] = _span(path, study, whole=whole)
+            except _ForeignError as error:
+                raise FileError(f"{self.folder}: {error}: choose another folder") from None
+            except FileError as error:
+                wrong.append(str(error))
+        if wrong:
+            raise FileError(*first_of(wrong, _SHOWN))
+        check_apart(found)
+        return found
 
     def describe(self, study: Mapping[str, Any]) -> None:
         """Check that existing runs belong to a study, and write its description. Raises FileError, WriteError."""
-        self.check(study)
-        self._clean()
+        if (self.folder / STUDY).exists() and self.done() and self.description()["format"] != _FORMAT:
+            raise FileError(f"{self.folder}: was written by an earlier version of this tool: choose another folder")
+        spans = [*self.checked(study).values()]
+        if spans and (end := spans[-1][1]) > study["runs"]:
+            raise FileError(
+                f"{self.folder}: has runs up to number {end - 1}, but the plan has only {study['runs']} runs"
+            )
+        for path in (self.folder / RUNS).glob(".part-*"):  # unfinished files of a process that was killed
+            path.unlink()
         text = json.dumps(
             {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", **study}, indent=2, ensure_ascii=False
         )
@@ -128,41 +180,39 @@ class Store:
         write_whole(output, force=self._force, is_ours=is_description)
 
     def merge(self, study: Mapping[str, Any]) -> None:
-        """Move the runs of all parts into this folder. An interrupted call is continued by the next one.
+        """Copy the runs of all parts into this folder, once all of them are found to be whole, and remove the parts.
 
-        Raises FileError about parts that are missing, not complete, or of another study; WriteError.
+        An interrupted call is continued by the next one. Raises FileError about parts that are missing, not complete,
+        damaged, or of another study; WriteError.
         """
         names = [_PART.fullmatch(path.name) for path in (self.folder / PARTS).glob("*")]
-        parts = sorted((int(name[2]), int(name[1])) for name in names if name)
+        parts = [Part(int(name[1]), int(name[2])) for name in names if name]
         if not parts:
             raise FileError(f"{self.folder}: has no parts to merge: run each with --part, as in --part 1/8")
-        (count, _), (other, _) = parts[0], parts[-1]
-        if count != other:
-            raise FileError(f"{self.folder / PARTS}: has parts of {count} and of {other}: remove those of one")
-        runs = study["runs"]
-        stores = [Part(number, count).store(self.folder) for _, number in parts]
+        runs, count = study["runs"], max(part.count for part in parts)
         with ExitStack() as locks:
-            for store in stores:
+            own, files, wrong = self.checked(study, whole=True), dict[Path, Span](), list[str]()
+            for store in (part.store(self.folder) for part in parts):
                 locks.enter_context(store.held())
-                store.check(study)
-            own = self.done()
-            files = [(store, span) for store in stores for span in store.done() if span not in own]
-            gaps = _gaps([*own, *(span for _, span in files)], 0, runs)
+                try:
+                    files |= store.checked(study, whole=True)
+                except FileError as error:
+                    wrong.append(str(error))
+            if wrong:
+                raise FileError(*"\n".join(wrong).splitlines())
+            files = {path: span for path, span in files.items() if span not in own.values()}
+            together = dict(sorted({**own, **files}.items(), key=lambda one: one[1]))
+            check_apart(together)
+            gaps = _gaps([*together.values()], 0, runs)
             if lacking := sorted({n for gap in gaps for n in Part.numbers(*gap, runs, count)}):
                 named = listed(first_of([str(number) for number in lacking], _SHOWN))
                 raise FileError(
                     f"{self.folder}: of {count} parts, these are missing or not complete: {named}. "
                     f"Run them with --part, as in --part {lacking[0]}/{count}"
                 )
-            for store, (first, end) in files:
-                if any(first < other_end and other < end for other, other_end in own):
-                    raise FileError(f"{self.folder}: has runs that {store.folder} has, too: choose another folder")
             self.describe(study)
-            for store, (first, end) in files:
-                name = _name(first, end)
-                trajectories = store.folder / TRAJECTORIES / name
-                kept = trajectories.read_bytes() if trajectories.exists() else None
-                self.write(first, end, (store.folder / RUNS / name).read_bytes(), kept)
+            for path, span in files.items():
+                self.write(*span, path.read_bytes())
         shutil.rmtree(self.folder / PARTS, ignore_errors=True)
 
     def description(self) -> dict[str, Any]:
@@ -172,7 +222,7 @@ class Store:
             raise FileError(f"{self.folder}: there is no such folder")
         try:
             found = json.loads(read_text(path))
-            known = isinstance(found, dict) and found.get("format") == _FORMAT
+            known = isinstance(found, dict) and found.get("format") in (1, _FORMAT)
         except (ValueError, RecursionError):
             known = False
         if not known:
@@ -181,36 +231,79 @@ class Store:
             )
         return dict(found)
 
-    def done(self) -> list[tuple[int, int]]:
-        """Return the ranges of finished runs in order, each from the first to the one after the last."""
+    def done(self) -> list[Span]:
+        """Return the ranges of finished runs in order, by the names of their files."""
         names = (_FILE.fullmatch(path.name) for path in (self.folder / RUNS).iterdir())
         return sorted((int(name[1]), int(name[2]) + 1) for name in names if name)
 
-    def missing(self, first: int, last: int) -> list[tuple[int, int]]:
+    def missing(self, first: int, last: int) -> list[Span]:
         """Return the ranges of runs from a first one to the one before the last one that are not done."""
         return _gaps(self.done(), first, last)
 
-    def write(self, first: int, end: int, runs: bytes, trajectories: bytes | None) -> None:
-        """Write the rows of some runs, whole or not at all. Raises WriteError."""
-        name = _name(first, end)
-        outputs = [Output(self.folder / TRAJECTORIES / name, trajectories)] if trajectories is not None else []
-        put_whole(*outputs, Output(self.folder / RUNS / name, runs))
-
-    def _clean(self) -> None:
-        """Remove unfinished files of a process that was killed."""
-        there = {path.name for path in (self.folder / RUNS).iterdir()}
-        for folder in (self.folder / RUNS, self.folder / TRAJECTORIES):
-            for path in folder.iterdir():
-                if path.name.startswith(".part-") or (_FILE.fullmatch(path.name) and path.name not in there):
-                    path.unlink()
+    def write(self, first: int, end: int, rows: bytes) -> None:
+        """Write the file with the rows of some runs, whole or not at all. Raises WriteError."""
+        put_whole(Output(self.folder / RUNS / f"part-{first:09d}-{end - 1:09d}.parquet", rows))
 
 
-def _name(first: int, end: int) -> str:
-    """Return the name of the files with the rows of some runs."""
-    return f"part-{first:09d}-{end - 1:09d}.parquet"
+# ---- One file --------------------------------------------------------------------------------------------------------
 
 
-def _gaps(done: Iterable[tuple[int, int]], first: int, last: int) -> list[tuple[int, int]]:
+class _ForeignError(FileError):
+    """A file has runs of another study; the text is the predicate of a sentence."""
+
+
+def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
+    """Return the runs of a file. Raises FileError if it cannot count."""
+    try:
+        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+            schema, table = file.schema_arrow, file.read(None if whole else [RUN])
+        about, has = json.loads(schema.metadata[_ABOUT.encode()]), {*schema.names}
+        if TRAJECTORY in has:
+            has |= {f"{TRAJECTORY}.{inner.name}" for inner in schema.field(TRAJECTORY).type}
+        first, end, of, digest = (about[key] for key in ("first", "end", "study", "digest"))
+        rows = table[RUN].to_pylist()
+        reason = _reason(of, study, digest)
+    except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, RecursionError) as error:
+        told = brief(reason_of(error).partition("\n")[0].partition(". ")[0])
+        raise FileError(f"{path}: cannot be read: {told}. Remove it, and its runs are done again") from error
+    if reason:
+        raise _ForeignError(reason)
+    name = _FILE.fullmatch(path.name)
+    if rows != [*range(first, end)] or not name or (int(name[1]), int(name[2]) + 1) != (first, end):
+        raise FileError(f"{path}: has the runs {first} to {end - 1}, and not those of its name")
+    columns = study["columns"]
+    outputs = [TIME, *columns["outputs"]] if columns["outputs"] else []
+    wanted = {*columns["parameters"], *columns["figures"], *(f"{TRAJECTORY}.{name}" for name in outputs)}
+    if lacking := sorted(wanted - has):
+        raise FileError(f"{path}: lacks {listed(lacking)}")
+    return first, end
+
+
+def _reason(old: Mapping[str, Any], study: Mapping[str, Any], digest: str) -> str:
+    """Return how the study of a file differs from a study, or an empty text."""
+    new = identity(study)
+    if old == new and digest == _digest(new):
+        return ""
+    if old["engine"] != new["engine"]:
+        return f"holds runs of --engine {old['engine']}"
+    if old["fmu"] != new["fmu"]:
+        vehicle = (
+            f", for the vehicle {name} has changed, or rov-fmu, which builds it" if (name := study["vehicle"]) else ""
+        )
+        return f"holds runs of another FMU{vehicle}"
+    plans = old["plan"], new["plan"]
+    changed = sorted(key for key in {*plans[0], *plans[1]} if plans[0].get(key) != plans[1].get(key))
+    return f"holds runs of another plan ({', '.join(changed)} changed)"
+
+
+def check_apart(files: Mapping[Path, Span]) -> None:
+    """Raise FileError if two files, which are in the order of their runs, have the same run."""
+    for (path, (_, end)), (other, (first, _)) in pairwise(files.items()):
+        if first < end:
+            raise FileError(f"{other}: has runs that {path} has, too: remove one of them")
+
+
+def _gaps(done: list[Span], first: int, last: int) -> list[Span]:
     """Return the ranges from a first number to the one before the last one that are not done."""
     found, begin = [], first
     for start, end in [*sorted(done), (last, last)]:

@@ -1,26 +1,24 @@
-"""The rows of runs, as Parquet files."""
+"""The rows of runs, as a Parquet file."""
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from rov_fmu.study.plan.figures import Array
-from rov_fmu.study.plan.plan import REASON, RUN, STATUS, TIME
+from rov_fmu.study.plan.plan import REASON, RUN, STATUS, TIME, TRAJECTORY
 from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.results.store import nested, parquet
 from rov_fmu.study.run.run import FAILED, Run
 
 
 @dataclass(frozen=True)
 class Rows:
-    """The rows of consecutive runs, as Parquet files."""
+    """The rows of consecutive runs."""
 
-    runs: bytes
-    trajectories: bytes | None
+    content: bytes
+    """The Parquet file."""
     failed: int
     turned: int
     """The number of runs in which the vehicle turned over."""
@@ -29,14 +27,7 @@ class Rows:
 
 
 def rows_of(job: Job, first: int, values: Array, found: Sequence[Run], seconds: float) -> Rows:
-    """Return the rows of runs from number `first` on, with the varied values of each."""
-    trajectories = _trajectories(job, first, found) if job.plan.kept else None
-    failed, turned = sum(run.status == FAILED for run in found), sum(run.turned for run in found)
-    return Rows(_runs(job, first, values, found), trajectories, failed, turned, seconds)
-
-
-def _runs(job: Job, first: int, values: Array, found: Sequence[Run]) -> bytes:
-    """Return the table with one row for each run.
+    """Return the rows of runs from number `first` on, with the varied values of each.
 
     Missing figures are null, because DuckDB and Polars skip it in a median but treat NaN as a large number.
     """
@@ -50,21 +41,19 @@ def _runs(job: Job, first: int, values: Array, found: Sequence[Run]) -> bytes:
     ]
     numbers = [(name, pa.float64()) for name in (*job.varied, *job.plan.figures)]
     schema = pa.schema([(RUN, pa.int64()), *numbers, (STATUS, pa.string()), (REASON, pa.string())])
-    return _parquet(pa.table([pa.array(column) for column in columns], schema=schema))
+    table = pa.table([pa.array(column) for column in columns], schema=schema)
+    if job.plan.kept:
+        table = table.append_column(TRAJECTORY, _trajectories(job, found))
+    failed, turned = sum(run.status == FAILED for run in found), sum(run.turned for run in found)
+    return Rows(parquet(table, job.study, first), failed, turned, seconds)
 
 
-def _trajectories(job: Job, first: int, found: Sequence[Run]) -> bytes:
-    """Return the table with a row for each kept time of each run that ended."""
+def _trajectories(job: Job, found: Sequence[Run]) -> pa.StructArray:
+    """Return the kept times and outputs of each run as lists; null for a run that did not end."""
     times = job.plan.times[np.array(job.plan.kept_points, int)]
-    ended = [n for n, run in enumerate(found) if run.status != FAILED]
-    table = {RUN: np.repeat(np.array(ended, int) + first, len(times)), TIME: np.tile(times, len(ended))}
+    ended = np.array([run.status != FAILED for run in found], bool)
+    lists = {TIME: np.tile(times, ended.sum())}
     for index, name in enumerate(job.plan.kept):
         none = np.empty(0, job.model.variables[name].dtype(job.model.version))
-        table[name] = np.concatenate([none, *(found[n].kept[index] for n in ended)])
-    return _parquet(pa.table(table))
-
-
-def _parquet(table: pa.Table) -> bytes:
-    file = io.BytesIO()
-    pq.write_table(table, file, compression="zstd")
-    return file.getvalue()
+        lists[name] = np.concatenate([none, *(run.kept[index] for run in found if run.status != FAILED)])
+    return nested(ended, lists)

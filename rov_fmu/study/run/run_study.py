@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -11,7 +12,7 @@ from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_mod
 from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
 from rov_fmu.study.plan.system_model import SystemModel, read_system
-from rov_fmu.study.results.store import RUNS, Part, Store
+from rov_fmu.study.results.store import RUNS, Part, Store, identity
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.run import LoadError
 from rov_fmu.study.run.system_simulator import half_step_words
@@ -43,7 +44,7 @@ def study(
     - `engine`: "lanes" for a vehicle in this process, the default for a plan with `vehicle` and no scheduler; "fmu" for
       its FMU on Dask workers. The rows are equal within rounding.
     - `part`: (3, 64) for the third of 64 parts, whose results are in `folder`/parts/3-of-64.
-    - `merge`: True to do no run, and move those of all parts into `folder`.
+    - `merge`: True to do no run, and copy those of all parts into `folder`.
     - `on_progress`: called with the state of the runs.
 
         rov_fmu.run_study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
@@ -104,7 +105,8 @@ def run_study(
             store.merge(description)
             return Spent(), store
         store.describe(description)
-        work = Work(prepared.job, prepared.design, store, *(part.runs(runs) if part else (0, runs)), on_progress)
+        job = replace(prepared.job, study=identity(description))
+        work = Work(job, prepared.design, store, *(part.runs(runs) if part else (0, runs)), on_progress)
         try:
             if not work.missing:
                 pass
@@ -135,7 +137,6 @@ def _description(plan: Plan, prepared: Prepared, model: Model, engine: Engine) -
         "engine": engine,
         "vehicle": plan.vehicle,
         "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
-        "points": len(plan.kept_points),
         "model": model.name,
         "title": plan.title,
         "units": {variable.name: variable.unit for variable in named},

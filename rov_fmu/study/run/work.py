@@ -75,7 +75,7 @@ class Work:
 
     def write(self, first: int, end: int, rows: Rows) -> None:
         """Keep the rows of runs. Raises WriteError."""
-        self.store.write(first, end, rows.runs, rows.trajectories)
+        self.store.write(first, end, rows.content)
         self.spent.runs += end - first
         self.spent.failed += rows.failed
         self.spent.turned += rows.turned
