@@ -178,9 +178,12 @@ def open_text(path: Path) -> OpenStream:
     """Return a function that opens the lines of a table, each time from the start. Raises UnreadableFileError.
 
     The text is in UTF-16 if it begins with its byte order mark, otherwise in UTF-8, or else in code page 1252, in which
-    Windows writes µ and °. The stream takes less memory than the text.
+    Windows writes µ and °. Zero bytes in it, which some loggers put into cells of text, are left out. The stream takes
+    less memory than the text.
     """
     content = read_bytes(path, UnreadableFileError, most=LARGEST)
+    if not content.startswith(_UTF_16_MARKS):
+        content = content.replace(b"\0", b"")
     for encoding in ("utf-16",) if content.startswith(_UTF_16_MARKS) else ("utf-8-sig", _CODE_PAGE):
         with suppress(UnicodeDecodeError):
             content.decode(encoding)

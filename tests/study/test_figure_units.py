@@ -8,7 +8,7 @@ import pytest
 from rov_fmu.study.plan.figure_units import unit_of
 from rov_fmu.study.plan.figures import Figures
 
-UNITS = {"x": "m", "y": "m", "u": "m/s", "psi": "rad", "c": "1", "der(u)": "m/s2", "m": "kg"}
+UNITS = {"x": "m", "y": "m", "u": "m/s", "psi": "rad", "c": "1", "der(u)": "m/s2", "rov.z": "m", "m": "kg"}
 TIMES = np.linspace(0.0, 10.0, 101)
 VALUES: dict[str, Any] = {
     "x": 3.0 + np.sin(TIMES),
@@ -18,6 +18,7 @@ VALUES: dict[str, Any] = {
     "c": 0.1 * TIMES,
     "der(u)": 0.5 * np.exp(-TIMES),
     "m": 6.0,
+    "rov.z": 2.0 + TIMES,
 }
 OF = {
     "m": [
@@ -27,6 +28,7 @@ OF = {
         "where(c > 0.5, x, y)[9]",
         "-2 * mean(x)",
         "ptp(x[t >= 5])",
+        "final(rov.z) + out['rov.z'][0]",
     ],
     "m/s": [
         "V_ss(u)",

@@ -86,6 +86,20 @@ def test_what_cannot_be_read_of_matlab(content: bytes | None, line: str, tmp_pat
     assert str(error.value) == f"{path}: {line}"
 
 
+@pytest.mark.parametrize("row", [1, 2, 60])
+@pytest.mark.parametrize("quote", ['"', ""])
+def test_zero_bytes_in_a_cell_of_text_say_nothing_about_the_format(row: int, quote: str, tmp_path: Path) -> None:
+    path, lines = tmp_path / "a.csv", ["time [s],depth [m],source"]
+    lines += [f"{n},{5 + n % 3},{quote}\0\0{quote}" if n == row else f"{n},{5 + n % 3},dvl" for n in range(1, 80)]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    (seen,) = inspect(path, [BLUEROV2])
+    assert (seen.unread, [channel.samples for channel in seen.channels]) == ({"source": "text"}, [79])
+    for content in (b"\0" + path.read_bytes(), "a,b\n1,2\n".encode("utf-16-le"), b"a;b\x01\n\0\0"):
+        path.write_bytes(content)
+        with pytest.raises(DataFileError, match="its first bytes are those of none of the formats"):
+            inspect(path, [BLUEROV2])
+
+
 def test_what_is_listed_of_headers_that_are_not_known(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     rows = ["0,1,x,1,5,5", "1,2,y,2,5,5", "2,3,z,a,5,5", "3,4,3,b,5,5", "4,5,4,,5,5"]

@@ -33,13 +33,15 @@ def unit_of(expression: str, units: Mapping[str, str]) -> str:
     return _unit(ast.parse(expression.strip(), mode="eval").body, {**units, TIME: "s"}) or ""
 
 
-def _unit(node: ast.expr, units: Mapping[str, str]) -> str | None:  # noqa: PLR0911, PLR0912 (a case for each kind)
+def _unit(node: ast.expr, units: Mapping[str, str]) -> str | None:  # noqa: C901, PLR0911, PLR0912 (a case for each kind)
     """Return the unit of a node, _PLAIN for a number, or None where it does not follow."""
     match node:
         case ast.Constant():
             return _PLAIN
         case ast.Name(id=name):
             return _PLAIN if name in CONSTANTS else units.get(name)
+        case ast.Attribute(value=ast.Name(id=component), attr=name):
+            return units.get(f"{component}.{name}")
         case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
             return units.get(variable)
         case ast.Subscript(value=ast.Call(func=ast.Name(id="where"), args=[_])):

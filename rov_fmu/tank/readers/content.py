@@ -134,7 +134,9 @@ def described(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProx
     """
     found = {}
     for topic in topics:
-        name, kind = topic.source.topic, topic.source.kind
-        found[name] = f"{kind}, {messages.get(name, len(topic.time))} messages"
-        found |= {field: range_in_words(values) for field, values in topic.full_fields() if np.isfinite(values).any()}
+        name, kind, count = topic.source.topic, topic.source.kind, len(topic.time)
+        found[name] = f"{kind}, {messages.get(name, count)} messages"
+        first = f" in the first {count} messages" if messages.get(name, count) > count else ""
+        ranges = {field: range_in_words(values) for field, values in topic.full_fields() if np.isfinite(values).any()}
+        found |= {field: f"{words}{first}" for field, words in ranges.items()}
     return found

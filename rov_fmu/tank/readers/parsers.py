@@ -60,7 +60,9 @@ class Format:
 
 
 _PYMAVLINK, _ROSBAGS = "pymavlink: pip install 'rov-fmu[mavlink]'", "rosbags and mcap: pip install 'rov-fmu[ros]'"
-TABLE = Format("a CSV file", rb"\xff\xfe|\xfe\xff|[^\0]*\Z", open_text, growth=3)
+_HEADER = rb'(?=[^\n]*[,;\t])(?:[\t !#-~\x80-\xff]|"[^"\n]*")+\r?\n'
+"""A first line of cells that are text. In a cell in quotes, and in the lines below it, a logger may have zero bytes."""
+TABLE = Format("a CSV file", rb"\xff\xfe|\xfe\xff|[^\0]*\Z|" + _HEADER, open_text, growth=3)
 FORMATS = (
     Format("a DataFlash log", rb"\xa3\x95", read=read_dataflash, needs=_PYMAVLINK),
     Format("a ULog", rb"ULog\x01\x12\x35", read=read_ulog, needs="pyulog: pip install 'rov-fmu[px4]'"),

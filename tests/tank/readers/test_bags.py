@@ -164,6 +164,13 @@ def test_messages_of_an_own_kind_are_listed_and_rov_toml_names_them(encoding: st
     (found,) = inspect(path, [BLUEROV2])
     fields = {"sensor.data.down": "1 to 1.99", "mixer.data.push": "0 to 0.25"} if encoding != "flatbuffer" else {}
     assert {"sensor": "own.Sensor, 100 messages", **fields}.items() <= found.unread.items()
+    later = ("sensor", "own.Sensor", TIME[-1] + 1.0, {"data": {"down": 9.0, "push": 9.0}})
+    (more,) = inspect(write_mcap(tmp_path / "more.mcap", encoding, [*messages, later]), [BLUEROV2])
+    assert (
+        more.unread.get("sensor.data.down", "1 to 1.99 in the first 100 messages")
+        == "1 to 1.99 in the first 100 messages"
+    )
+    assert (more.unread["sensor"], more.unread["mixer"]) == ("own.Sensor, 101 messages", "own.Mixer, 100 messages")
     if fields:
         names, _ = names_of(BLUEROV2, RovTables(topics={"sensor.data.down": "depth [m]", "mixer.data.push": "u_5 [1]"}))
         log = read_log(path, BLUEROV2, names=names).log
