@@ -1,13 +1,17 @@
 """The FMUs under test, built for this machine once in a run, by the command line of the exporter."""
 
+import atexit
 import gc
 import hashlib
 import os
+import shutil
 import sys
+import tempfile
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from tempfile import gettempdir, mkdtemp
 from typing import Any
 
 import fmpy
@@ -22,9 +26,11 @@ from rov_fmu.c.library import engine_sources
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.cli import main
 from rov_fmu.equation.layout import Layout
+from rov_fmu.io import interrupts
 from rov_fmu.tank.readers.parsers import one_parser
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.commands import ROOT
 from tests.equation.steps import Step, in_fmu
 from tests.fmi2 import Fmu
 from tests.vehicles import (
@@ -45,6 +51,9 @@ sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 VIDEORAY_LAYOUT = load_vehicle(VIDEORAY).layout
+_BEFORE = pytest.StashKey[set[Path]]()
+_NOT_LOOKED_AT = {".git", ".venv", ".hypothesis", "node_modules", ".tools", ".npm", ".m2", ".java", ".cargo"}
+"""What is no test's: other programs write it, such as the importers that .ci/run installs meanwhile."""
 compile_anew = compilation._Library.compile
 """The method that compiles a library even if another test has done so."""
 _LOGGER = fmi2CallbackLoggerTYPE(printLogMessage)
@@ -66,6 +75,33 @@ def pytest_configure(config: pytest.Config) -> None:
     settings.register_profile("same", derandomize=True, database=None, deadline=None, max_examples=40)
     settings.register_profile("fresh", derandomize=False, database=None, deadline=None, print_blob=True)
     settings.load_profile("fresh" if config.option.markexpr == "weekly" else "same")
+    if not hasattr(config, "workerinput"):
+        os.environ.setdefault("PYTEST_DEBUG_TEMPROOT", gettempdir())  # where those of tmp_path stay
+        os.environ["TMPDIR"] = tempfile.tempdir = mkdtemp(prefix="rov-fmu-tests-")
+        atexit.register(shutil.rmtree, gettempdir(), ignore_errors=True)
+        config.stash[_BEFORE] = {*_places()}
+
+
+def _places() -> Iterator[Path]:
+    """Yield what is in the temporary folder of this run, in the home, and in the checkout but for caches."""
+    yield from Path(gettempdir()).iterdir()
+    yield from (path for path in Path.home().iterdir() if path.name not in _NOT_LOOKED_AT)
+    for folder, names, files in os.walk(ROOT):
+        names[:] = [name for name in names if not name.endswith(("cache", "cache__")) and name not in _NOT_LOOKED_AT]
+        yield from (Path(folder, name) for name in (*names, *files))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_sessionfinish(session: pytest.Session) -> Iterator[None]:
+    """Fail if the tests leave something behind, when all workers have ended, and what they remove then is gone."""
+    yield
+    if hasattr(session.config, "workerinput"):
+        return
+    removed_later = {action.args[0] for action, _ in interrupts._PENDING if isinstance(action, partial)}
+    left = [path for path in _places() if path not in session.config.stash[_BEFORE] and str(path) not in removed_later]
+    if left:
+        print(f"\nThe tests left behind: {', '.join(map(str, left))}", file=sys.stderr)
+        session.exitstatus = session.exitstatus or pytest.ExitCode.TESTS_FAILED
 
 
 @pytest.hookimpl(wrapper=True)

@@ -4,14 +4,15 @@ The motion of the FMU comes from its C code, and mass matrices from `verificatio
 the package.
 """
 
+import atexit
 import importlib
 import re
 import subprocess
 import sys
+from contextlib import ExitStack
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
-from tempfile import mkdtemp
 from types import ModuleType, SimpleNamespace
 from typing import Any
 from unittest.mock import MagicMock
@@ -29,6 +30,7 @@ from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import delayed_name
 from rov_fmu.interface.arguments import with_axes
 from rov_fmu.interface.model import VehicleModel
+from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, without_surface
@@ -56,9 +58,13 @@ TILTS = {
 }
 
 
+_UNTIL_THE_END = ExitStack()
+atexit.register(_UNTIL_THE_END.close)
+
+
 def package_of(vehicle: Vehicle) -> ModuleType:
     """Return the package of a vehicle, written to a folder and imported from there as users do."""
-    folder = Path(mkdtemp(prefix=f"{vehicle.identifier}_"))
+    folder = Path(_UNTIL_THE_END.enter_context(temporary_folder(f"{vehicle.identifier}_")))
     package = folder.name
     for name, file in mujoco_files(vehicle, package, {"Where it holds": ["Here."]}, {}, HOST).items():
         (folder / name).write_bytes(file.encode() if isinstance(file, str) else file)
@@ -582,14 +588,14 @@ def test_a_vehicle_without_thrusters_moves_by_loads() -> None:
     assert rov.model.actuator("memory").actnum[0] == rov.model.na == rov.model.nu * 7
 
 
-def test_a_simulation_that_becomes_unstable_begins_anew() -> None:
+def test_a_simulation_that_becomes_unstable_begins_anew(tmp_path: Path) -> None:
     rov = loaded("bluerov2")[1].load()
     start = rov.data.qpos.copy()
     rov.data.ctrl[:] = 1.0
     rov.step()
     rov.data.qfrc_applied[0] = 1e13
     with pytest.MonkeyPatch.context() as patched:
-        patched.chdir(mkdtemp())  # MuJoCo writes a log there
+        patched.chdir(tmp_path)  # MuJoCo writes a log there
         rov.step()
     assert rov.data.time == 0.002, "it has begun anew, and taken a step"
     assert not any(rov.forces.values()), "the thrusters stand still"

@@ -4,6 +4,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import dask
 import fmpy
 import pytest
 from distributed import LocalCluster
@@ -40,9 +41,10 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[LocalCluster]:
 
     It has one thread, because each thread starts a process for the FMU in every study.
     """
-    folder = tmp_path_factory.mktemp("cluster")
-    settings = {"dashboard_address": "127.0.0.1:0", "local_directory": folder}
-    with LocalCluster(n_workers=1, threads_per_worker=1, **settings) as started:
+    with (
+        dask.config.set({"temporary-directory": str(tmp_path_factory.mktemp("cluster"))}),
+        LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address="127.0.0.1:0") as started,
+    ):
         yield started
 
 
