@@ -196,7 +196,12 @@ def _in_copy(folder: Path, options: str) -> str:
         written = (path.read_text(encoding="utf-8") for path in sorted(place.glob("*.*")))
         parts = [said, *(_text(text.partition("\n")[2]) if text.startswith("<!") else text for text in written)]
         parts += [_text(documentation_page(load_vehicle(path))) for path in place.glob("*.toml")]
-    return "\n".join(parts).replace(f"{temporary}/", "")
+    return without_folder("\n".join(parts), temporary)
+
+
+def without_folder(text: str, folder: str) -> str:
+    """Return a text without the path of a folder. Commands to copy quote it if it has a space."""
+    return re.sub(rf"'{re.escape(folder)}/([^']*)'", r"\1", text).replace(f"{folder}/", "")
 
 
 _VEHICLES = {
