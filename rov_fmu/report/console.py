@@ -91,6 +91,10 @@ def print_table(found: Table, out: Console | None = None) -> None:
         for part in _narrowed(found, out):
             out.print(part)
         return
+    if found.title:  # a table would break a long path to its own width
+        out.print(found.title, soft_wrap=True)
+    found = copy(found)
+    found.title = None
     out.width = max(out.width, _width(found, out))
     for line in out.render_lines(found, pad=False):
         out.print("".join(segment.text for segment in line).rstrip(), soft_wrap=True)
