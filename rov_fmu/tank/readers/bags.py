@@ -32,6 +32,7 @@ from rov_fmu.tank.readers.recordings import (
     database_messages,
     mcap_messages,
 )
+from rov_fmu.tank.readers.ulog import fields_of, velocity_frames
 
 _LONGEST = 32
 """Longer arrays in messages are images or clouds, and are not read."""
@@ -47,6 +48,8 @@ _IDL = f"{'=' * 80}\nIDL: "
 """What is before each of several definitions in IDL."""
 _MAVLINK_TOPIC = re.compile(r"mavlink/(\d+)/(\d+)/(\w+)")
 """The topics of BlueOS: system, component and kind of the message."""
+_PX4 = re.compile(r"px4_msgs/(?:msg/)?(\w+)")
+"""The types of PX4's topics in ROS 2, whose fields are those of its own logs."""
 _SECONDS, _NANOSECONDS = ("sec", "secs", "seconds"), ("nanosec", "nsec", "nsecs", "nanos")
 """The names of the parts of a time stamp."""
 
@@ -111,7 +114,8 @@ def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown)
         if stream not in decoders:
             decoders[stream] = _decoder(stream)
         decode, match = decoders[stream], _MAVLINK_TOPIC.fullmatch(stream.topic)
-        is_read = stream.topic in named or is_known(stream.kind)
+        kind = _kind_of(stream)
+        is_read = stream.topic in named or is_known(kind)
         if not decode or not (match or is_read):
             unknown.add(stream, decode, raw)
             continue
@@ -121,10 +125,13 @@ def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown)
                 yield _of_mavlink(match, message["message"], time * 1e-9)
                 continue
             if stream not in frames:
-                frames[stream] = _frames(message, stream.kind)
+                frames[stream] = _frames(message, kind)
             namespace, _, _ = stream.topic.strip("/").rpartition("/")[0].partition("/")
-            source = Source(stream.topic, stream.kind or stream.topic, namespace, frames=frames[stream])
-            yield Message(source, time * 1e-9, dict(_numbers("", message)), stamp=_stamp(message))
+            source = Source(stream.topic, kind or stream.topic, namespace, frames=frames[stream])
+            numbers = dict(_numbers("", message))
+            if kind != stream.kind:
+                numbers = fields_of(kind, numbers, frames[stream])
+            yield Message(source, time * 1e-9, numbers, stamp=_stamp(message))
         except MemoryError:
             raise
         except Exception:  # a parser may raise anything on damaged bytes
@@ -211,12 +218,20 @@ def _stamp(message: Any) -> float:
     return (seconds + (nanoseconds or 0) * 1e-9 if seconds is not None else 0.0) or nan
 
 
+def _kind_of(stream: Stream) -> str:
+    """Return the type of messages; that of PX4 as its own logs have it, such as vehicle_odometry."""
+    match = _PX4.fullmatch(stream.kind)
+    return re.sub(r"(?<!^)(?=[A-Z])", "_", match[1]).lower() if match else stream.kind
+
+
 def _frames(message: Any, kind: str) -> tuple[str, str]:
     """Return the frames of the pose and of the twist in a message.
 
     A child frame is that of the body: of the rotation of a pose, and of the twist in odometry. Otherwise, the frame in
     the header is that in which the numbers are given, or, in a message of an IMU or a wrench, the body's.
     """
+    if (number := _part(message, "velocity_frame")) is not None:
+        return velocity_frames(number)
     frame, child = f"{_part(_part(message, 'header'), 'frame_id') or ''}", f"{_part(message, 'child_frame_id') or ''}"
     return ("", frame) if re.search("Imu|Twist|Wrench", kind) else (frame, child)
 

@@ -5,9 +5,9 @@ and otherwise of the message.
 """
 
 from collections import Counter
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from rov_fmu.tank.findings import about
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers.content import Content, Piece, described
 
+_T = TypeVar("_T")
 _FRAMES = {1: "ned", 3: "frd"}
 """The numbers of the frames of vehicle_odometry; others are not usable."""
 
@@ -54,10 +55,19 @@ def _topic(data: Any, several: bool) -> Topic:
     columns = {key: values.astype(float) for key, values in data.data.items()}
     sampled = columns.get("timestamp_sample", columns["timestamp"])
     stamp = np.where(sampled > 0.0, sampled, columns["timestamp"]) * 1e-6
-    fields = {key: values for key, values in columns.items() if not key.startswith("timestamp")}
-    frames = ("ned", _FRAMES.get(int(np.median(fields.get("velocity_frame", np.ones(1)))), ""))
-    if data.name == "vehicle_odometry" and not frames[1]:
-        fields = {key: values for key, values in fields.items() if not key.startswith("velocity")}
+    frames = velocity_frames(int(np.median(columns.get("velocity_frame", np.ones(1)))))
+    fields = fields_of(data.name, columns, frames)
     name = f"{data.name}_{data.multi_id}" if data.multi_id else data.name
     part = f"instance {data.multi_id}" if several else ""
     return Topic.of_messages(Source(name, data.name, part=part, frames=frames), stamp, fields)
+
+
+def velocity_frames(number: int) -> tuple[str, str]:
+    """Return the frame of the position and that of the velocity for a number of vehicle_odometry; others are empty."""
+    return "ned", _FRAMES.get(number, "")
+
+
+def fields_of(kind: str, fields: Mapping[str, _T], frames: tuple[str, str]) -> dict[str, _T]:
+    """Return the fields of a message that may measure something: no time stamps, and no velocity in another frame."""
+    left_out = ("timestamp", "velocity") if kind == "vehicle_odometry" and not frames[1] else ("timestamp",)
+    return {name: value for name, value in fields.items() if not name.startswith(left_out)}

@@ -9,6 +9,7 @@ import pytest
 from rosbags.rosbag1 import Writer as Writer1
 from rosbags.rosbag2 import CompressionFormat, CompressionMode
 from rosbags.typesys import get_types_from_msg
+from scipy.spatial.transform import Rotation
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
@@ -21,7 +22,7 @@ from rov_fmu.tank.readers.listing import list_files
 from tests.tank.logs import Read, axes, commanded, measured, read_log
 from tests.tank.readers import motion
 from tests.tank.readers.motion import BLUEROV2, DIVE, TIME
-from tests.tank.readers.writers import Ros, messages_of, outputs, write_mcap
+from tests.tank.readers.writers import RATES, Ros, messages_of, outputs, write_mcap
 
 DVLS = {
     "dvl_msgs/msg/DVL": "std_msgs/Header header\nfloat64 time\ngeometry_msgs/Vector3 velocity\nfloat64 fom\n"
@@ -44,6 +45,54 @@ def test_frames_that_are_named_ned_are_those_of_the_sea_already(tmp_path: Path) 
         "dive.db3: the log does not tell the directions of the motors (MOT_n_DIRECTION), so every thruster is taken to "
         "push ahead above its neutral pulse. [logs] in rov.toml may name those that do not: reversed = [...]",
     )
+
+
+PX4 = {
+    "px4_msgs/msg/VehicleOdometry": "uint64 timestamp\nuint64 timestamp_sample\nfloat32[3] position\nfloat32[4] q\n"
+    "uint8 velocity_frame\nfloat32[3] velocity\nfloat32[3] angular_velocity\n",
+    "px4_msgs/msg/ActuatorOutputs": "uint64 timestamp\nuint32 noutputs\nfloat32[16] output\n",
+}
+"""The parts of the definitions of PX4's messages in ROS 2 that matter here."""
+
+
+@pytest.mark.parametrize(("number", "moved"), [(1, DIVE.over_ground), (3, DIVE.velocity), (2, None)])
+@pytest.mark.parametrize("suffix", [".db3", ".mcap"])
+def test_messages_of_px4_in_a_bag_are_those_of_its_own_logs(
+    number: int, moved: Any, suffix: str, tmp_path: Path
+) -> None:
+    """A velocity in another frame than those of the earth and the body is not used."""
+    ros = Ros(2)
+    for kind, definition in PX4.items():
+        ros.store.register(get_types_from_msg(definition, kind))
+
+    def messages() -> Iterator[tuple[str, float, Any]]:
+        for n, time in enumerate(TIME.tolist()):
+            odometry = {
+                "timestamp": 10**15 + n,
+                "position": DIVE.position[n],
+                "q": Rotation.from_matrix(DIVE.rotation[n]).as_quat(scalar_first=True),
+                "velocity": (DIVE.velocity if moved is None else moved)[n],
+                "angular_velocity": RATES,
+            }
+            single = {key: np.asarray(own, np.float32) for key, own in odometry.items() if key != "timestamp"}
+            stamp = {"timestamp": odometry["timestamp"], "velocity_frame": number}
+            yield "/fmu/out/vehicle_odometry", time, ros.message("px4_msgs/msg/VehicleOdometry", **stamp, **single)
+            pulses = np.append(DIVE.pulses[n], np.zeros(10)).astype(np.float32)
+            yield (
+                "/fmu/out/actuator_outputs",
+                time,
+                ros.message("px4_msgs/msg/ActuatorOutputs", noutputs=6, output=pulses),
+            )
+
+    log = read_log(ros.write(tmp_path, messages(), suffix), BLUEROV2)
+    assert not [name for name in log.log.unread if "timestamp" in name]
+    if moved is None:
+        assert "surge velocity" not in {channel.quantity.name for channel in log.log.channels}
+        return
+    assert measured(log.log, "surge velocity") == pytest.approx(DIVE.velocity[:, 0], abs=1e-5)
+    assert measured(log.log, "depth") == pytest.approx(motion.DEPTH, abs=1e-5)
+    assert measured(log.log, "heading") == pytest.approx(motion.HEADING, abs=1e-5)
+    assert commanded(log.log, "5") == pytest.approx(motion.THRUSTERS["5"], abs=2e-3)
 
 
 COMPRESSED = [
