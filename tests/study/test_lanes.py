@@ -158,12 +158,14 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     assert not (parted / "parts").exists()
     assert main(given) == 0, "it is a study like any other"
     capsys.readouterr()
-    for more, reason in (
-        (["--part", "1/3"], "has runs that are no parts: choose another folder, or leave --part out"),
-        (["--merge"], "has no parts to merge: run each with --part, as in --part 1/8"),
+    assert main([*given, "--merge"]) == 0, "a merge that was killed before it wrote the page is done again"
+    capsys.readouterr()
+    for folder, more, reason in (
+        (parted, ["--part", "1/3"], "has runs that are no parts: choose another folder, or leave --part out"),
+        (tmp_path / "new", ["--merge"], "has no parts to merge: run each with --part, as in --part 1/8"),
     ):
-        assert main([*given, *more]) == 2
-        assert capsys.readouterr().err.endswith(f"rov-fmu: {parted}: {reason}\n")
+        assert main(["study", str(plan), "-o", str(folder), *more]) == 2
+        assert capsys.readouterr().err.endswith(f"rov-fmu: {folder}: {reason}\n")
 
 
 def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_refused(

@@ -187,9 +187,9 @@ class Store:
         """
         names = [_PART.fullmatch(path.name) for path in (self.folder / PARTS).glob("*")]
         parts = [Part(int(name[1]), int(name[2])) for name in names if name]
-        if not parts:
+        runs, count = study["runs"], max((part.count for part in parts), default=0)
+        if not parts and self.missing(0, runs):
             raise FileError(f"{self.folder}: has no parts to merge: run each with --part, as in --part 1/8")
-        runs, count = study["runs"], max(part.count for part in parts)
         with ExitStack() as locks:
             own, files, wrong = self.checked(study, whole=True), dict[Path, Span](), list[str]()
             for store in (part.store(self.folder) for part in parts):
