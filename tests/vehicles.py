@@ -266,7 +266,7 @@ def tied(rov: Vehicle, **points: Vector) -> Vehicle:
     return replace(rov, layout=layout, coefficients={**rov.coefficients, **at})
 
 
-def with_rotors(rov: Vehicle) -> Vehicle:
+def with_rotors(rov: _Vehicle) -> _Vehicle:
     """Return a vehicle whose rotors lag in speed, where its forces lag."""
     return replace(rov, layout=replace(rov.layout, curves=tuple(replace(c, lag="speed") for c in rov.layout.curves)))
 

@@ -153,9 +153,9 @@ def _left_out(layout: Layout) -> Iterator[str]:
     yield from _left_out_of_forces(layout)
     at = "at a point" if layout.points else "as a load"
     yield f"A tether: it acts only if its force is connected {at}."
-    surface = "The drag of what is out of the water, bottom" if layout.surface else "Surface, bottom"
+    surface, drag = ("Bottom", " Out of the water, drag acts in full.") if layout.surface else ("Surface, bottom", "")
     waves = "walls, and waves that the body changes" if layout.waves else "walls and waves"
-    yield f"{surface}, {waves}.{' Depth has no limits.' if 'heave' in layout.by_name else ''}"
+    yield f"{surface}, {waves}.{' Depth has no limits.' if 'heave' in layout.by_name else ''}{drag}"
     level = "" if layout.has_attitude else ", horizontal"
     moving = "The velocity of the water is" if layout.waves else f"A current is steady{level} and"
     yield f"{moving} everywhere the same." if "V_N" in layout.inputs else "The water is at rest."

@@ -97,7 +97,7 @@ def _three(vehicle: Vehicle) -> tuple[Callable[[], float], Callable[[], float]]:
     model = spec.compile()
     first: Any = load(vehicle)
     data, other = mujoco.MjData(model), mujoco.MjData(model)
-    rovs = [type(first)(first.library, first.water.equation, model, data, prefix) for prefix in ("", "1_", "2_")]
+    rovs = [type(first)(first.library, first.equation, model, data, prefix) for prefix in ("", "1_", "2_")]
     for one in (data, other):
         one.ctrl[:] = vehicle.layout.command_of(0.1)
     return _loop(lambda: mujoco.mj_step(model, other)), _loop(lambda: step(*rovs))

@@ -200,9 +200,9 @@ class Rov:
 
     @data.setter
     def data(self, data: Any) -> None:
-        model = self.model
-        sizes = [(one.nq, one.nv, one.nu, one.na, one.nbody, one.nM, one.signature) for one in (model, data.model)]
-        if sizes[0] != sizes[1]:
+        model, its = self.model, data.model if isinstance(data, mujoco.MjData) else None
+        same = ("nq", "nv", "nu", "na", "nbody", "nM", "signature")
+        if its is None or any(getattr(model, name) != getattr(its, name) for name in same):
             raise ValueError("data: must be those of the vehicle's model, MjData(rov.model)")
         self._data = data
         memory, first = self.memory, self.library.outer
