@@ -50,13 +50,18 @@ CONSTANTS = {
     ),
     "soon": Constant(
         1.15,
-        "errors over 2 s, relative to the noise, from which they widen intervals",
-        "0.85 to 1.16 along 45 right axes, and up to 2.98 along wrong ones",
+        "R₂ from which intervals are wider",
+        "0.85 to 1.16 along 45 right axes, and up to 2.98",
+    ),
+    "least soon": Constant(
+        0.002,
+        "least noise of a sensor over 2 s, relative to its motion within them",
+        _FLIGHTS,
     ),
     "steps": Constant(
         1.25,
-        "χ² per degree of freedom from which steps differ in predictions over 2 s",
-        "with both, 14 of 64 axes that break the equation had an answer outside its interval, and then 4",
+        "χ² per step from which the inertia has a spread, in predictions over 2 s",
+        "with both, 4 instead of 14 of 64 axes had an answer outside",
     ),
     "late steps": Constant(2.0, "the same over 10 s", "the same"),
     "contrast": Constant(
@@ -524,7 +529,7 @@ class AxisResult:
     structure: float = 0.0
     """The error R of the fit to all data over 10 s, relative to what noise explains (`search.structure`)."""
     soon: float = 0.0
-    """That over 2 s, relative to the noise alone (`search.with_steps`); 0 where nothing tells it."""
+    """That over 2 s, relative to the noise (`search.with_steps`); 0 where nothing tells it."""
     disturbances: Sequence[Disturbance] = ()
     effects: Sequence[Effect] = ()
     slips: Sequence[Slip] = ()

@@ -173,8 +173,10 @@ def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
 
 
 def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield each file in which a horizontal velocity jumps."""
-    yield from ((one.log.file,) for one in logs if one.jump is not None)
+    """Yield each file in whose first half a horizontal velocity jumps. Beyond, too little is left to judge it by."""
+    yield from (
+        (one.log.file,) for one in logs if one.jump is not None and one.jump < np.mean(one.record.time[[0, -1]])
+    )
 
 
 def _slow_tables(_: Prior, logs: Logs) -> Iterator[Of]:

@@ -35,7 +35,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, total
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total
 from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, WRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -96,7 +96,7 @@ class Misfit:
     """Over 10 s, beyond the noise, relative to the motion: the root of (e² - σ²) / motion²; 0 where nothing moves. The
     motion is that of the log in which the axis moves most: one in which it hardly moves tells little of a scale."""
     soon: float = 0.0
-    """R₂: over 2 s, relative to the noise alone; 0 where nothing tells it."""
+    """R₂: over 2 s, relative to the noise; 0 where nothing tells it."""
     spread: float = 0.0
     """The standard deviation of ln of the inertia from step to step of the commands, beyond the noise."""
 
@@ -156,7 +156,8 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
     """Return the misfits with what predictions over 2 s tell, and the steps of the commands within them.
 
     Over 10 s, the noise of the sensor is at least 1 % of the motion, which hides what a fast axis does. Over 2 s, it is
-    the noise alone. Logs whose commands change between the rows tell nothing about it.
+    at least 0.2 % of the motion within them, so that a sensor almost without noise asks of no model what nobody needs.
+    Logs whose commands change between the rows tell nothing about it.
 
     What makes each step of the commands another one, such as a wake, an inertia that grows, or lags that differ, is
     seen by regressing the errors after a step on their derivative by ln of the inertia. If the results differ by more
@@ -182,8 +183,10 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
             for number, m in enumerate(sampled.measured):
                 own, axis = record.sensor == number, m.sensor.axis
                 noise = hypot(m.noise, table.wander(best.z, sampled, m.sensor))
-                if span == _SOON and (usual & own).sum() >= _FEWEST:
-                    soon = Misfit(soon=rms(run.innovations[usual & own]) / noise)
+                at = usual & own
+                if span == _SOON and at.sum() >= _FEWEST:
+                    least = CONSTANTS["least soon"].value * unchanged(record.time[at], record.value[at], _SOON)
+                    soon = Misfit(soon=rms(run.innovations[at]) / max(noise, least))
                     found[axis] = soon.or_larger(found.get(axis, Misfit()))
                 if axis in inertias:
                     pairs = np.column_stack([run.innovations, slopes[:, axes.index(axis)]]) / noise
@@ -479,14 +482,15 @@ def fitted(
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. The result is None if a motion diverges, or if
-    the evidence of thinned logs is below `enough`.
+    fit `near` ended, or at its prior mean if the hypotheses change that. If a motion diverges from there, all begin as
+    in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below `enough`.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
     with suppress(DivergedError):
-        end = minimise(thinned, begun(thinned, there, starts), enough=QUICK, last=False)
+        first, other = (begun(thinned, z, starts) for z in (there, start_of(thinned)))
+        end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False)
         quick = evidence(thinned, end)
         if quick > enough:
             objective = applied(plain, starts)
@@ -561,17 +565,18 @@ class StructureSearch:
         Evidence is relative to the hypotheses that are known: one of them always wins where the model lacks something
         else. One that explains nothing leaves, and what it kept from being tried is tried without it.
         """
+        rounds = iter(range(_ROUNDS))
         while True:
-            self._search()
+            self._search(rounds)
             doubtful = {one: z for one, z in self.now.starts.items() if not self._explains(one)}
             if not doubtful:
                 break
             self.refuted |= doubtful
             self.now = max(self._valid, key=lambda one: one.score - WINS * len(one.starts))
 
-    def _search(self) -> None:
-        """Add, drop and replace hypotheses as long as the fit becomes better."""
-        for _ in range(_ROUNDS):
+    def _search(self, rounds: Iterable[int]) -> None:
+        """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
+        for _ in rounds:
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
             if self._gain(best) <= 0.0:

@@ -57,15 +57,22 @@ class Minimum:
     """p x p: the second derivatives of J, with those of the prior."""
 
 
-def minimise(objective: Objective, start: Array, on_step: OnStep = lambda _: None, **how: Any) -> Minimum:
+def minimise(
+    objective: Objective,
+    start: Array,
+    on_step: OnStep = lambda _: None,
+    *,
+    elsewhere: Sequence[Array] = (),
+    **how: Any,
+) -> Minimum:
     """Minimise J from a start. Raises DivergedError.
 
-    If a motion diverges at the start, the vehicle begins there with the noise of a first fit, and then with the values
-    of a careful start: rounding decides whether motions that no sensor measures diverge beside exact measurements, so
-    they do on one processor and not on another. The other options are those of `_minimised`.
+    If a motion diverges at the start, the fit begins `elsewhere`. Then the vehicle of the start has noise as in a first
+    fit, and then the values of a careful start: rounding decides whether motions that no sensor measures diverge beside
+    exact measurements, so they do on one processor and not on another. The other options are those of `_minimised`.
     """
     louder = np.where(objective.table.each("of_motion"), start, np.maximum(start, start_of(objective)))
-    for z in (start, louder):
+    for z in (start, *elsewhere, louder):
         with suppress(DivergedError):
             return _minimised(objective, z, on_step, **how)
     return _minimised(objective, start_of(objective, _CAREFUL), on_step, **how)

@@ -17,6 +17,7 @@ import rov_fmu
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
+from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.hypotheses import (
     CONTRAST,
     HYPOTHESES,
@@ -604,6 +605,8 @@ def test_velocities_before_they_jump_are_left_out(model: Objective, tmp_path: Pa
     drifting = folder(tmp_path, "videoray", Fault("", settled=16.5))
     other = Objective.of_known(*begin(load_tests(drifting)))
     (of,) = HYPOTHESES["unsettled velocity"].suspects(other.table.known, other.logs)
+    late = replace(other.logs[0], record=replace(other.logs[0].record, time=other.logs[0].record.time - 20.0))
+    assert not [*HYPOTHESES["unsettled velocity"].suspects(other.table.known, [late])]
     left = applied(other, {("unsettled velocity", of): None})
     ((sampled,), (whole,)) = left.logs, other.logs
     assert of == ("dive_0.csv",)
@@ -805,6 +808,25 @@ def searching(plain: StructureFit, now: StructureFit, monkeypatch: pytest.Monkey
     search.tried[frozenset(now.starts)] = now
     monkeypatch.setattr(search, "_round", list)
     return search
+
+
+def test_a_hypothesis_begins_as_in_a_first_fit_where_the_end_of_another_diverges(
+    reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With more noise than at that end, it would stay far from its minimum, and no lag of rotors would be found."""
+    starts = list[Array]()
+
+    def diverging(_: Objective, z: Array, *__: object, **___: object) -> Minimum:
+        starts.append(z)
+        raise DivergedError
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.solve._minimised", diverging)
+    z = reversed_model.mean + 0.01
+    near = StructureFit({}, reversed_model, Minimum(z, 0.0, [], [], np.eye(len(z))), 0.0, 0.0)
+    assert fitted(near, reversed_model, {ROTORS: None}, 0.0) is None
+    thinned = applied(reversed_model, {ROTORS: None}, thinned=True)
+    assert np.array_equal(starts[1], np.clip(start_of(thinned), thinned.low, thinned.high))
+    assert not np.array_equal(starts[0], starts[1])
 
 
 @pytest.mark.parametrize("surge", [1.4, 9.0])
