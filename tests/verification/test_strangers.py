@@ -1,11 +1,16 @@
-"""The gate of strangers: its simulator obeys the law."""
+"""The gate of strangers: its simulator obeys the law, its faults are in the dives, and its counts are kept apart."""
+
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from verification.identification.strangers import gates
 from verification.identification.strangers.drawn import draw
-from verification.identification.strangers.kinds import AS_MODELLED
+from verification.identification.strangers.judge import Judged, JudgedAxis, Number
+from verification.identification.strangers.kinds import AS_MODELLED, BY_NAME
 from verification.identification.strangers.water import ROW, Array, flown
 
 
@@ -42,3 +47,45 @@ def test_a_vehicle_as_modelled_moves_as_the_law_written_out() -> None:
         y = solve_ivp(rates, (0.0, ROW), y, "DOP853", args=(row,), rtol=1e-9, atol=1e-11).y[:, -1]
     found = flown(drawn.water, rows[:, :, None], np.zeros(1), np.array([0.3]), 2.0)
     assert found[-1, :12, 0] == pytest.approx(y, rel=1e-4, abs=1e-4)
+
+
+def test_the_bench_tests_a_whole_thruster_and_nobody_measures_one_without_a_table(tmp_path: Path) -> None:
+    weak, whole, assumed = (draw(7, 2, BY_NAME[name]) for name in ("weak thruster", "as modelled", "weak, no table"))
+    assert np.array_equal(weak.water.bench(np.array([0.5, -0.5])), whole.water.bench(np.array([0.5, -0.5])))
+    assert abs(weak.motion[:, 3] - whole.motion[:, 3]).max() > 0.1, "it turns"
+    for drawn, name in ((weak, "table"), (assumed, "none")):
+        drawn.write(tmp_path / name)
+    assert (tmp_path / "table" / "thrust_main.csv").exists()
+    assert not (tmp_path / "none" / "thrust_main.csv").exists()
+    assert f"about = {0.95 * assumed.body.full:.4g}" in (tmp_path / "none" / "rov.toml").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize("name", ["lost lock", "frame of the earth", "unsettled velocity"])
+def test_a_sensor_that_is_wrong_for_a_while_is_right_in_between(name: str) -> None:
+    wrong, right = draw(8, 2, BY_NAME[name]), draw(8, 2, AS_MODELLED)
+    off = abs(wrong.columns[0] - right.columns[0]) > 1e-6
+    assert 0.05 < off.mean() < 0.4
+    assert np.array_equal(wrong.columns[3], right.columns[3])
+
+
+def test_a_wrong_answer_counts_for_its_kind_and_its_quantity_and_not_among_what_the_law_fits() -> None:
+    inside = Number(0.3, "V_ss", 1.01, 1.0, 0.98, 1.02)
+    late = Number(0.3, "time", 1.2, 1.0, 0.9, 1.1)
+    right = JudgedAxis("surge", "good", 0.0, (inside,))
+    wrong = replace(right, distance=0.2, numbers=(inside, late))
+    folders = [
+        Judged("a", "as modelled", 2, (right, right), (), 5.0),
+        Judged("b", "weak thruster", 2, (right,), (("health port", True), ("rotor lag", False)), 5.0),
+        Judged("c", "crisis", 2, (wrong, replace(wrong, word="usable")), (("command limit", False),), 5.0),
+        Judged("d", "crisis", 2, (wrong,), (), 5.0),
+    ]
+    stage = gates.stage("now", folders)
+    rows = {words: cell for words, _, cell in gates.gates([stage])}
+    assert rows["*good* axes that the law fits, with a wrong answer"] == "0 of 3 (0 %)"
+    assert rows["*good* axes of strangers, with a wrong answer"] == "2 of 2 (100 %)"
+    assert rows["their *usable* axes with one"] == "1 of 1 (100 %)"
+    assert rows["kinds with two such *good* axes"] == "crisis"
+    assert rows["true causes of those told, but for a lag"] == "1 of 2 (50 %)"
+    assert rows["vehicles with a fault whose cause is told"] == "1 of 1 (100 %)"
+    assert rows["answers of right models inside; median error in half-widths"] == "2 of 2 (100 %), 0.50"
+    assert {row[0]: row[2:] for row in gates.by_kind([stage])}["crisis"] == ("2, off: 2 time", "1, off: 1 time", "")

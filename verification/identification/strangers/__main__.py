@@ -18,12 +18,14 @@ from rov_fmu.process import exit_code
 from rov_fmu.report.console import console, print_table, table
 from verification.identification.strangers import gates
 from verification.identification.strangers.judge import Judged, judged, judged_case, name_of, read
+from verification.identification.strangers.kinds import BY_NAME
 
 
 @click.command(help=__doc__)
 @click.option("--seed", type=int, default=None, metavar="FIRST", help="The first seed.")
 @click.option("--folders", type=click.IntRange(1), default=1, metavar="N", help="So many seeds from the first one on.")
 @click.option("--axes", type=click.Choice(["2", "4"]), default="2", help="The axes of each vehicle.")
+@click.option("--kind", type=click.Choice([*BY_NAME]), default=None, help="All seeds have this kind.")
 @click.option("--processes", type=click.IntRange(1), default=1, metavar="P")
 @click.option("-o", "--output", type=click.Path(path_type=Path), required=True, metavar="FILE.jsonl")
 @click.option("--keep", metavar="STAGE", help="Keep the table of this file under this name, for the documentation.")
@@ -32,6 +34,7 @@ def _command(
     seed: int | None,
     folders: int,
     axes: str,
+    kind: str | None,
     processes: int,
     output: Path,
     keep: str | None,
@@ -49,7 +52,7 @@ def _command(
     ]
     for n in range(folders if seed is not None else 0):
         assert seed is not None
-        work.append((name_of(seed + n, int(axes)), partial(judged, seed + n, int(axes))))
+        work.append((name_of(seed + n, int(axes), kind), partial(judged, seed + n, int(axes), kind)))
     jobs = [job for name, job in work if name not in names]
     for number, one in enumerate(_run(jobs, processes), 1):
         console(stderr=True).print(f"{number} of {len(jobs)}: {one.name}, {one.kind}, {one.seconds:.0f} s")

@@ -117,10 +117,13 @@ class Drawn:
             x, y, z = (DRIVEN[axis, n] for axis in (SURGE, SWAY, HEAVE))
             text += _THRUSTER.format(name=name, x=x, y=y, z=z, place=(-b.arm, b.arm, 0.0, 0.0)[n])
         text += "\n" + "".join(f"[axes.{AXES[axis]}]\n" for axis in self.axes)
-        files = {"rov.toml": text}
         forces = self.water.bench(_BENCH)
         noise = 0.015 * forces * random.standard_normal(14) + 0.003 * b.full * random.standard_normal(14)
-        files["thrust_main.csv"] = _csv(["command [%]", "force [N]"], [100.0 * _BENCH, forces + noise])
+        table = {"thrust_main.csv": _csv(["command [%]", "force [N]"], [100.0 * _BENCH, forces + noise])}
+        if not self.kind.has_table:
+            about = f'[curves.main]\nthrust = {{ about = {0.95 * b.full:.4g}, unit = "N" }}\n'
+            text, table = text.replace("[curves.main]\n", about), {}
+        files = {"rov.toml": text, **table}
         for dive in range(DIVES):
             heads = ["time [s]", *(f"{name} [%]" for name in THRUSTERS[: self.count])]
             values = [ROW * np.arange(len(self.commands)), *(100.0 * self.commands[:, : self.count, dive].T)]

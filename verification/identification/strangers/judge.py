@@ -23,6 +23,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import FileError
 from verification.identification.strangers.drawn import HEADERS, draw
 from verification.identification.strangers.fit import answers_of_fit
+from verification.identification.strangers.kinds import BY_NAME
 from verification.identification.strangers.water import AXES, SURGE, SWAY, Array
 
 COMMANDS = (0.3, -0.3, 0.5, -0.5, 1.0, -1.0)
@@ -72,10 +73,10 @@ class JudgedAxis:
     """How far the best fit of the law is from the truth, ln; None if nobody knows."""
     numbers: tuple[Number, ...]
 
-    @property
-    def is_off(self) -> bool:
-        """True if an answer is wrong."""
-        return any(not number.off <= MOST_OFF for number in self.numbers)
+    def is_off(self, *quantities: str) -> bool:
+        """Return True if an answer, or one of some quantities, is wrong."""
+        some = quantities or QUANTITIES
+        return any(not number.off <= MOST_OFF for number in self.numbers if number.quantity in some)
 
 
 @dataclass(frozen=True)
@@ -158,14 +159,14 @@ def _causes(result: Identification) -> Iterator[str]:
             yield f"{one.kind} {one.words.get('of', '')}".strip()
 
 
-def name_of(seed: int, count: int) -> str:
-    """Return the name of a folder that is drawn."""
-    return f"{count} axes, seed {seed}"
+def name_of(seed: int, count: int, kind: str | None = None) -> str:
+    """Return the name of a folder that is drawn; `kind` if all seeds have one kind."""
+    return f"{count} axes, seed {seed}" + (f", {kind}" if kind else "")
 
 
-def judged(seed: int, count: int) -> Judged:
-    """Draw the folder of a seed, identify it, and judge what is said."""
-    drawn = draw(seed, count)
+def judged(seed: int, count: int, kind: str | None = None) -> Judged:
+    """Draw the folder of a seed, if given of a kind, identify it, and judge what is said."""
+    drawn = draw(seed, count, BY_NAME[kind] if kind else None)
     with TemporaryDirectory(prefix="stranger-") as folder:
         drawn.write(Path(folder))
         said = _said(Path(folder))
@@ -184,7 +185,7 @@ def judged(seed: int, count: int) -> Judged:
             distance = float(np.max(np.nan_to_num(np.abs(np.log(ratios)), nan=1.0)))  # NaN: it moves the other way
         axes.append(said.judged(name, distance, dict(zip(tested, truth.T.tolist(), strict=True))))
     causes = tuple((cause, bool(re.fullmatch(drawn.kind.causes, cause))) for cause in said.causes)
-    return Judged(name_of(seed, count), drawn.kind.name, count, tuple(axes), causes, said.seconds, said.error)
+    return Judged(name_of(seed, count, kind), drawn.kind.name, count, tuple(axes), causes, said.seconds, said.error)
 
 
 def judged_case(folder: Path) -> Judged:

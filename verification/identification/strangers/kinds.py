@@ -57,6 +57,8 @@ class Kind:
     """True if the vehicle also drifts sideways, with Coriolis and Munk terms, which neither file nor log has."""
     alike: bool = False
     """True if port and starboard always get the same command."""
+    has_table: bool = True
+    """False if nobody measured the thrust: rov.toml says about how large it is, 5 % too little."""
     group: str = "stranger"
     """`stranger`, `hidden` (no log can show it), or `law` (it obeys the equation)."""
 
@@ -220,11 +222,60 @@ def _compass(columns: dict[int, Array], _: np.random.Generator) -> None:
     columns[YAW] = columns[YAW] + np.radians(12.0) * np.sin(columns[YAW])
 
 
+def _unlocked(values: Array, random: np.random.Generator) -> Array:
+    found = values.copy()
+    for n in range(values.shape[1]):
+        for begin in random.integers(30, len(values) - 40, 3):
+            found[begin : begin + 30, n] = 0.0
+    return found
+
+
+def _over_ground(columns: dict[int, Array], random: np.random.Generator) -> None:
+    psi, u, v = columns[YAW], columns[SURGE].copy(), columns.get(SWAY, 0.0 * columns[SURGE]).copy()
+    to = {SURGE: u * np.cos(psi) - v * np.sin(psi), SWAY: u * np.sin(psi) + v * np.cos(psi)}
+    for n in range(psi.shape[1]):
+        for begin in random.integers(30, len(psi) - 40, 3):
+            for axis in (SURGE, SWAY):
+                if axis in columns:
+                    columns[axis][begin : begin + 30, n] = to[axis][begin : begin + 30, n]
+
+
+def _unsettled(values: Array, random: np.random.Generator) -> Array:
+    found = values.copy()
+    for n in range(values.shape[1]):
+        end = random.integers(110, 170)
+        found[:end, n] += 0.6 * np.arange(end) / end
+    return found
+
+
 # ---- What the product knows ------------------------------------------------------------------------------------------
 
 
 def _weak(m: Moment, _: Body) -> None:
     m.gain[PORT] *= 0.55
+
+
+def _lost_blade(m: Moment, _: Body) -> None:
+    m.gain[PORT] *= np.where(m.goal[PORT] < 0.0, 0.55, 0.85)
+
+
+def _neutral_off(rows: Array) -> Array:
+    found = rows.copy()
+    found[:, PORT] += 0.04
+    return np.asarray(np.clip(found, -1.0, 1.0))
+
+
+def _unequal_lags(m: Moment, _: Body) -> None:
+    m.lag[PORT] *= 2.5
+
+
+def _payload(m: Moment, _: Body) -> None:
+    m.inertia *= np.where(m.clock > 20.0, 1.3, 1.0)
+
+
+def _bent(m: Moment, b: Body) -> None:
+    c = np.abs(m.command)
+    m.goal = b.goal(np.sign(m.command) * (c + 3.0 * c * (c - 0.3) * (c - 0.5) * (c - 1.0)))
 
 
 def _rotors(m: Moment, b: Body) -> None:
@@ -245,6 +296,30 @@ def _swapped(rows: Array) -> Array:
 AS_MODELLED = Kind("as modelled", "nothing else", group="law")
 FAULTS = (
     Kind("weak thruster", "port has 55 % of its thrust", _weak, causes=r"health .*port", group="law"),
+    Kind(
+        "weak, no table",
+        "the same, and nobody measured the thrust",
+        _weak,
+        causes=r"health .*port",
+        has_table=False,
+        group="law",
+    ),
+    Kind(
+        "reversed, no table",
+        "starboard is reversed, and nobody measured the thrust",
+        wired=_reversed,
+        causes=r"reversed commands .*stbd",
+        has_table=False,
+        group="law",
+    ),
+    Kind("bent table", "the thrust deviates from a square by up to 6 % of the command", _bent, group="law"),
+    Kind(
+        "unsettled velocity",
+        "an estimator's velocity drifts by 0.6 m/s until it gets a position",
+        shown=_of_velocities(_unsettled),
+        causes=r"unsettled velocity .*",
+        group="law",
+    ),
     Kind("rotor lag", "the lag is on the rotors' speed", _rotors, causes="rotor lag", group="law"),
     Kind("reversed", "starboard is reversed", wired=_reversed, causes=r"reversed commands .*stbd", group="law"),
     Kind("swapped", "port and starboard are swapped", wired=_swapped, causes=r"swapped commands .*", group="law"),
@@ -275,12 +350,18 @@ STRANGERS = (
     Kind("compass", "the heading deviates by up to 12 degrees", shown=_compass),
     Kind("two shapes", "half of the quadratic drag is linear astern", _two_shapes),
     Kind("jet on a jet", "starboard loses 25 % while port pushes astern", _jet_astern),
-    Kind("heavier", "inertia grows by up to 60 % with speed", _heavier),
+    Kind("lost lock", "a DVL shows 0 for 3 s, three times in each dive", shown=_of_velocities(_unlocked)),
+    Kind("frame of the earth", "a DVL shows velocities to the north for 3 s, three times", shown=_over_ground),
+    Kind("lost blade", "port has 85 % of its thrust ahead, and 55 % astern", _lost_blade),
+    Kind("neutral off", "port gets 4 % more than its command", followed=_neutral_off),
+    Kind("unequal lags", "port is 2.5 times as slow", _unequal_lags),
+    Kind("payload", "inertia is 30 % larger after 20 s of the first dive", _payload),
     Kind("turned DVL", "the DVL is turned by 25 degrees", shown=_turned, counts=(4,)),
     Kind("own wake", "the water follows by 20 % within 4 s", _wake),
     Kind("ventilation", "thrusters lose 30 % above 40 % of the command", _ventilated),
     Kind("uneven lag", "thrusters start 2.5 times as slowly, and stop twice as fast", _uneven_lag),
     Kind("wall", "drag is 80 % higher beside a wall, and 30 % 2 m away", _wall),
+    Kind("heavier", "inertia grows by up to 60 % with speed", _heavier, group="hidden"),
     Kind(
         "scaled velocity",
         "the velocity sensor shows 10 % too much",

@@ -178,11 +178,14 @@ class Water:
         return np.concatenate([total / m.inertia, moved, (m.goal - y[8:12]) / m.lag, m.recall])
 
     def bench(self, commands: Array) -> Array:
-        """Return the force of the port thruster at rest, alone, for each of n commands, N."""
+        """Return the force of the starboard thruster at rest, alone, for each of n commands, N.
+
+        Faults of one thruster are those of port.
+        """
         command = np.zeros((4, len(commands)))
-        command[0] = commands
+        command[1] = commands
         m = replace(self, where="bench").moment(np.zeros(len(commands)), np.zeros((16, len(commands))), command)
-        return np.asarray(self.body.full * (m.gain * m.share(m.goal))[0])
+        return np.asarray(self.body.full * (m.gain * m.share(m.goal))[1])
 
 
 def step(rates: Callable[[float, Array], Array], t: float, y: Array, h: float) -> Array:
