@@ -86,7 +86,8 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
     for one in (rov, heavy):
         with say(f"many of {one.name}"):
             for cores in sorted({1, usable_cores()}):
-                found = [taylor.many_vehicles(one, h, effort.repetitions, cores) for h in taylor.STEPS]
+                sizes = [*((h, taylor.VEHICLES) for h in taylor.STEPS), (1.0, taylor.MANY)]
+                found = [taylor.many_vehicles(one, h, effort.repetitions, cores, number) for h, number in sizes]
                 yield taylor.section(one.name, found)
     with say("simulators"):
         for one in (rov, six, heavy):

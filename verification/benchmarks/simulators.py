@@ -52,13 +52,14 @@ def section(vehicle: Vehicle, repetitions: int) -> Section:
         "MuJoCo without water, in C": lambda: _in_c(none),
         "MuJoCo with its own fluid, in C": lambda: _in_c(fluid),
         "MuJoCo without water, mj_step from Python": _loop(lambda: mujoco.mj_step(none, data)),
+        "mj_step of the exported model, without the plug-in": _loop(lambda: mujoco.mj_step(rov.model, alone)),
         "MuJoCo with the plug-in": _loop(rov.step),
         "MuJoCo with the plug-in, 100 steps at once": _loop(lambda: rov.step(100), _STEPS // 100, 100),
         "mj_step of a world with three vehicles": bare,
         "that world with the plug-in": water,
         "RovVectorEnv, 1000 vehicles in lanes": _loop(lambda: environment.step(actions), 20, _FLEET),
     }
-    data = mujoco.MjData(none)
+    data, alone = mujoco.MjData(none), mujoco.MjData(rov.model)
     rows = {name: [run() for _ in range(max(repetitions, 3))] for name, run in times.items()}
     turn: Counter[str] = Counter()
     for axis, share in _TURN.items():

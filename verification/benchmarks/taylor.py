@@ -126,9 +126,9 @@ class Heyoka:
 class Fleet:
     """Vehicles in heyoka, each at its own state with commands of its own."""
 
-    def __init__(self, rov: Vehicle, commands: Reals, starts: Reals) -> None:
+    def __init__(self, rov: Vehicle, commands: Reals, starts: Reals, copies: int = 1) -> None:
         self._series = Heyoka(rov)
-        begun = [self._series.begun(*both) for both in zip(commands, starts, strict=True)]
+        begun = [self._series.begun(*both) for both in zip(commands, starts, strict=True)] * copies
         self._states, self._parameters = (np.array(part) for part in zip(*begun, strict=True))
 
     def step(self, size: int, h: float, steps: int, cores: int = 1) -> tuple[float, float, bool]:
@@ -163,8 +163,9 @@ class Fleet:
         return 1e-9 * seconds / per_step, taken / per_step, finite
 
 
-VEHICLES = 256
-"""The number of vehicles that are stepped together. It is a multiple of the sizes of heyoka's batches."""
+VEHICLES, MANY = 256, 2560
+"""The numbers of vehicles that are stepped together: multiples of the sizes of heyoka's batches. With many, it hardly
+counts that our time has the call from Python, and that of heyoka has not."""
 STEPS = {0.001: 300, 0.01: 30, 1.0: 10}
 """The steps of each length, s. With lag, heyoka leaves the finite numbers after 0.3 to 1 s."""
 OURS, LANES, TURNING = "simulate_many", "simulate_many(lanes=True)", "lanes=True, commands that reverse"
@@ -176,6 +177,7 @@ class Many:
     """What many vehicles cost with steps of one length on some cores."""
 
     cores: int
+    vehicles: int
     h: float
     seconds: Mapping[str, Reals]
     """For each way to step them, the seconds per vehicle and step in each repetition."""
@@ -188,8 +190,10 @@ class Many:
         return float(np.median(self.seconds[way] / best))
 
 
-def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1) -> Many:
+def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1, vehicles: int = VEHICLES) -> Many:
     """Step vehicles that hold commands of their own, in turn by each way, as many on each core.
+
+    There are VEHICLES different ones; more are copies of these.
 
     The time is the processor time of all cores over their number, so waiting for other programs does not count.
     They have moved for 0.2 s with their commands before, so no velocity turns back in what is measured. simulate_many
@@ -200,7 +204,8 @@ def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1) -> M
     steps, layout = STEPS[h], rov.layout
     inputs: dict[str, Reals] = {name: commands[:, [n]] for n, name in enumerate(layout.commands)}
     starts = simulate(rov, [0.0, 0.2], inputs, vehicles=VEHICLES).values[:, :, -1].T
-    heyoka = Fleet(rov, commands, starts) if installed() else None
+    copies = vehicles // VEHICLES
+    heyoka = Fleet(rov, commands, starts, copies) if installed() else None
     values = inputs | {name: starts[:, [n]] for n, name in enumerate(layout.state)}
     times = h * np.arange(steps + 1)
     held = max(1, round(1.0 / h))
@@ -208,24 +213,31 @@ def many_vehicles(rov: Vehicle, h: float, repetitions: int, cores: int = 1) -> M
     turning = values | dict(zip(inputs, np.repeat(changes, held, axis=2)[..., : steps + 1], strict=True))
     seconds, taken = defaultdict(list), {}
     ours = {OURS: values, LANES: values, TURNING: turning}
-    on_all = {way: {name: np.tile(array, (cores, 1)) for name, array in given.items()} for way, given in ours.items()}
+    on_all = {
+        way: {name: np.tile(array, (cores * copies, 1)) for name, array in given.items()} for way, given in ours.items()
+    }
     for _ in range(repetitions + 1):  # the first one is not counted: it compiles
         for way, given in on_all.items():
             began = time.process_time_ns()
-            simulate(rov, times, given, vehicles=VEHICLES * cores, workers=cores, lanes=way != OURS)
-            seconds[way].append(1e-9 * (time.process_time_ns() - began) / (VEHICLES * steps * cores**2))
+            simulate(rov, times, given, vehicles=vehicles * cores, workers=cores, lanes=way != OURS)
+            seconds[way].append(1e-9 * (time.process_time_ns() - began) / (vehicles * steps * cores**2))
         if heyoka:
             for way, size in BATCHES.items():
                 cost, count, finite = heyoka.step(size, h, steps, cores)
                 seconds[way].append(cost)
                 taken[way] = count if finite else np.nan
-    return Many(cores, h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)
+    return Many(cores, vehicles, h, {way: np.array(costs[1:]) for way, costs in seconds.items()}, taken)
+
+
+def _column(one: Many) -> str:
+    """Return the head of a column: the length of a step, and the number of vehicles where it is not the usual one."""
+    return f"{one.h:g} s" + (f", {one.vehicles:,}" if one.vehicles != VEHICLES else "")
 
 
 def section(name: str, found: Sequence[Many]) -> Section:
     """Return the cost of many vehicles that are stepped together, and the ratio to the best of heyoka's batches."""
     where = "one core" if found[0].cores == 1 else f"{found[0].cores} cores"
-    rows = [[f"Many of {name}, {where}, each and step", *(f"{one.h:g} s" for one in found)]]
+    rows = [[f"Many of {name}, {where}, each and step", *(_column(one) for one in found)]]
     for way in found[0].seconds:
         cells = [duration(float(np.median(one.seconds[way]))) for one in found]
         if way in found[0].taken:
