@@ -8,6 +8,7 @@ import sys
 import warnings
 from collections.abc import Callable, Hashable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 from threading import Lock
 
@@ -30,8 +31,7 @@ from rov_fmu.c.prebuilt import prebuilt
 from rov_fmu.c.source import sources
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.output import Output, put_whole
-from rov_fmu.io.paths import is_own_file, own_folder
+from rov_fmu.io.output import kept
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _FILES = {
@@ -77,21 +77,20 @@ def load_sources(key: Hashable, sources_of: Callable[[], dict[str, str]]) -> cty
 def _load(texts: dict[str, str]) -> ctypes.CDLL:
     """Load the library of these sources from the cache folder, or from a temporary one when that fails."""
     key = _key(texts)
-    content = prebuilt(host_platform(fmi=3), texts)
     folder = user_cache_path("rov-fmu", appauthor=False) / "engine"
+
+    @cache
+    def make() -> bytes:
+        return prebuilt(host_platform(fmi=3), texts) or compile_engine(texts)
+
     try:
-        own = own_folder(folder)
-        for path in own.glob(f"{key}-*"):
-            if is_own_file(path) and path.name == _name(key, path.read_bytes()):  # otherwise the library is damaged
-                return ctypes.CDLL(str(path))
-        content = content or compile_engine(texts)
-        return ctypes.CDLL(str(_write(own, key, content)))
+        return ctypes.CDLL(str(kept(folder, key, make)))
     except OSError as error:
         reason = f"{folder}: the compiled engine cannot be kept there: {error.strerror or error}"
         remedy = "It is compiled for this process alone, which takes some seconds"
         warnings.warn(f"{reason}. {remedy}", UserWarning, stacklevel=2)
     with temporary_folder("rov-fmu-") as temporary:
-        return ctypes.CDLL(str(_write(Path(temporary), key, content or compile_engine(texts))))
+        return ctypes.CDLL(str(kept(Path(temporary), key, make)))
 
 
 def _key(texts: dict[str, str]) -> str:
@@ -109,18 +108,3 @@ def _processor() -> str:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
         return next((line for line in lines if line.startswith(("flags", "Features"))), "")
     return platform.processor()
-
-
-def _write(folder: Path, key: str, content: bytes) -> Path:
-    """Write a library whole or not at all. Another process may write the same library at the same time."""
-    path = folder / _name(key, content)
-    if path.is_symlink() or (path.exists() and not is_own_file(path)):
-        path.unlink()
-    put_whole(Output(path, content))
-    path.chmod(0o600)  # whatever the umask is
-    return path
-
-
-def _name(key: str, content: bytes) -> str:
-    """Return the name of a library, which contains a digest of its content."""
-    return f"{key}-{hashlib.sha256(content).hexdigest()[:32]}"

@@ -14,7 +14,7 @@ from pathlib import Path
 from rov_fmu.io.file_kinds import check_written
 from rov_fmu.io.interrupts import UNINTERRUPTED, cleaned_up
 from rov_fmu.io.messages import FileError, RovError
-from rov_fmu.io.paths import own_folder
+from rov_fmu.io.paths import is_own_file, own_folder
 from rov_fmu.io.reading import open_file, read_text
 
 
@@ -113,6 +113,29 @@ def put_whole(*outputs: Output) -> None:
             for path, draft in ready:
                 with _errors_about(path):
                     draft.replace(path)
+
+
+def kept(folder: Path, key: str, make: Callable[[], bytes]) -> Path:
+    """Return the file that a cache folder has under a key. It is made if it is missing or damaged.
+
+    Its name has the key, which says what the content depends on, and a digest of the content. Raises OSError if the
+    folder cannot be used (`own_folder`), and what `make` raises.
+    """
+    own = own_folder(folder)
+    for path in own.glob(f"{key}-*"):
+        if is_own_file(path) and path.name == _kept_name(key, path.read_bytes()):
+            return path
+    content = make()
+    path = own / _kept_name(key, content)  # another process may write the same file at the same time
+    if path.is_symlink() or (path.exists() and not is_own_file(path)):
+        path.unlink()
+    put_whole(Output(path, content))
+    path.chmod(0o600)  # whatever the umask is
+    return path
+
+
+def _kept_name(key: str, content: bytes) -> str:
+    return f"{key}-{hashlib.sha256(content).hexdigest()[:32]}"
 
 
 def _draft(output: Output, drafts: ExitStack) -> Path:

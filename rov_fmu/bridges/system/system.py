@@ -1,11 +1,17 @@
 """A system from its plan: everything that does not fit is told, and then the FMUs of vehicles are built."""
 
+import hashlib
+import json
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+from platformdirs import user_cache_path
+
+from rov_fmu import __version__
 from rov_fmu.bridges.system.companion import Rows, companion, lack, levels_of, rows_of, slave_of
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,
@@ -20,11 +26,13 @@ from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
 from rov_fmu.build import build
+from rov_fmu.c.compile import compiler_identity, host_platform
 from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, lines_on, listed
+from rov_fmu.io.output import kept
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.toml_file import LARGEST, key_line
@@ -180,10 +188,24 @@ def _description(vehicle: Vehicle) -> Part:
 
 
 def _built(vehicle: Vehicle) -> bytes:
-    """Return the FMU of a vehicle for this machine. Raises BuildError."""
-    with temporary_folder("system-") as folder:
-        path = Path(folder, f"{vehicle.identifier}.fmu")
-        return build(vehicle, path, platforms="host", interface="cs").path.read_bytes()
+    """Return the FMU of a vehicle for this machine: from the user's cache folder, or built now. Raises BuildError.
+
+    It is kept by all that it depends on: its interface and code (GUID), the texts of its file, and the compiler.
+    """
+    guid, text = native_content(vehicle, interface="cs").guid, vehicle.file_content or b""
+    parts = [guid, text.hex(), __version__, host_platform(), compiler_identity()]
+    folder = user_cache_path("rov-fmu", appauthor=False) / "fmu"
+
+    @cache
+    def make() -> bytes:
+        with temporary_folder("system-") as own:
+            path = Path(own, f"{vehicle.identifier}.fmu")
+            return build(vehicle, path, platforms="host", interface="cs").path.read_bytes()
+
+    try:
+        return kept(folder, hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32], make).read_bytes()
+    except OSError:  # the folder cannot be used
+        return make()
 
 
 def _set_values(
