@@ -41,7 +41,8 @@ static const double INVERSE[ORDER + 1] = {0.0,        1.0,        1.0 / 2.0,  1.
                                           1.0 / 7.0,  1.0 / 8.0,  1.0 / 9.0,  1.0 / 10.0, 1.0 / 11.0, 1.0 / 12.0, 1.0 / 13.0,
                                           1.0 / 14.0, 1.0 / 15.0, 1.0 / 16.0, 1.0 / 17.0, 1.0 / 18.0, 1.0 / 19.0};
 
-/* Two numbers that a processor adds and multiplies at once. Other compilers do it one after the other, to the same bits. */
+/* Two numbers that a processor adds and multiplies at once. Other compilers do it one after the other, to the same bits; so does
+ * every compiler without an attitude, where the unrolled loops are then a tenth faster. */
 #if LANES == 1 && HAS_ATTITUDE && defined __GNUC__
 typedef double pair __attribute__((vector_size(16)));
 
