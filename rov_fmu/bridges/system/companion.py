@@ -11,6 +11,7 @@ from typing import Any
 from uuid import UUID
 from xml.etree.ElementTree import Element, SubElement, tostring
 
+from rov_fmu.bridges.system.companions import _common
 from rov_fmu.equation.parts import Point
 from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.archive import archive
@@ -20,6 +21,8 @@ from rov_fmu.io.csv_table import DataFileError, read_series
 from rov_fmu.io.interrupts import temporary_folder
 
 _FILES = {path.stem: path for path in Path(__file__).with_name("companions").glob("[a-z]*.py")}
+_COMMON = "rov_fmu_companion"
+"""The name of the module that companions have in common, in their FMUs."""
 COMPANIONS = tuple(sorted(_FILES))
 """The names of the companions."""
 _PORT = port_of(Point(name="point")).names
@@ -54,7 +57,10 @@ def companion(name: str, rows: Rows = [], places: Sequence[str] = (), levels: in
     - `levels`: with how many levels it passes on or gets a profile of the water; 0 for the usual number.
     """
     slave = slave_of(name)
-    sources = {f"{slave.__name__}_slave.py": _FILES[name].read_text(encoding="utf-8")}
+    sources = {
+        f"{slave.__name__}_slave.py": _FILES[name].read_text(encoding="utf-8").replace(_common.__name__, _COMMON),
+        f"{_COMMON}.py": Path(_common.__file__).read_text(encoding="utf-8"),
+    }
     if shape := {key: one for key, one in {"rows": rows, "places": [*places], "levels": levels}.items() if one}:
         sources["shape.json"] = json.dumps(shape)
     with temporary_folder("companion-") as folder:

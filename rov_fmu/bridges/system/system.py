@@ -40,7 +40,7 @@ from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle
 
 _MOST_TOLD = 8
-"""The most inputs of a terminal that are told by their names."""
+"""The most inputs of a component or a terminal that are told by their names."""
 _MOST_BYTES = 1_000_000_000
 """The most bytes of all FMUs, which are in memory."""
 
@@ -337,7 +337,9 @@ def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
                 yield f"{component}: the velocity of {terminal} is the change of its place, because it is not connected"
                 free = [name for name in free if name not in velocities]
         if free:
-            yield f"{component}: nothing is connected to {listed(free)}, which keep their start values"
+            others = [f"{len(free) - _MOST_TOLD} others"] if len(free) > _MOST_TOLD + 1 else free[_MOST_TOLD:]
+            names = listed([*free[:_MOST_TOLD], *others])
+            yield f"{component}: nothing is connected to {names}, which keep their start values"
 
 
 def files_of(plan: SystemPlan, structure: Structure, name: str) -> System:

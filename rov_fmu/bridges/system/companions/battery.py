@@ -7,13 +7,15 @@ a resistance. By Peukert's law, a current I empties it in the time H (C / (H I))
 
 from math import sqrt
 
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
+
+from rov_fmu.bridges.system.companions._common import Variables, register
 
 THRUSTS = ("F_l", "F_r", "F_t")
 
 # name: causality, start, unit, description
-VARIABLES: dict[str, tuple[str, float | bool, str, str]] = {
+VARIABLES: Variables = {
     "electric_power": ("input", 0.0, "W", "Electric power of the thrusters"),
     "F_l": ("input", 0.0, "N", "Thrust F_l"),
     "F_r": ("input", 0.0, "N", "Thrust F_r"),
@@ -41,7 +43,6 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
     author = "rov-fmu"
     description = "A battery: from electric power or thrusts to the voltage"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
-    variables = VARIABLES
     terminals = (("electric", ("electric_power",)), ("battery", ("voltage",)))
 
     electric_power: float
@@ -57,12 +58,7 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        for name, (causality, start, _, text) in VARIABLES.items():
-            setattr(self, name, start)
-            changes = Fmi2Variability.tunable if causality == "parameter" else Fmi2Variability.continuous
-            kind, changes = (Boolean, Fmi2Variability.discrete) if start is False else (Real, changes)
-            how = {"causality": Fmi2Causality[causality], "variability": changes}
-            self.register_variable(kind(name, description=text, **how))
+        register(self, VARIABLES)
 
     def exit_initialization_mode(self) -> None:
         """Begin full."""

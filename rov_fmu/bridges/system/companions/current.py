@@ -8,41 +8,27 @@ Each vehicle has a place in the water, where it asks for the velocity. A tether 
 between which the velocity is on straight lines. They are the rows of the file, or lie close where the profile bends.
 """
 
-import json
 from bisect import bisect_right
 from math import cos, sin
-from pathlib import Path
 
-from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu import DefaultExperiment, Fmi2Slave
 
-LEVELS = 16  # at least; a file may have more rows
+from rov_fmu.bridges.system.companions._common import LEVELS, WATER, Variables, at, profile, register, shape_of
 
 # name: causality, start, unit, description
-VARIABLES: dict[str, tuple[str, float, str, str]] = {
+VARIABLES: Variables = {
     "speed": ("parameter", 0.3, "m/s", "Speed at the surface; without a file"),
     "direction": ("parameter", 0.0, "rad", "Direction that the water runs to, from north to east; without a file"),
     "exponent": ("parameter", 1.0 / 7.0, "1", "Exponent of the profile; without a file"),
     "rise": ("parameter", 0.0, "s", "Time in which the current grows from nothing; without a file"),
     "seabed": ("parameter", 100.0, "m", "Depth of the seabed, to which the levels reach"),
 }
-WATER = (("V_N", "northward"), ("V_E", "eastward"), ("V_D", "downward"))
 
 
-def place(suffix: str) -> dict[str, tuple[str, float, str, str]]:
+def place(suffix: str) -> Variables:
     """Return the variables of a place in the water."""
-    found = {f"z{suffix}": ("input", 0.0, "m", "Depth of the vehicle")}
-    return found | {
-        f"{name}{suffix}": ("output", 0.0, "m/s", f"Velocity of the water there, {to}") for name, to in WATER
-    }
-
-
-def profile(levels: int) -> dict[str, tuple[str, float, str, str]]:
-    """Return the variables of the levels."""
-    found = {}
-    for n in range(1, levels + 1):
-        found[f"depth_{n}"] = ("output", 0.0, "m", f"Depth of level {n} of the water, level 1 at the top")
-        found |= {f"{name}_{n}": ("output", 0.0, "m/s", f"Velocity at level {n}, {to}") for name, to in WATER}
-    return found
+    found: Variables = {f"z{suffix}": ("input", 0.0, "m", "Depth of the vehicle")}
+    return found | {f"{name}{suffix}": ("output", 0.0, "m/s", f"Velocity of the water, {to}") for name, to in WATER}
 
 
 Rows = list[list[float]]
@@ -67,23 +53,18 @@ class Current(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        file = Path(str(arguments.get("resources")), "shape.json")
-        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+        shape = shape_of(arguments)
         self.times: list[float] = [time for time, _ in shape.get("rows", ())]
         self.profiles: list[Rows] = [rows for _, rows in shape.get("rows", ())]
         self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
-        self.levels = profile(max(LEVELS, shape.get("levels", 0)))
-        self.variables = place("") | VARIABLES | self.levels
+        self.levels = profile(shape.get("levels", 0), "output")
+        variables = place("") | VARIABLES | self.levels
         self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = [("profile", [*self.levels], ())]
         for suffix in self.suffixes:
-            self.variables |= place(suffix)
+            variables |= place(suffix)
             for port, names in self.places:
                 self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
-        for name, (causality, start, _, text) in self.variables.items():
-            setattr(self, name, start)
-            changes = Fmi2Variability.tunable if causality == "parameter" else Fmi2Variability.continuous
-            kind = {"causality": Fmi2Causality[causality], "variability": changes}
-            self.register_variable(Real(name, description=text, **kind))
+        register(self, variables)
 
     def exit_initialization_mode(self) -> None:
         """Begin with the water at the start."""
@@ -126,25 +107,9 @@ class Current(Fmi2Slave):  # type: ignore[misc]
             share = max(0.0, 1.0 - max(z, 0.0) / self.seabed) ** self.exponent
             speed = self.speed * share * (min(1.0, t / self.rise) if self.rise > 0.0 else 1.0)
             return [speed * cos(self.direction), speed * sin(self.direction), 0.0]
-        before, after = self._around(t)
-        return between(
-            self.times[before], at(self.profiles[before], z), self.times[after], at(self.profiles[after], z), t
-        )
+        return at([[self.times[n], *at(self.profiles[n], z)] for n in self._around(t)], t)
 
 
 def depths_of(*profiles: Rows) -> list[float]:
     """Return the depths of the rows of some profiles, from above."""
     return sorted({depth for rows in profiles for depth, *_ in rows})
-
-
-def at(profile: Rows, z: float) -> list[float]:
-    """Return the velocity at a depth of a profile, whose rows have a depth and a velocity."""
-    n = bisect_right([depth for depth, *_ in profile], z)
-    (a, *above), (b, *below) = profile[max(n - 1, 0)], profile[min(n, len(profile) - 1)]
-    return between(a, above, b, below, z)
-
-
-def between(a: float, above: list[float], b: float, below: list[float], x: float) -> list[float]:
-    """Return the values at x on a straight line from those at a to those at b."""
-    share = (x - a) / (b - a) if b > a else 0.0
-    return [p + share * (q - p) for p, q in zip(above, below, strict=True)]

@@ -8,16 +8,16 @@ The seabed pushes with GROUND for each metre of depth and diameter, and damps as
 MoorDyn's own damping is so large that a node would need some 100 times smaller substeps.
 """
 
-import json
-from bisect import bisect_right
 from math import ceil, hypot, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from pythonfmu import Boolean, DefaultExperiment, Fmi2Slave, Real
-from pythonfmu.enums import Fmi2Causality, Fmi2Status, Fmi2Variability
+from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu.enums import Fmi2Status
 
-SEGMENTS, SHOWN, LEVELS = 20, 11, 16  # of the line, the points of its shape, the levels of the water at least
+from rov_fmu.bridges.system.companions._common import Variables, at, profile, register, shape_of
+
+SEGMENTS, SHOWN = 20, 11  # of the line, the points of its shape
 SUBSTEP = 0.2  # of the time in which a wave of tension passes a segment: twice as much can be unstable
 GROUND = 1e5  # stiffness of the seabed, Pa/m
 DEPTH = 100.0  # of the seabed, where nothing tells it, m
@@ -25,7 +25,7 @@ ENDS = {"top": "upper", "bottom": "lower"}
 AXES = (("N", "x", "north"), ("E", "y", "east"), ("D", "z", "down"))
 
 # name: causality, start, unit, description
-VARIABLES: dict[str, tuple[str, float | bool, str, str]] = {
+VARIABLES: Variables = {
     "length": ("parameter", 60.0, "m", "Length without tension"),
     "diameter": ("parameter", 0.0076, "m", "Diameter"),
     "mass": ("parameter", 0.0465, "kg/m", "Mass over length; 0.0465 floats with the default diameter"),
@@ -47,15 +47,6 @@ VARIABLES |= {
     for n in range(SHOWN)
     for _, x, to in AXES
 }
-
-
-def profile(levels: int) -> dict[str, tuple[str, float | bool, str, str]]:
-    """Return the variables of the levels of the water. The last one is that above the first one which is no deeper."""
-    found: dict[str, tuple[str, float | bool, str, str]] = {}
-    for n in range(1, levels + 1):
-        found[f"depth_{n}"] = ("input", 0.0, "m", f"Depth of level {n} of the water, level 1 at the top")
-        found |= {f"V_{d}_{n}": ("input", 0.0, "m/s", f"Velocity of the water at level {n}, {to}") for d, _, to in AXES}
-    return found
 
 
 FILE = """tether
@@ -97,16 +88,9 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
         self.system: object = None
         self.history: list[list[float]] = []
-        file = Path(str(arguments.get("resources")), "shape.json")
-        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
-        self.levels = max(LEVELS, shape.get("levels", 0))
-        self.variables = VARIABLES | profile(self.levels)
-        self.terminals = (("profile", tuple(profile(self.levels))),)
-        for name, (causality, start, _, text) in self.variables.items():
-            setattr(self, name, start)
-            changes = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
-            kind = {"causality": Fmi2Causality[causality], "variability": changes}
-            self.register_variable((Boolean if start is False else Real)(name, description=text, **kind))
+        self.levels = profile(shape_of(arguments).get("levels", 0), "input")
+        self.terminals = (("profile", [*self.levels]),)
+        register(self, VARIABLES | self.levels, "fixed")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
@@ -174,7 +158,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
     def _levels(self) -> list[list[float]]:
         """Return depth and velocity of each level that is deeper than the one above it."""
         found: list[list[float]] = []
-        for n in range(1, self.levels + 1):
+        for n in range(1, len(self.levels) // 4 + 1):
             level = [getattr(self, f"{name}_{n}") for name in ("depth", "V_N", "V_E", "V_D")]
             if found and level[0] <= found[-1][0]:
                 break
@@ -200,8 +184,5 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
 
 def current(levels: list[list[float]], depth: float) -> list[float]:
     """Return the velocity of the water at a depth in the frame of MoorDyn, on straight lines between the levels."""
-    n = bisect_right([level[0] for level in levels], depth)
-    (a, *above), (b, *below) = levels[max(n - 1, 0)], levels[min(n, len(levels) - 1)]
-    share = (depth - a) / (b - a) if b > a else 0.0
-    V_N, V_E, V_D = (p + share * (q - p) for p, q in zip(above, below, strict=True))
+    V_N, V_E, V_D = at(levels, depth)
     return [V_N, -V_E, -V_D]

@@ -1,0 +1,48 @@
+"""What companions have in common. The FMU of each contains this file, too."""
+
+import json
+from bisect import bisect_right
+from pathlib import Path
+from typing import Any
+
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Variability, Real
+
+Variables = dict[str, tuple[str, float | bool, str, str]]
+"""Causality, start value, unit and description by name."""
+LEVELS = 16
+"""The levels of a profile of the water; a file may have more rows."""
+WATER = (("V_N", "northward"), ("V_E", "eastward"), ("V_D", "downward"))
+
+
+def shape_of(arguments: dict[str, Any]) -> dict[str, Any]:
+    """Return the shape of a companion, shape.json among its resources, by the arguments of its slave."""
+    file = Path(str(arguments.get("resources")), "shape.json")
+    shape: dict[str, Any] = json.loads(file.read_text("utf-8")) if file.is_file() else {}
+    return shape
+
+
+def register(slave: Any, variables: Variables, parameters: str = "tunable") -> None:
+    """Give a slave its variables."""
+    slave.variables = variables
+    for name, (causality, start, _, text) in variables.items():
+        setattr(slave, name, start)
+        kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
+        how = Fmi2Variability[parameters if causality == "parameter" else changes]
+        slave.register_variable(kind(name, description=text, causality=Fmi2Causality[causality], variability=how))
+
+
+def profile(levels: int, causality: str) -> Variables:
+    """Return the variables of the levels of the water. The last one is that above the first one which is no deeper."""
+    found: Variables = {}
+    for n in range(1, max(levels, LEVELS) + 1):
+        found[f"depth_{n}"] = (causality, 0.0, "m", f"Depth of level {n} of the water, level 1 at the top")
+        found |= {f"{name}_{n}": (causality, 0.0, "m/s", f"Velocity at level {n}, {to}") for name, to in WATER}
+    return found
+
+
+def at(rows: list[list[float]], x: float) -> list[float]:
+    """Return the values at x on straight lines between rows, which begin with their x; outside, of the nearest row."""
+    n = bisect_right([row[0] for row in rows], x)
+    (a, *above), (b, *below) = rows[max(n - 1, 0)], rows[min(n, len(rows) - 1)]
+    share = (x - a) / (b - a) if b > a else 0.0
+    return [p + share * (q - p) for p, q in zip(above, below, strict=True)]
