@@ -139,9 +139,7 @@ def build(
 
     missing = [name for name in chosen or [] if name not in binaries]
     binaries |= compile_all(missing, content.sources, content.identifier, done, fmi)
-    files = dict(content.files)
-    for name, library in binaries.items():
-        files[f"binaries/{_folder(name, fmi)}/{content.identifier}{PLATFORMS[name].suffix}"] = library
+    files = with_binaries(content, binaries, fmi)
     packed = archive(files, partial(meta_data, vehicle, files))
     lost = sorted(_platforms_in(output) - _folders(files))
     if sign:
@@ -151,6 +149,16 @@ def build(
     written = write_whole(draft, *beside, force=force, is_ours=is_ours)
     sizes = {name: len(library) for name, library in binaries.items()}
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], written, lost)
+
+
+def with_binaries(content: Content, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
+    """Return the files of an FMU with its binaries by platform."""
+    name = content.identifier
+    libraries = {
+        f"binaries/{_folder(platform, fmi)}/{name}{PLATFORMS[platform].suffix}": library
+        for platform, library in binaries.items()
+    }
+    return {**content.files, **libraries}
 
 
 def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> Content:

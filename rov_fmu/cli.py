@@ -489,15 +489,16 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
     "--to",
     required=True,
     type=_Choice(
-        ["mujoco", "allocation", "ardusub-gains", "sdf", "urdf"],
-        {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco", "gains": "ardusub-gains"},
+        ["mujoco", "allocation", "autopilot", "gains", "ardusub-gains", "sdf", "urdf"],
+        {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco", "ardusub": "ardusub-gains"},
     ),
-    help="MuJoCo, the allocation of thrust, the gains of ArduSub, Gazebo (SDFormat), or ROS 2 (URDF).",
+    help="MuJoCo, the allocation of thrust, an autopilot (FMU), its gains, those of ArduSub, Gazebo (SDFormat), or "
+    "ROS 2 (URDF).",
 )
 @_output_option(
     metavar="PATH",
-    help="Folder (mujoco, allocation, ardusub-gains) or file (sdf, urdf) to write. The default is <identifier>_mujoco, "
-    "<identifier>_allocation, <identifier>_ardusub_gains, <identifier>.sdf or <identifier>.urdf.",
+    help="File (sdf, urdf) or folder (others) to write. The default is the identifier with the name of the format, "
+    "such as <identifier>_mujoco or <identifier>.sdf.",
 )
 @click.option(
     "--draws",

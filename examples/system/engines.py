@@ -15,6 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from rov_fmu.bridges.autopilot.gains import autopilot_of
+from rov_fmu.bridges.autopilot.law import AXES, SENSORS
+from rov_fmu.bridges.autopilot.pilot import Pilot
 from rov_fmu.bridges.system.ssp import PARAMETER_SET
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY
@@ -45,13 +48,30 @@ class Rov:
         vars(self).update(zip(OUTPUTS["rov"], results, strict=True))
 
 
+class Held:
+    """The autopilot of the vehicle with the same interface."""
+
+    def __init__(self, values: Values) -> None:
+        self._pilot = Pilot(autopilot_of(load_vehicle(VIDEORAY), STEP))
+        names = (*SENSORS, *OUTPUTS["autopilot"], "sag")
+        vars(self).update({**dict.fromkeys(names, 0.0), **values})
+        for n, axis in enumerate(AXES):
+            mode = int(values.get(f"mode_{axis.velocity}", 0))
+            aim = (f"stick_{axis.velocity}", f"ref_{axis.velocity}", f"ref_{SENSORS[n]}")[mode]
+            self._pilot.modes[n], self._pilot.aims[n] = mode, values.get(aim, 0.0)
+
+    def do_step(self, current_time: float, step_size: float) -> None:  # noqa: ARG002
+        """Take the sensors at the start of the step; the commands are there at its end."""
+        vars(self).update(self._pilot.step(vars(self), step_size, 1.0 - vars(self)["sag"]))
+
+
 def plain(parameters: str, *, sequential: bool = False) -> Trajectory:
     """Run the slaves and the vehicle in a loop; sequential: each gets the newest outputs of the others."""
     values = parameter_sets()[parameters]
     parts: dict[str, Any] = {name: SLAVES[name](instance_name=name) for name in values if name in SLAVES}
     for name, slave in parts.items():
         vars(slave).update(values[name])
-    parts["rov"] = Rov(values["rov"])
+    parts |= {"rov": Rov(values["rov"]), "autopilot": Held(values["autopilot"])}
 
     def pass_on(components: Iterable[str]) -> None:
         for (start, output), (end, name) in CONNECTIONS.items():

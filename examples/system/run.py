@@ -82,8 +82,8 @@ def difference(a: Trajectory, b: Trajectory) -> dict[str, float]:
 def held(result: Trajectory) -> tuple[float, float]:
     """The largest errors of depth (m) and heading (deg) once the manoeuvre is over."""
     late = TIME >= HELD_FROM
-    depth = np.abs(result["rov.z"][late] - MISSION["z_ref"])
-    heading = np.abs(result["rov.psi"][late] - MISSION["psi_ref"])
+    depth = np.abs(result["rov.z"][late] - MISSION["ref_z"])
+    heading = np.abs(result["rov.psi"][late] - MISSION["ref_psi"])
     return float(depth.max()), degrees(float(heading.max()))
 
 
@@ -106,8 +106,8 @@ def draw(results: Mapping[str, Trajectory], path: Path, *, force: bool) -> None:
                 commands.plot(t, 100.0 * few[f"autopilot.{name}"], color=LIGHT[role], **line, label=label)
             battery.plot(t, 100.0 * few["battery.sag"], color=LIGHT["teal"], **line, label=parameters)
         wanted: Any = {"color": LIGHT["orange"], "linewidth": 1.3, "linestyle": ":", "label": "wanted"}
-        depth.plot(t, few["autopilot.z_d"], **wanted)
-        heading.plot(t, np.degrees(few["autopilot.psi_d"]), **wanted)
+        depth.axhline(MISSION["ref_z"], **wanted)
+        heading.axhline(degrees(MISSION["ref_psi"]), **wanted)
         for name, role in (("V_N", "teal"), ("V_E", "violet")):
             current.plot(t, few[f"current.{name}"], color=LIGHT[role], linewidth=1.6, label=name)
         track.plot(0.0, 0.0, "o", markersize=4.5, **blue)

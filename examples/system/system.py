@@ -7,8 +7,9 @@ from collections.abc import Mapping
 from math import pi
 from pathlib import Path
 
+from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
+from rov_fmu.bridges.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.companion import companion
-from rov_fmu.bridges.system.companions.autopilot import Autopilot
 from rov_fmu.bridges.system.companions.battery import Battery
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.ssp import Component, System, ssp_content, write_osp
@@ -29,7 +30,7 @@ IDENTIFIED = "videoray_refit"
 Values = Mapping[str, float | bool]
 
 # The set points, and as much forward stick as holds the place against current and tether.
-MISSION: Values = {"z_ref": 5.0, "psi_ref": pi / 2, "surge": 0.26, "depth_hold": True, "heading_hold": True}
+MISSION: Values = {"mode_w": 2.0, "ref_z": 5.0, "mode_r": 2.0, "ref_psi": pi / 2, "stick_u": 0.09}
 # The tether pulls aft, up and to starboard. The current runs westward, at the bow after the turn.
 TETHER: Values = {"X_ext": -2.0, "Z_ext": -1.5, "N_ext": 0.05}
 
@@ -37,6 +38,8 @@ TETHER: Values = {"X_ext": -2.0, "Z_ext": -1.5, "N_ext": 0.05}
 CONNECTIONS = {
     ("rov", "z"): ("autopilot", "z"),
     ("rov", "psi"): ("autopilot", "psi"),
+    ("rov", "r"): ("autopilot", "r"),
+    ("rov", "vg_D"): ("autopilot", "vg_D"),
     ("autopilot", "u_l"): ("rov", "u_l"),
     ("autopilot", "u_r"): ("rov", "u_r"),
     ("autopilot", "u_t"): ("rov", "u_t"),
@@ -47,16 +50,22 @@ CONNECTIONS = {
     ("rov", "F_t"): ("battery", "F_t"),
     ("battery", "sag"): ("autopilot", "sag"),
 }
-# What stands for the connections of ROV and autopilot: the groups of the OSP model descriptions.
-GROUPS = dict.fromkeys(("depth", "heading", "thruster_commands"), ("rov", "autopilot"))
+# What stands for the connections from the autopilot to the ROV: a group of the OSP model descriptions.
+GROUPS = {"thruster_commands": ("autopilot", "rov")}
 
-SLAVES: dict[str, type] = {"current": Current, "battery": Battery, "autopilot": Autopilot}
-FMUS = {"rov": "videoray.fmu"} | {name: f"{slave.__name__}.fmu" for name, slave in SLAVES.items()}
+OSP = "videoray_autopilot_OspModelDescription.xml"
+
+SLAVES: dict[str, type] = {"current": Current, "battery": Battery}
+FMUS = {
+    "rov": "videoray.fmu",
+    "autopilot": "videoray_autopilot.fmu",
+    **{name: f"{slave.__name__}.fmu" for name, slave in SLAVES.items()},
+}
 OUTPUTS = {
-    "rov": ("x", "y", "z", "psi", "u", "w", "r", "F_l", "F_r", "F_t"),
+    "rov": ("x", "y", "z", "psi", "u", "w", "r", "F_l", "F_r", "F_t", "vg_D"),
     "current": ("V_N", "V_E"),
     "battery": ("sag", "drawn", "electric_current"),
-    "autopilot": ("u_l", "u_r", "u_t", "z_d", "psi_d"),
+    "autopilot": ("u_l", "u_r", "u_t"),
 }
 
 
@@ -83,9 +92,10 @@ def build_system(folder: Path) -> None:
         raise RuntimeError("videoray.fmu was not built")
     build = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "current.py"), "-d", str(folder)]
     subprocess.run(build, check=True)
-    for name in ("battery", "autopilot"):
-        (folder / FMUS[name]).write_bytes(companion(name))
-    shutil.copy(HERE / "Autopilot_OspModelDescription.xml", folder)
+    (folder / FMUS["battery"]).write_bytes(companion("battery"))
+    held = autopilot_of(load_vehicle(SHIPPED[DEFAULT]), STEP)
+    (folder / FMUS["autopilot"]).write_bytes(autopilot_fmu(held, ["host"]))
+    shutil.copy(HERE / OSP, folder)
     for parameters, values in parameter_sets().items():
         # Only connected inputs are connectors, for FMPy sets every one of them at every step.
         components = {

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from types import MappingProxyType
 from uuid import UUID
@@ -17,14 +17,13 @@ from rov_fmu.c.compile import (
     fmi_headers,
 )
 from rov_fmu.c.prebuilt import MODULE, prebuilt
-from rov_fmu.c.source import generated_sources, unused_sources
 from rov_fmu.c.source import sources as motion_sources
 from rov_fmu.equation.layout import Layout
-from rov_fmu.fmu.model_description import build_description, model_description
+from rov_fmu.fmu.model_description import build_description, model_description, model_of
 from rov_fmu.fmu.picture import read_png
 from rov_fmu.fmu.python_flavour import python_files, python_sources
-from rov_fmu.fmu.terminals import FOLDER, ICON, terminals_and_icons
-from rov_fmu.fmu.variables import interface_header, variables
+from rov_fmu.fmu.terminals import FOLDER, ICON
+from rov_fmu.fmu.variables import Model, interface_header
 from rov_fmu.io.paths import LICENSE
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -52,43 +51,50 @@ class Content:
 
 
 def native_content(
-    vehicle: Vehicle,
+    subject: Vehicle | Model,
     pages: Mapping[str, bytes] = MappingProxyType({}),
     fmi: int = 2,
     interface: str = "both",
     platforms: Collection[str] = PLATFORMS.keys(),
 ) -> Content:
-    """Return the FMU in C for one of INTERFACES.
+    """Return the FMU in C of a vehicle or another model for one of INTERFACES.
 
     `pages` are further files, by their paths. `platforms` are those of PLATFORMS for which it will have binaries.
     """
-    declared = variables(vehicle)
+    own_files = dict(pages)
+    if isinstance(subject, Model):
+        model = subject
+    else:
+        model = replace(model_of(subject), c_files=motion_sources(subject.layout))
+        own_files = _own_files(subject, pages)
     other_version = {2: "fmi3_", 3: "fmi2_"}[fmi]
-    left_out = (other_version, *unused_sources(vehicle.layout))
-    paths = [path for path in sorted(C_SOURCES.iterdir()) if not path.name.startswith(left_out)]
-    sources = {path.name: path.read_text(encoding="utf-8") for path in paths}
-    sources |= generated_sources(vehicle.layout)
+    names = [path.name for path in sorted(C_SOURCES.iterdir())]
+    own = [name for name in names if name.startswith(("fmi", "fmu", "instance", "saved"))]
+    sources = {name: C_SOURCES.joinpath(name).read_text(encoding="utf-8") for name in own if other_version not in name}
+    sources |= model.c_files
     source_files = (UNITY_FILE,) if fmi == 2 else ()
     interfaces = INTERFACES[interface]
-    describe = partial(model_description, vehicle, declared, interfaces=interfaces, source_files=source_files, fmi=fmi)
+    describe = partial(model_description, model, interfaces=interfaces, source_files=source_files, fmi=fmi)
     guid = _guid(describe(guid=""), sources)
-    sources["interface.h"] = interface_header(vehicle, vehicle.identifier, guid, fmi, interfaces)
+    sources["interface.h"] = interface_header(model, guid, fmi, interfaces)
     files = {"documentation/licenses/fmi-headers.txt": _fmi_license(fmi)}
     files |= {f"sources/{name}": text.encode() for name, text in sources.items()}
     if fmi == 3:
-        files["sources/buildDescription.xml"] = build_description(vehicle.identifier)
+        files["sources/buildDescription.xml"] = build_description(model.identifier)
         files["documentation/externalDependencies.txt"] = _external_dependencies(platforms).encode()
-    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, sources)
+    documents = _common_files(model, describe(guid=guid)) | own_files
+    return Content(model.identifier, guid, documents | files, sources)
 
 
 def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
     """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
-    declared = variables(vehicle)
-    sources = python_sources(vehicle, declared)
-    describe = partial(model_description, vehicle, declared, interfaces=INTERFACES["cs"], native=False)
+    model = model_of(vehicle)
+    sources = python_sources(vehicle, model.variables)
+    describe = partial(model_description, model, interfaces=INTERFACES["cs"], native=False)
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle.identifier, sources)
-    return Content(vehicle.identifier, guid, _common_files(vehicle, describe(guid=guid), pages) | files, {})
+    documents = _common_files(model, describe(guid=guid)) | _own_files(vehicle, pages)
+    return Content(vehicle.identifier, guid, documents | files, {})
 
 
 def _external_dependencies(platforms: Collection[str]) -> str:
@@ -108,17 +114,23 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
     return f"{{{UUID(digest.hexdigest()[:32])}}}"
 
 
-def _common_files(vehicle: Vehicle, description: bytes, pages: Mapping[str, bytes]) -> dict[str, bytes]:
+def _common_files(model: Model, description: bytes) -> dict[str, bytes]:
     """Return the files that FMUs in C and in Python both have, by their path."""
-    report = vehicle.provenance.report if vehicle.provenance else None
-    files = {"documentation/licenses/license.txt": LICENSE, f"documentation/{REPORT}": report}
-    read = {name: read_bytes(path, VehicleFileError) for name, path in files.items() if path}
+    terminals = {f"{FOLDER}/terminalsAndIcons.xml": model.terminals}
+    license_text = {"documentation/licenses/license.txt": read_bytes(LICENSE, VehicleFileError)}
+    return {"modelDescription.xml": description, **terminals, **license_text}
+
+
+def _own_files(vehicle: Vehicle, pages: Mapping[str, bytes]) -> dict[str, bytes]:
+    """Return the report and the picture of a vehicle, and its pages, by their path."""
+    read = dict[str, bytes]()
+    if report := vehicle.provenance.report if vehicle.provenance else None:
+        read[f"documentation/{REPORT}"] = read_bytes(report, VehicleFileError)
     if picture := vehicle.picture("model.png"):
         read["model.png"] = read_png(picture)
     elif ICON in pages:
         read["model.png"] = pages[ICON]
-    terminals = {f"{FOLDER}/terminalsAndIcons.xml": terminals_and_icons(vehicle.layout)}
-    return {"modelDescription.xml": description, **terminals, **read, **pages}
+    return {**read, **pages}
 
 
 def _fmi_license(fmi: int) -> bytes:

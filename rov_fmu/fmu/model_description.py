@@ -1,15 +1,15 @@
 """Write modelDescription.xml (FMI 2.0, section 2.2; FMI 3.0, section 2.4)."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 from rov_fmu import __version__
 from rov_fmu.c.compile import UNITY_FILE
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.dependencies import parameters_of
-from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.units import unit_of
 from rov_fmu.fmu.card import card_text
-from rov_fmu.fmu.variables import LOG_CATEGORIES, Variable
+from rov_fmu.fmu.terminals import terminals_and_icons
+from rov_fmu.fmu.variables import LOG_CATEGORIES, Model, Variable, variables
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -26,9 +26,23 @@ DEAD_TIME_NOTE = (
 """The text that follows the summary of a vehicle with a dead time, if the FMU is for Model Exchange."""
 
 
+def model_of(vehicle: Vehicle) -> Model:
+    """Return the model of a vehicle, without its C files."""
+    layout = vehicle.layout
+    return Model(
+        *(vehicle.identifier, vehicle.version, vehicle.source, vehicle.summary, card_text(vehicle)),
+        variables(vehicle),
+        terminals_and_icons(layout),
+        notes=[DEAD_TIME_NOTE] if layout.has_dead_time else [],
+        completes_steps=layout.has_attitude or layout.has_dead_time,
+        parameters_of=parameters_of(layout),
+        voltage_ranges=layout.voltage_ranges,
+        has_only_water=layout.has_only_water,
+    )
+
+
 def model_description(
-    vehicle: Vehicle,
-    variables: tuple[Variable, ...],
+    model: Model,
     *,
     guid: str,
     interfaces: Sequence[str],
@@ -40,15 +54,16 @@ def model_description(
 
     `interfaces` are the elements of what the FMU offers, such as CoSimulation. `native` is False in pure Python.
     """
-    notes = [DEAD_TIME_NOTE] if vehicle.layout.has_dead_time and "ModelExchange" in interfaces else []
+    notes = [*model.notes] if "ModelExchange" in interfaces else []
     notes += [] if native else [PYTHON_NOTE]
-    description = ". ".join(filter(None, (vehicle.summary, " ".join(notes))))
+    description = ". ".join(filter(None, (model.summary, " ".join(notes))))
+    declared = model.variables
     if fmi == 3:
-        variables = (*variables, Variable("time", len(variables), "Time", "s", "independent", "continuous"))
-    number, type_names = {v.name: v.index for v in variables}, _type_names(variables)
+        declared = (*declared, Variable("time", len(declared), "Time", "s", "independent", "continuous"))
+    number, type_names = {v.name: v.index for v in declared}, _type_names(declared)
     return render(
         "modelDescription.xml.j2",
-        vehicle=vehicle,
+        model=model,
         guid=guid,
         fmi=fmi,
         native=native,
@@ -56,15 +71,14 @@ def model_description(
         description=description,
         interfaces=interfaces,
         source_files=source_files,
-        units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in variables)},
-        types={type_names[v.name]: v for v in variables},
+        units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in declared)},
+        types={type_names[v.name]: v for v in declared},
         type_names=type_names,
         log_categories=LOG_CATEGORIES,
-        card=card_text(vehicle),
-        variables=variables,
+        variables=declared,
         number=number,
         numbers=lambda names: " ".join(str(number[name]) for name in names),
-        structure=_structure(variables, vehicle.layout, _LISTS[fmi]),
+        structure=_structure(declared, model.parameters_of, _LISTS[fmi]),
     ).encode()
 
 
@@ -98,16 +112,18 @@ _Elements = dict[str, dict[str, str]]
 """For each unknown the dependenciesKind of each known."""
 
 
-def _structure(variables: tuple[Variable, ...], layout: Layout, names: tuple[str, str, str]) -> dict[str, _Elements]:
-    """Return the lists of <ModelStructure> by name."""
-    parameters, order = parameters_of(layout), {v.name: v.index for v in variables}
+def _structure(
+    declared: tuple[Variable, ...], parameters: Mapping[str, Collection[str]], names: tuple[str, str, str]
+) -> dict[str, _Elements]:
+    """Return the lists of <ModelStructure> by name. `parameters` are those of `Model.parameters_of`."""
+    order = {v.name: v.index for v in declared}
     lists: dict[str, _Elements] = {name: {} for name in names}
     outputs, derivatives, initial = lists.values()
 
     def add(to: _Elements, variable: Variable, known: Mapping[str, str]) -> None:
         to[variable.name] = dict(sorted(known.items(), key=lambda item: order[item[0]]))
 
-    for v in variables:
+    for v in declared:
         if v.dependencies is None:
             continue
         if v.causality == "output":

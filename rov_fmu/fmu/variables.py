@@ -6,8 +6,8 @@ what is kept between steps, coefficients, attitude at the start, outputs that ca
 variable is its place in this order: from 0 in FMI 2.0, from 1 in FMI 3.0.
 """
 
-from collections.abc import Collection, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from math import isfinite
 from typing import Any
@@ -166,19 +166,48 @@ LOG_CATEGORIES = {
 """The log categories by the standard's names (2.2.4), each with its description."""
 
 
-def interface_header(vehicle: Vehicle, identifier: str, token: str, fmi: int, interfaces: Collection[str]) -> str:
+@dataclass(frozen=True, eq=False)
+class Model:
+    """What an FMU is of: a vehicle (`model_of`), or something else that the FMI functions in C can run."""
+
+    identifier: str
+    version: str
+    source: str
+    """Where its numbers are from, in words."""
+    summary: str
+    card: str
+    """The model card as text."""
+    variables: tuple[Variable, ...]
+    terminals: bytes
+    """The document terminalsAndIcons.xml."""
+    c_files: Mapping[str, str] = field(default_factory=dict)
+    """The C files beside those of the FMI functions, by name."""
+    notes: Sequence[str] = ()
+    """Sentences after the summary, if the FMU is for Model Exchange."""
+    completes_steps: bool = False
+    """True if Model Exchange must tell that the integrator has completed a step."""
+    has_derivatives: bool = True
+    """True if the FMU gives partial derivatives and those of its outputs."""
+    parameters_of: Mapping[str, Collection[str]] = field(default_factory=dict)
+    """The parameters that determine a variable at the start, by the name of the variable."""
+    voltage_ranges: Mapping[tuple[float, float], str] = field(default_factory=dict)
+    """Those of `Layout.voltage_ranges`."""
+    has_only_water: bool = False
+    """True for a vehicle without a surface, so that it must not rise above depth 0."""
+
+
+def interface_header(model: Model, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
-    declared = variables(vehicle)
     return render(
         "interface.h.j2",
-        variables=declared,
-        first_reference=declared[0].reference(fmi),
-        identifier=identifier,
+        variables=model.variables,
+        first_reference=model.variables[0].reference(fmi),
+        identifier=model.identifier,
         token=token,
         fmi=fmi,
         interfaces=interfaces,
-        ranges=vehicle.layout.voltage_ranges,
-        has_only_water=vehicle.layout.has_only_water,
+        ranges=model.voltage_ranges,
+        has_only_water=model.has_only_water,
         afloat=AFLOAT,
         left_water=LEFT_WATER,
         log_categories=LOG_CATEGORIES,

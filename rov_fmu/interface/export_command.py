@@ -27,6 +27,8 @@ _ENDS = {
     "mujoco": "_mujoco",
     "allocation": "_allocation",
     "ardusub-gains": "_ardusub_gains",
+    "autopilot": "_autopilot",
+    "gains": "_gains",
     "sdf": ".sdf",
     "urdf": ".urdf",
 }
@@ -70,7 +72,7 @@ class Exported:
 
 
 def export(vehicle: Path, to: str, output: Path | None, options: Options) -> Exported:
-    """Write a vehicle in a format: mujoco, allocation, ardusub-gains, sdf, urdf.
+    """Write a vehicle in a format: mujoco, allocation, autopilot, gains, ardusub-gains, sdf, urdf.
 
     Raises FileError, InputError about an option or a vehicle that the format cannot have, and WriteError.
     """
@@ -134,10 +136,26 @@ def _ardusub_gains(vehicle: Vehicle, path: Path, options: Options) -> Contents:
     return gains_files(found), Exported({}, "Note", found.notes, following=following, table=table_of(found))
 
 
+def _autopilot(vehicle: Vehicle, path: Path, _: Options) -> Contents:
+    from rov_fmu.bridges.autopilot.files import autopilot_files
+
+    named = path / f"{vehicle.identifier}_autopilot.fmu"
+    following = f"connect {named} with the FMU of the vehicle: pose, velocities and thrusters (docs/system.md)"
+    return autopilot_files(vehicle), Exported({}, following=following)
+
+
+def _gains(vehicle: Vehicle, *_: object) -> Contents:
+    from rov_fmu.bridges.autopilot.files import gains_yaml
+
+    return gains_yaml(vehicle), Exported({})
+
+
 _CONTENTS: Mapping[str, Callable[[Vehicle, Path, Options], Contents]] = {
     "mujoco": _mujoco,
     "allocation": lambda vehicle, *_: (allocation_files(vehicle), Exported({})),
     "ardusub-gains": _ardusub_gains,
+    "autopilot": _autopilot,
+    "gains": _gains,
 }
 
 

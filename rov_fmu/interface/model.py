@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
+    from rov_fmu.bridges.autopilot.pilot import Pilot
     from rov_fmu.build import Built
     from rov_fmu.interface.arguments import Inputs
     from rov_fmu.interface.result import Result
@@ -237,6 +238,62 @@ class VehicleModel(Vehicle):
         check_coefficients(self.layout, self.coefficients)
         begin = {name: value.item() for name, value in checked_start(start, self.layout, many=False).items()}
         return VehicleStepper(self, begin, checked_record(record, self.layout, units_of(self.layout)))
+
+    def autopilot(self, step: float = 0.02, delay: float = 0.015) -> "Pilot":
+        """Return an autopilot of the vehicle, with gains that are made for it, to be stepped in a loop.
+
+        - `step`: the time between two calls, s.
+        - `delay`: the time from the sensors to the thrust, s.
+
+        It holds every axis along which the thrusters push:
+
+            pilot, stepper = rov.autopilot().hold(depth=1.0, heading=0.5), rov.stepper()
+            for _ in range(500):
+                stepper.step(pilot.step(stepper.now, 0.02), 0.02)
+
+        Raises InputError if the thrusters cannot hold any axis, and BuildError where the law cannot be compiled.
+        """
+        from rov_fmu.bridges.autopilot.gains import autopilot_of
+        from rov_fmu.bridges.autopilot.pilot import Pilot
+        from rov_fmu.interface.stepper import checked_length
+
+        return Pilot(autopilot_of(self, checked_length(step), delay))
+
+    def hold(
+        self,
+        seconds: float,
+        inputs: Mapping[str, float] = _NONE,
+        *,
+        start: Mapping[str, Any] = _NONE,
+        step: float = 0.02,
+        **aims: float,
+    ) -> "Result":
+        """Simulate the vehicle while its autopilot holds places, angles or velocities.
+
+        - `seconds`: the duration, s, which is rounded to whole steps.
+        - `inputs`: inputs that are no commands, such as a load or a current.
+        - `start`: that of `simulate`.
+        - `step`: the time between two commands, s.
+        - `aims`: `depth`, `heading`, `north` and `east`, `roll`, `pitch` (m, rad), or `surge`, `sway`, `heave`, `yaw`
+          (m/s, rad/s).
+
+            rov.hold(20.0, {"V_N": 0.2}, depth=2.0, heading=0.5)["z"][-1]  # 2.0
+
+        Raises InputError about an argument, also about an axis that the thrusters cannot hold.
+        """
+        import numpy as np
+
+        pilot, stepper = self.autopilot(step).hold(**aims), self.stepper(start=start)
+        if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
+            raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")
+        time = step * np.arange(max(1, round(seconds / step)) + 1)
+        commands = list[dict[str, float]]()
+        for n in range(len(time)):
+            commands.append(pilot.step(stepper.now, step))
+            if n + 1 < len(time):
+                stepper.step({**inputs, **commands[-1]}, float(time[n + 1] - time[n]))
+        given = {name: np.array([one[name] for one in commands]) for name in self.layout.commands}
+        return self.simulate(time, {**inputs, **given}, start=start)
 
     def derivatives(self, inputs: Mapping[str, float], state: Mapping[str, float]) -> dict[str, float]:
         """Return the time derivatives of the states by their names, in SI units.

@@ -17,7 +17,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Vector
 from rov_fmu.equation.units import unit_of
-from rov_fmu.fmu.model_description import build_description, model_description
+from rov_fmu.fmu.model_description import build_description, model_description, model_of
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.fmu.variables import variables
@@ -88,7 +88,7 @@ _LISTS = {
 
 def described(rov: Vehicle, fmi: int) -> etree._Element:
     both = build_options.INTERFACES["both"]
-    description = model_description(a_vehicle(rov), variables(rov), guid="{1}", interfaces=both, fmi=fmi)
+    description = model_description(model_of(a_vehicle(rov)), guid="{1}", interfaces=both, fmi=fmi)
     return etree.fromstring(description)
 
 

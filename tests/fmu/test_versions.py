@@ -10,8 +10,7 @@ import rov_fmu
 from rov_fmu.c import compile as build_options
 from rov_fmu.cli import main
 from rov_fmu.fmu.content import native_content
-from rov_fmu.fmu.model_description import DEAD_TIME_NOTE, PYTHON_NOTE, model_description
-from rov_fmu.fmu.variables import variables
+from rov_fmu.fmu.model_description import DEAD_TIME_NOTE, PYTHON_NOTE, model_description, model_of
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE
 from tests.fmi import CO_SIMULATION, INTERFACES, MODEL_EXCHANGE
@@ -28,7 +27,7 @@ def test_the_description_says_what_an_importer_must_do() -> None:
         (one, "cs", False, [PYTHON_NOTE]),
     ):
         offered = build_options.INTERFACES[interface]
-        xml = model_description(of, variables(of), guid="", interfaces=offered, native=is_native)
+        xml = model_description(model_of(of), guid="", interfaces=offered, native=is_native)
         assert etree.fromstring(xml).get("description") == ". ".join([of.summary, *notes])
 
 

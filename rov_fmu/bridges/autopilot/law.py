@@ -47,9 +47,10 @@ SHARING = np.dtype([*((name, "f8") for name in _HEAD), ("priority", "f8", 6)])
 """The struct `sharing` of the C, which thrusters, tables and the matrix of commands follow."""
 STATE, SENSED = 12, 15
 """The numbers of doubles in `loop_state` and `sensor_values`."""
-SENSORS = (*"xyz", "phi", "theta", "psi", *"uvwpqr", "vg_N", "vg_E", "vg_D")
+SENSORS: tuple[str, ...] = (*"xyz", "phi", "theta", "psi", *"uvwpqr", "vg_N", "vg_E", "vg_D")
 """The variables of a vehicle that are the sensors. One that neither rolls nor pitches has psi alone."""
-FILES = ("autopilot.c", "flights.c")
+LAW_FILE, FLIGHTS_FILE, STEP_FILE = "autopilot.c", "flights.c", "step.c"
+FILES = (LAW_FILE, FLIGHTS_FILE)
 _SOURCES = FMU_SRC / "autopilot"
 
 

@@ -23,7 +23,9 @@ from rov_fmu.io.interrupts import temporary_folder
 _FILES = {path.stem: path for path in Path(__file__).with_name("companions").glob("[a-z]*.py")}
 _COMMON = "rov_fmu_companion"
 """The name of the module that companions have in common, in their FMUs."""
-COMPANIONS = tuple(sorted(_FILES))
+AUTOPILOT = "autopilot"
+"""The companion in C, which is made for a vehicle (rov_fmu/bridges/autopilot/fmu.py)."""
+COMPANIONS = (AUTOPILOT, *sorted(_FILES))
 """The names of the companions."""
 _PORT = port_of(Point(name="point")).names
 """The names of the members of a vehicle's port, by which a port of a companion fits it: force, place, velocity."""
@@ -36,6 +38,8 @@ def slave_of(name: str) -> Any:
     `points`, the ports, whose variables end with the name of the port and are in the order of a vehicle's; `places`,
     the terminals that each one whom it serves has for itself; `columns`, those of its file; and `needs`, a package.
     """
+    if name == AUTOPILOT:
+        return object  # it has no class in Python
     return getattr(import_module(f"rov_fmu.bridges.system.companions.{name}"), name.capitalize())
 
 

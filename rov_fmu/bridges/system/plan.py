@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
-from rov_fmu.bridges.system.companion import COMPANIONS
+from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS
 from rov_fmu.io.file_kinds import SYSTEM_PLAN, check_suffix
 from rov_fmu.io.messages import FileError, listed
 from rov_fmu.io.toml_file import AS_TUPLE, Beside, Finite, Name, Strict, Symbol, key_line, read_checked, rule
@@ -63,6 +63,8 @@ class ComponentTable(Strict):
     """An FMU for Co-Simulation in the folder of the plan."""
     companion: Literal[COMPANIONS] | None = None  # type: ignore[valid-type]
     """A companion that ships; `rov-fmu system --list` has their variables."""
+    held: Symbol | None = Field(None, alias="for")
+    """The component whose vehicle an `autopilot` holds. Its gains are made for this vehicle and for the step."""
     file: Beside | None = None
     """The table (CSV) of the companion `current`: time (s), z (m), V_N, V_E and perhaps V_D (m/s)."""
     point: Annotated[dict[Symbol, _Position], Field(max_length=_MOST)] = Field({})
@@ -83,6 +85,8 @@ class ComponentTable(Strict):
         for key, needs in (("file", "companion"), ("point", "vehicle")):
             if getattr(self, key) and given != [needs]:
                 raise ValueError(f"{key} needs {needs}")
+        if (self.held is not None) != (self.companion == AUTOPILOT):
+            raise ValueError('for = "component" belongs to companion = "autopilot", which needs it')
         return self
 
 

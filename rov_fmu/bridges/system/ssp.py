@@ -55,13 +55,13 @@ class System:
     stop: float
     connections: Sequence[Connection] = ()
     groups: Mapping[str, tuple[str, str]] = field(default_factory=dict)
-    """The connections for OSP between variable groups of two components, which stand for all connections of the two."""
+    """The connections for OSP between variable groups, which stand for all from one component to another."""
 
     @property
     def single_connections(self) -> list[Connection]:
         """The connections that no group stands for."""
-        grouped = [{*pair} for pair in self.groups.values()]
-        return [one for one in self.connections if {one.start[0], one.end[0]} not in grouped]
+        grouped = {*self.groups.values()}
+        return [one for one in self.connections if (one.start[0], one.end[0]) not in grouped]
 
 
 # ---- Writing ---------------------------------------------------------------------------------------------------------

@@ -12,7 +12,9 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from rov_fmu import __version__
-from rov_fmu.bridges.system.companion import Rows, companion, lack, levels_of, rows_of, slave_of
+from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
+from rov_fmu.bridges.autopilot.gains import autopilot_of
+from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, rows_of, slave_of
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,
     VELOCITIES,
@@ -31,7 +33,7 @@ from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, lines_on, listed
+from rov_fmu.io.messages import FileError, InputError, lines_on, listed
 from rov_fmu.io.output import kept
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes
@@ -95,13 +97,16 @@ def _parts(
     levels = max(map(levels_of, tables.values()), default=0)
     ready: dict[str, Part] = {}
     for name, table in plan.component.items():
-        kind = f"{table.model_dump_json(include={*SOURCES, 'file', 'point', 'port'})}{served.get(name)}"
+        kind = f"{table.model_dump_json(include={*SOURCES, 'file', 'point', 'port', 'held'})}{served.get(name)}"
         try:
             if kind in ready:
                 part = ready[kind]
             elif table.vehicle:
                 vehicles[name] = _vehicle(name, table, path)
                 part = _description(vehicles[name]).with_ports(table.port)
+            elif table.held:
+                on_part(name)
+                part = _autopilot(name, plan, path)
             else:
                 on_part(name)
                 shape = {"rows": tables.get(name, []), "places": served.get(name, [])[1:], "levels": levels}
@@ -168,6 +173,20 @@ def _served(plan: SystemPlan) -> tuple[dict[str, list[str]], list[tuple[str, str
                 ends[n] += f"_{other}" * (other != others[0])
         lines.append((ends[0], ends[1], factor))
     return served, lines
+
+
+def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
+    """Make the autopilot of a component's vehicle, for the step of the plan. Raises FileError."""
+    held = plan.component[name].held or ""
+    table = plan.component.get(held)
+    if not table or not table.vehicle:
+        reason = "must be a component that has a vehicle"
+        raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', reason, held)}")
+    try:
+        made = autopilot_of(_vehicle(held, table, path), plan.step)
+    except InputError as error:
+        raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', str(error), held)}") from error
+    return read_part(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
 
 
 def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:

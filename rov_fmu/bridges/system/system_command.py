@@ -7,7 +7,9 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from rov_fmu.bridges.system.companion import COMPANIONS, lack, slave_of
+from rov_fmu.bridges.autopilot.fmu import autopilot_model
+from rov_fmu.bridges.autopilot.gains import autopilot_of
+from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_of
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
@@ -20,7 +22,7 @@ from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.runs import Array
 from rov_fmu.report import console
 from rov_fmu.report.progress import Parts, parts
-from rov_fmu.vehicle.shipped import named_in
+from rov_fmu.vehicle.shipped import find_vehicle, named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 _MOST_SHOWN = 10
@@ -102,9 +104,23 @@ def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
                 yield from (file, *load_vehicle(file).files)
 
 
+def _autopilot_table() -> Table:
+    """Return the inputs of the autopilot of the vehicle that ships first, and its gains in depth."""
+    model = autopilot_model(autopilot_of(load_vehicle(find_vehicle("videoray"))))
+    title = f"{AUTOPILOT}: holds the vehicle of `for`, here a VideoRay, with gains that are made for it"
+    shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])
+    for one in model.variables:
+        if one.causality in ("input", "output") or (one.name.endswith("_w") and one.causality == "parameter"):
+            shown.add_row(one.name, f"{one.start or 0.0:g}", one.unit, one.causality, one.description)
+    return shown
+
+
 def list_companions() -> None:
     """Print the companions with their variables."""
     for name in COMPANIONS:
+        if name == AUTOPILOT:
+            console.print_table(_autopilot_table())
+            continue
         slave = slave_of(name)(instance_name=name)
         title = f"{name}: {type(slave).description}"
         if reason := lack(name):

@@ -10,8 +10,9 @@ import pytest
 from rov_fmu.bridges.ardusub.law import RATE, Mixer, loops_of
 from rov_fmu.bridges.autopilot import flights, law
 from rov_fmu.bridges.autopilot.flights import Flights
+from rov_fmu.bridges.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
-from rov_fmu.equation.catalogue import PITCH, ROLL
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from verification.references.autopilot.ardusub import STICK as STICK_TIME
@@ -55,3 +56,44 @@ def test_the_law_in_c_is_ardusubs_hold(
         sinking = sinks
         assert outputs == pytest.approx(hold.outputs(motion, sticks[0], sticks[1], 1.0 / RATE), abs=1e-12)
     assert abs(flown.outputs).max() == 1.0
+
+
+# ---- What it promises ------------------------------------------------------------------------------------------------
+
+
+def test_a_hold_begins_without_a_jump() -> None:
+    """The demand goes on from that of the stick, though the vehicle is fast and the aim is 3 m away."""
+    made = autopilot_of(HEAVY)
+    flights, h = Flights(HEAVY, made.sharing, [{"z": 10.0}]), made.step
+    stick = np.tile([0.0, 0.0, 0.4, 0.0, 0.0, 0.3], (100, 1))
+    modes = np.tile([STICK, STICK, STICK, PLACE, PLACE, STICK], (100, 1))
+    before = flights.fly(made.loops, modes, stick, h)
+    modes[:, [2, 5]], stick[:, [2, 5]] = PLACE, (13.0, 1.0)
+    after = flights.fly(made.loops, modes, stick, h)
+    assert np.abs(after.demands[0, 0] - before.demands[0, -1])[[2, 5]] == pytest.approx([0.0, 0.0], abs=1e-9)
+    most = made.loops["most"][[2, 5]]
+    assert (np.abs(np.diff(after.demands[0], axis=0))[:, [2, 5]] < 0.2 * most).all()
+
+
+@pytest.mark.parametrize(("roll", "pitch"), [(0.0, 1.3), (0.0, -1.3), (2.0, 0.4)])
+def test_the_attitude_is_held_where_pitch_is_large(roll: float, pitch: float) -> None:
+    """The pitch of 75 degrees is reached, with the depth and a heading beside it, which Euler angles alone lose."""
+    made = autopilot_of(HEAVY.with_(W=112.8, B=112.8))
+    aims = np.tile([0.0, 0.0, 10.0, roll, pitch, 2.0], (1500, 1))
+    modes = np.tile([STICK, STICK, PLACE, PLACE, PLACE, PLACE], (1500, 1))
+    seen = Flights(made.vehicle, made.sharing, [{"z": 10.0}]).fly(made.loops, modes, aims, made.step).sensors[0]
+    assert seen[-1, 3:6] == pytest.approx([roll, pitch, 2.0], abs=0.02)
+    assert seen[-1, 2] == pytest.approx(10.0, abs=0.02)
+
+
+def test_what_the_thrusters_cannot_give_is_taken_back() -> None:
+    """A load beyond the strongest thrust for 20 s leaves no more than 10 cm of overshoot after it."""
+    made = autopilot_of(SIX)
+    flights, steps = Flights(SIX, made.sharing, [{"z": 10.0}]), round(20.0 / made.step)
+    modes = np.tile([STICK, STICK, PLACE, STICK, STICK, PLACE], (steps, 1))
+    aims = np.tile([0.0, 0.0, 10.0, 0.0, 0.0, 0.0], (steps, 1))
+    pushed = flights.fly(made.loops, modes, aims, made.step, {"Z_ext": 1.2 * made.gain(HEAVE, "most")})
+    assert pushed.sensors[0, -1, 2] > 11.0
+    freed = flights.fly(made.loops, modes, aims, made.step, {"Z_ext": 0.0}).sensors[0, :, 2]
+    assert freed.min() > 9.9
+    assert freed[-1] == pytest.approx(10.0, abs=0.01)

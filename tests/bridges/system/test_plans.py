@@ -19,7 +19,7 @@ from rov_fmu.fmu.terminals import port_of
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
 from tests.bridges.system.fmus import described, foreign, undescribed_build
-from tests.commands import without_progress
+from tests.commands import ROOT, without_progress
 from tests.often import spread
 
 PLAN = """
@@ -363,7 +363,7 @@ def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
         connected("rov.point_bow", "rov.point_bow", 1.0, has)
 
 
-@pytest.mark.parametrize("name", companions.COMPANIONS)
+@pytest.mark.parametrize("name", companions.COMPANIONS[1:])
 def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     content = companions.companion(name)
     assert companions.companion(name) == content
@@ -383,7 +383,8 @@ def test_companions_have_units_and_the_same_bytes(name: str) -> None:
 def test_the_list_names_every_companion_with_its_variables(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["system", "--list"]) == 0
     printed = capsys.readouterr().out
-    for name in companions.COMPANIONS:
+    assert "autopilot: holds the vehicle of `for`" in printed
+    for name in companions.COMPANIONS[1:]:
         assert f"{name}: {companions.slave_of(name).description}" in printed
         assert all(variable in printed for variable in companions.slave_of(name)(instance_name=name).variables)
 
@@ -402,3 +403,28 @@ def test_the_plan_of_a_stranger_is_bounded(capsys: pytest.CaptureFixture[str], m
     plan.write_text(PLAN.replace("z = 3.0", f"z = {'9' * 400}"), encoding="utf-8")
     with pytest.raises(SystemPlanError, match="must be a finite number"):
         load_system_plan(plan)
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ('companion = "autopilot"', 'for = "component" belongs to companion = "autopilot", which needs it'),
+        ('companion = "current"\nfor = "rov"', 'for = "component" belongs to companion = "autopilot", which needs it'),
+        (
+            'companion = "autopilot"\nfor = "water"',
+            "pilot.for = 'water': must be a component that has a vehicle",
+        ),
+        (
+            'companion = "autopilot"\nfor = "fish"',
+            "pilot.for = 'fish': must be a component that has a vehicle",
+        ),
+        ('companion = "autopilot"\nfor = "fins"', "moves thrusters alone, and not the fins"),
+    ],
+)
+@pytest.mark.usefixtures("folder")
+def test_an_autopilot_belongs_to_a_vehicle(table: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    others = {"rov": 'vehicle = "videoray"', "water": 'companion = "current"', "fins": 'vehicle = "remus100.toml"'}
+    text = "".join(f"[component.{name}]\n{lines}\n" for name, lines in {**others, "pilot": table}.items())
+    Path("remus100.toml").write_bytes((ROOT / "examples" / "remus100" / "remus100.toml").read_bytes())
+    (line,) = told(f"step = 0.02\nstop_time = 1.0\n{text}", capsys)
+    assert message in line

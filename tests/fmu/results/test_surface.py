@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.equation.words import LEFT_WATER
+from rov_fmu.fmu.model_description import model_of
 from rov_fmu.fmu.variables import interface_header
 from tests.fmi import Fmu
 from tests.fmu.calls.conftest import of_both_versions
@@ -34,5 +35,5 @@ def test_the_flavour_in_python_tells_it_once(tmp_path: Path, monkeypatch: pytest
 
 
 def test_a_vehicle_with_a_surface_may_float() -> None:
-    headers = (interface_header(a_vehicle(rov), "x", "y", 2, ()) for rov in (VIDEORAY, surfaced(VIDEORAY)))
+    headers = (interface_header(model_of(a_vehicle(rov)), "y", 2, ()) for rov in (VIDEORAY, surfaced(VIDEORAY)))
     assert ["enum { DEPTH = REF_z };" in header for header in headers] == [True, False]

@@ -1,0 +1,130 @@
+/* The autopilot in the place of a vehicle's step.c, for the same functions of FMI. Sensors, memory, gains and commands lie among the
+ * variables; the tables of the thrusters are constants (model.h). It samples at the start of a step, and its commands are there at the end. */
+#include "autopilot.c"
+
+enum { MOST_PIECES = 2, N_STATE = sizeof(loop_state) / sizeof(double), N_GAINS = sizeof(loop_gains) / sizeof(double) };
+
+typedef struct {
+    loop_gains gains[AXES];
+} model_numbers;
+
+typedef struct {
+    int waiting; /* no command waits: C has no empty struct */
+} delay_line;
+
+static double value_at(const double at[], int place)
+{
+    return place >= 0 ? at[place] : 0.0;
+}
+
+static bool all_finite(const double x[], int n)
+{
+    for (int i = 0; i < n; i++) {
+        if (!isfinite(x[i])) {
+            return false;
+        }
+    }
+    return true;
+}
+
+static void model_prepare(const double at[], model_numbers *n)
+{
+    for (int a = 0; a < AXES; a++) {
+        double *const gains = (double *)&n->gains[a];
+        for (int i = 0; i < N_GAINS; i++) {
+            gains[i] = value_at(at, GAIN_AT[a][i]);
+        }
+    }
+}
+
+static bool model_is_definite(const model_numbers *n)
+{
+    (void)n;
+    return true;
+}
+
+static void model_begin(double at[], double *heading)
+{
+    (void)at, (void)heading;
+}
+
+/* The only state is the time since the start. */
+static void model_calculate(double at[], const model_numbers *n, double heading)
+{
+    (void)n, (void)heading;
+    at[FIRST_CALCULATED] = 1.0;
+}
+
+static void model_tangent(const double at[], double d[])
+{
+    (void)at;
+    d[FIRST_CALCULATED] = 0.0;
+}
+
+static void model_begin_tangent(const double at[], double d[])
+{
+    (void)at, (void)d;
+}
+
+static bool model_has_direction(const double x[])
+{
+    (void)x;
+    return true;
+}
+
+static double model_heading(const double at[], double heading)
+{
+    (void)at;
+    return heading;
+}
+
+static void current_keep(double at[])
+{
+    (void)at;
+}
+
+static void delay_commit(double at[], delay_line *line, double t, double h)
+{
+    (void)at, (void)line, (void)t, (void)h;
+}
+
+/* Set the Euler angles to those of the quaternion, if the pose has one. */
+static void angles_of(const double at[], double angle[3])
+{
+    if (QUATERNION_AT >= 0) {
+        const double *const q = at + QUATERNION_AT, w = q[0], x = q[1], y = q[2], z = q[3];
+        angle[0] = atan2(2.0 * (w * x + y * z), w * w - x * x - y * y + z * z);
+        angle[1] = asin(fmin(fmax(2.0 * (w * y - x * z), -1.0), 1.0));
+        angle[2] = atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z);
+    }
+}
+
+static int delayed_step(double at[], const model_numbers *n, delay_line *line, double t, double h, double next[], double *heading)
+{
+    double values[sizeof(sensor_values) / sizeof(double)], mode[AXES], aim[AXES], demand[AXES], outputs[MOST_THRUSTERS];
+    loop_state state[AXES];
+    sensor_values now;
+    (void)line, (void)t, (void)heading;
+    for (int i = 0; i < (int)(sizeof values / sizeof values[0]); i++) {
+        values[i] = value_at(at, SENSOR_AT[i]);
+    }
+    angles_of(at, values + ROLL_AXIS);
+    memcpy(&now, values, sizeof now);
+    for (int a = 0; a < AXES; a++) {
+        mode[a] = floor(value_at(at, AIM_AT[a][0]) + 0.5);
+        aim[a] = value_at(at, AIM_AT[a][1 + (int)mode[a]]);
+        memset(&state[a], 0, sizeof state[a]);
+        if (STATE_AT[a] >= 0) {
+            memcpy(&state[a], at + STATE_AT[a], sizeof state[a]);
+        }
+    }
+    autopilot_step(n->gains, (const sharing *)(const void *)SHARING, state, &now, mode, aim, 1.0 - fmin(fmax(at[SAG_AT], 0.0), 1.0), h,
+                   at + FIRST_COMMAND, demand, outputs);
+    for (int a = 0; a < AXES; a++) {
+        if (STATE_AT[a] >= 0) {
+            memcpy(at + STATE_AT[a], &state[a], sizeof state[a]);
+        }
+    }
+    next[0] = at[FIRST_STATE] + h;
+    return all_finite(at + FIRST_COMMAND, N_OUTPUTS) ? 1 : 0;
+}

@@ -1,0 +1,158 @@
+"""The autopilot of a vehicle as an FMU: in C for all platforms, with the gains for this vehicle as start values.
+
+Its inputs are the outputs of the vehicle (the terminals `pose`, `body_velocity` and `velocity`), and for each axis that
+the thrusters can push a mode and what the axis aims at; its outputs are the commands (`thrusters`). The gains are
+parameters, the tables of the thrusters constants of the code.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+from rov_fmu.bridges.autopilot.gains import Autopilot
+from rov_fmu.bridges.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
+from rov_fmu.build import chosen_platforms, with_binaries
+from rov_fmu.c.compile import compile_all
+from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
+from rov_fmu.equation.layout import Layout
+from rov_fmu.fmu.archive import archive
+from rov_fmu.fmu.content import native_content
+from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
+from rov_fmu.fmu.variables import Model, Variable
+from rov_fmu.io.templates import render
+
+_SHOWN = tuple(GAINS)[: tuple(GAINS).index("k_a")]
+"""The gains that are parameters. The others are those of ArduSub's loops."""
+_PLUGS = ("pose", "body_velocity", "velocity")
+"""The terminals of the vehicle that are the sensors."""
+_MODES = "0: stick, 1: rate, 2: place or angle"
+
+
+def _unit(axis: Axis, name: str) -> str:
+    """Return the unit of a gain of an axis."""
+    load, rate, place = axis.load, axis.unit, axis.position_unit or axis.unit.partition("/")[0]
+    if name in ("most", "i_max", "bias"):
+        return load
+    turned = axis.is_rotation
+    units: dict[str, str] = {
+        **{"k_x": "1/s", "v_max": rate, "brake": f"{rate}2", "tracking": "s", "handover": "s"},
+        **{"k_p": "N.m.s/rad" if turned else "N.s/m", "k_i": f"{load}/{place}"},
+        **{"d_1": "N.m.s/rad" if turned else "N.s/m", "d_2": "N.m.s2/rad2" if turned else "N.s2/m2"},
+        **{"inertia": "kg.m2" if turned else "kg", "k_d": "kg.m2" if turned else "kg"},
+    }
+    return units[name]
+
+
+def autopilot_model(autopilot: Autopilot) -> Model:
+    """Return the model of the FMU of an autopilot."""
+    vehicle, layout = autopilot.vehicle, autopilot.vehicle.layout
+    sensors = [one for one in terminals(layout) if one.name in _PLUGS]
+    measured = [name for one in sensors for name in one.variables]
+    declared = {**layout.pose, **layout.velocities, **layout.over_ground}
+    made = list[Variable]()
+
+    def add(name: str, declaration: Declaration, causality: str, variability: str, **rest: Any) -> int:
+        given = {"display_unit": declaration.display_unit, **rest}
+        about = declaration.description, declaration.unit
+        made.append(Variable(name, len(made), *about, causality, variability, **given))
+        return made[-1].value_reference
+
+    def put(name: str, text: str, unit: str, start: float, **rest: Any) -> int:
+        return add(name, Declaration(unit, text), "input", "continuous", start=start, **rest)
+
+    for name in measured:
+        add(name, declared[name], "input", "continuous", start=float(name == QUATERNION[0]))
+    aims = {axis: [-1] * 4 for axis in AXES}
+    for axis in autopilot.axes:
+        place = _place_of(axis)
+        aims[axis] = [
+            put(f"mode_{axis.velocity}", f"Mode of {axis.name}. {_MODES}", "1", 2.0 * (axis in (ROLL, PITCH)),
+                display_unit=None, minimum=0.0, maximum=2.0),
+            put(f"stick_{axis.velocity}", f"Share of the largest {axis.load} of {axis.name}", "1", 0.0,
+                minimum=-1.0, maximum=1.0),
+            put(f"ref_{axis.velocity}", f"Rate to hold in {axis.name}", axis.unit, 0.0),
+            put(f"ref_{place}", f"Place or angle to hold in {axis.name}", _length(axis), 0.0),
+        ]  # fmt: skip
+    most = {"minimum": 0.0, "maximum": 1.0}
+    sag = put("sag", "Part of the largest command that is lost, as by a battery", "1", 0.0, **most)
+    inputs = len(made)
+    elapsed = Declaration("s", "Time since the start")
+    add("elapsed", elapsed, "output", "continuous", initial="exact", start=0.0, dependencies={})
+    rate = Declaration("1", "Rate of the time since the start")
+    rest: dict[str, Any] = {"derivative_of": "elapsed", "dependencies": {}, "display_unit": None}
+    add("der(elapsed)", rate, "local", "continuous", initial="calculated", **rest)
+    for name, declaration in layout.commands.items():
+        add(name, declaration, "output", "discrete", initial="calculated", dependencies={})
+    states = dict.fromkeys(AXES, -1)
+    for axis in autopilot.axes:
+        memory = Declaration("1", f"What the loop of {axis.name} keeps between steps")
+        first, *_ = [
+            add(f"kept_{n}_{axis.velocity}", memory, "local", "discrete", initial="calculated", display_unit=None)
+            for n in range(STATE)
+        ]
+        states[axis] = first
+    gains = {axis: [-1] * len(GAINS) for axis in AXES}
+    for axis in autopilot.axes:
+        for n, name in enumerate(_SHOWN):
+            text = f"{axis.name.capitalize()}: {GAINS[name]}"
+            own = Declaration(_unit(axis, name), text)
+            start = autopilot.gain(axis, name)
+            gains[axis][n] = add(
+                f"{name}_{axis.velocity}", own, "parameter", "tunable", initial="exact", start=start, display_unit=None
+            )
+    places = {variable.name: variable.value_reference for variable in made[:inputs]}
+    given = {
+        "inputs": inputs,
+        "commands": len(layout.commands),
+        "sag": sag,
+        "quaternion": places.get(QUATERNION[0], -1),
+        "variables": len(made),
+        "sensors": [places.get(name, -1) for name in SENSORS],
+        "aims": [*aims.values()],
+        "states": [*states.values()],
+        "gains": [*gains.values()],
+        "sharing": [*map(repr, autopilot.sharing.numbers.tolist())],
+    }
+    files = law_sources(LAW_FILE, STEP_FILE) | {"model.h": render("autopilot.h.j2", **given)}
+    names = {axis.name: autopilot.lags[axis.name] for axis in autopilot.axes}
+    told = ", ".join(f"{name} {lag:.3g} s" for name, lag in names.items())
+    summary = f"Autopilot of {vehicle.name}: holds {', '.join(names)} by its thrusters"
+    card = (
+        f"{summary}.\nThe gains are for a step of {autopilot.step:g} s, {autopilot.delay:g} s from sensor to thrust, "
+        f"and the lags {told}.\nFor each axis: {_MODES}. It samples once per step."
+    )
+    return Model(
+        *(f"{vehicle.identifier}_autopilot", vehicle.version, vehicle.source, summary, card),
+        tuple(made),
+        terminals_document(_terminals(layout, sensors)),
+        {**files, "series.c": "/* The autopilot has no series. */\n"},
+        has_derivatives=False,
+    )
+
+
+def _place_of(axis: Axis) -> str:
+    """Return the name of the place or the angle of an axis."""
+    return SENSORS[AXES.index(axis)]
+
+
+def _length(axis: Axis) -> str:
+    return "rad" if axis.is_rotation else "m"
+
+
+def _terminals(layout: Layout, sensors: Sequence[Terminal]) -> list[Terminal]:
+    commands = next(one for one in terminals(layout) if one.name == "thrusters")
+    return [*(replace(one, causality="input") for one in sensors), replace(commands, causality="output")]
+
+
+def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, fmi: int = 2) -> bytes:
+    """Return the FMU of an autopilot for Co-Simulation.
+
+    - `platforms`: those of PLATFORMS, or `host`; by default those with 64 bits.
+
+    Raises BuildError.
+    """
+    chosen = chosen_platforms(platforms, fmi)
+    content = native_content(autopilot_model(autopilot), fmi=fmi, interface="cs", platforms=chosen)
+    binaries = compile_all(chosen, content.sources, content.identifier, fmi=fmi)
+    return archive(with_binaries(content, binaries, fmi))

@@ -1,0 +1,138 @@
+"""The gains of a cascade for a vehicle, in SI units, and the autopilot with these gains.
+
+For each axis that the thrusters can push: v* = sat(k_x (x* - x)), braked so that the aim is reached without overshoot,
+and tau = k_p (v* - v) + k_i ∫(v* - v) dt + d_1 v* + d_2 |v*| v* + M dv*/dt + bias. The bandwidth of the rate loop is
+
+    k_v = 1/(2.5 (T + T_d + delay + 2.5 h)),   k_p = k_v M,   k_i = k_v^2 M/4,   k_x = k_v/3,
+
+with the inertia M with added mass, the lag T and the dead time T_d of the thrusters, the delay of the sensors, and the
+step h of the controller. With 2.5 h in it, a loop in which all exchange their values at once (Jacobi) stays calm up to
+100 ms. It is at most 3/s for translations and 8/s for turns, because vehicle files without a lag would allow any.
+"""
+
+from dataclasses import dataclass
+from math import inf, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rov_fmu.bridges.allocation import allocation_matrix, table
+from rov_fmu.bridges.autopilot.law import AXES, LOOP, Sharing, pulse_of
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
+from rov_fmu.io.messages import InputError, listed
+from rov_fmu.tank.arrays import Array
+from rov_fmu.vehicle.vehicle import Vehicle
+
+STEP, DELAY = 0.02, 0.015
+"""The step of the autopilot, and the time from the sensors to the thrust, that gains are made for by default, s."""
+_ORDER = (HEAVE, YAW, ROLL, PITCH, SURGE, SWAY)
+"""The axes in the order in which thrusters are given to them."""
+_PRIORITY = {HEAVE: 0, ROLL: 0, PITCH: 0, YAW: 1, SURGE: 2, SWAY: 2}
+_FASTEST = {False: 3.0, True: 8.0}
+"""The largest k_v, 1/s, of a translation and of a turn."""
+_LEAST = 1e-2
+"""The least singular value of the directions of the thrusters, relative to the largest, with which an axis is held."""
+_BRAKE, _SPEED = 0.3, 0.6
+"""The parts of the largest force that brake before the aim, and that the drag at the largest rate takes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Autopilot:
+    """The numbers of the autopilot of a vehicle."""
+
+    vehicle: Vehicle
+    step: float
+    """The step that the gains are made for, s."""
+    delay: float
+    """The time from the sensors to the thrust that they are made for, s."""
+    axes: tuple[Axis, ...]
+    """The axes that the thrusters can push, in the order of AXES."""
+    loops: NDArray[np.void]
+    """The numbers of each of AXES, of the type LOOP."""
+    sharing: Sharing
+    lags: dict[str, float]
+    """The lag of the thrusters of each axis, with the dead time, s."""
+
+    def gain(self, axis: Axis, name: str) -> float:
+        """Return a number of an axis."""
+        return float(self.loops[name][AXES.index(axis)])
+
+
+def autopilot_of(vehicle: Vehicle, step: float = STEP, delay: float = DELAY) -> Autopilot:
+    """Return the autopilot of a vehicle for a step (s) and a delay of the sensors (s).
+
+        autopilot_of(load_vehicle(find_vehicle("videoray"))).gain(HEAVE, "k_p")  # N.s/m
+
+    Raises InputError if the thrusters cannot hold any axis.
+    """
+    layout = vehicle.layout
+    if layout.fins:
+        names = listed(fin.name for fin in layout.fins)
+        raise InputError(f"{vehicle.identifier}: the autopilot moves thrusters alone, and not the fins {names}")
+    if not layout.thrusters:
+        raise InputError(f"{vehicle.identifier}: has no thrusters, so no axis can be held")
+    matrix, chosen = allocation_matrix(vehicle), list[Axis]()
+    rows = {axis: matrix[n] for n, axis in enumerate(layout.bare_axes)}
+    for axis in (axis for axis in _ORDER if axis in rows and np.abs(rows[axis]).max() > 0.0):
+        tried = np.array([rows[one] / np.linalg.norm(rows[one]) for one in (*chosen, axis)])
+        singular = np.linalg.svd(tried, compute_uv=False)
+        if len(tried) <= tried.shape[1] and singular[-1] > _LEAST * singular[0]:
+            chosen.append(axis)
+    axes = tuple(axis for axis in AXES if axis in chosen)
+    loops = np.zeros(len(AXES), LOOP)
+    lags = {axis.name: _lag(vehicle, axis) for axis in axes}
+    sharing = _sharing(vehicle, axes, np.array([rows[axis] for axis in axes]))
+    for axis in axes:
+        loops[AXES.index(axis)] = _loop(vehicle, axis, sharing, lags[axis.name], step, delay)
+    return Autopilot(vehicle, step, delay, axes, loops, sharing, lags)
+
+
+def _lag(vehicle: Vehicle, axis: Axis) -> float:
+    curves = [vehicle.layout.curve_of[one.name] for one in vehicle.layout.thrusters_along(axis)]
+    dead = vehicle["T_d"] if vehicle.layout.has_dead_time else 0.0
+    return dead + max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=0.0)
+
+
+def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing:
+    """Return how the thrusters make the forces along axes, whose rows of the allocation matrix are given."""
+    layout = vehicle.layout
+    count, places = len(layout.thrusters), [AXES.index(axis) for axis in axes]
+    of_axis, to_axis = np.zeros((2, count, len(AXES)))
+    of_axis[:, places], to_axis[:, places] = np.linalg.pinv(matrix), matrix.T
+    commands = np.eye(count)
+    if layout.mix:
+        gains = [[layout.gains[t.name].get(u, 0.0) for u in layout.commands] for t in layout.thrusters]
+        commands = np.linalg.pinv(np.array(gains))
+    curves = list(layout.curves)
+    return Sharing(
+        *(of_axis, to_axis, commands, tuple(_PRIORITY[axis] for axis in AXES)),
+        tables=tuple(np.array(table(vehicle, curve, None)) for curve in curves),
+        table_of=tuple(curves.index(layout.curve_of[one.name]) for one in layout.thrusters),
+        attitude=layout.has_attitude,
+        pulse=pulse_of(layout),
+    )
+
+
+def _loop(vehicle: Vehicle, axis: Axis, sharing: Sharing, lag: float, step: float, delay: float) -> NDArray[np.void]:
+    """Return the numbers of an axis. They follow the rule at the head of this file."""
+    loop = np.zeros((), LOOP)
+    inertia = vehicle.effective_inertia(vehicle.layout.by_name[axis.name])
+    ends = np.array([sharing.tables[n][[0, -1], 0] for n in sharing.table_of])
+    along = sharing.to_axis[:, AXES.index(axis)]
+    most = min(np.abs(np.sort(along[:, np.newaxis] * ends, axis=1).sum(axis=0)))
+    alone = vehicle.motions(vehicle.layout.usual_inputs, (axis,))[0]
+    d_1, d_2 = alone.B * inertia, alone.A * inertia
+    k_v = min(1.0 / (2.5 * (lag + delay + 2.5 * step)), _FASTEST[axis.is_rotation])
+    loop["k_x"], loop["k_p"], loop["k_i"] = k_v / 3.0, k_v * inertia, k_v**2 * inertia / 4.0
+    loop["d_1"], loop["d_2"], loop["inertia"], loop["bias"] = d_1, d_2, inertia, -alone.C * inertia
+    loop["most"] = loop["i_max"] = most
+    loop["brake"], loop["v_max"] = _BRAKE * most / inertia, _speed(_SPEED * most, d_1, d_2)
+    loop["tracking"], loop["handover"] = 2.0 / k_v, 1.0 / k_v
+    return loop
+
+
+def _speed(force: float, linear: float, quadratic: float) -> float:
+    """Return the speed whose drag is a force; 0, which is no limit, without drag."""
+    root = linear + sqrt(linear**2 + 4.0 * max(quadratic, 0.0) * force)
+    speed = 2.0 * force / root if root > 0.0 else inf
+    return speed if speed < inf else 0.0

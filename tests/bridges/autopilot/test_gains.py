@@ -1,0 +1,207 @@
+"""Gains in SI units: calm in all corners, and the same flight in Python, in C, and by the FMU."""
+
+import shutil
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+import yaml
+from fmpy.validation import validate_fmu
+
+import rov_fmu
+from rov_fmu.bridges.autopilot.files import flown
+from rov_fmu.bridges.autopilot.flights import Flights
+from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
+from rov_fmu.bridges.autopilot.gains import Autopilot, autopilot_of
+from rov_fmu.bridges.autopilot.law import AXES, PLACE, RATE, SENSORS, STICK
+from rov_fmu.bridges.autopilot.pilot import Pilot
+from rov_fmu.c.compile import PLATFORMS
+from rov_fmu.c.simulation import Array
+from rov_fmu.c.stepper import Stepper
+from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW
+from rov_fmu.io.messages import InputError
+from rov_fmu.vehicle.shipped import SHIPPED
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.often import spread
+from tests.vehicles import FINNED
+
+VIDEORAY, SIX, HEAVY = (load_vehicle(SHIPPED[name]) for name in ("videoray", "bluerov2", "bluerov2_heavy"))
+_MASSES = [name for name in SIX.coefficients if name in ("m_rov", "I_r") or name.startswith("m_a_")]
+
+
+def scaled(mass: float, **others: float) -> Vehicle:
+    return SIX.with_(**{name: mass * SIX[name] for name in _MASSES}, **others)
+
+
+OWN = {
+    "VideoRay": VIDEORAY,
+    "Heavy": HEAVY,
+    "4 kg": scaled(4.0 / SIX["m_rov"], T_t200=0.05),
+    "25 kg": scaled(25.0 / SIX["m_rov"], T_t200=0.25),
+    "drag x 4": SIX.with_(**{name: 4.0 * SIX[name] for name in SIX.coefficients if name[:4] in ("a_d_", "b_d_")}),
+    "sinks": SIX.with_(F_0_w=20.0) if "F_0_w" in SIX.coefficients else SIX,
+}
+
+
+@pytest.mark.parametrize("step", [0.01, 0.02, 0.05, 0.1])
+@pytest.mark.parametrize("name", spread([*OWN], ["VideoRay", "Heavy", "25 kg"]))
+def test_the_gains_are_calm_in_all_corners_when_all_exchange_at_once(name: str, step: float) -> None:
+    """With 30 % more and less thrust and inertia, and the commands one step late, as in Jacobi loops, and a load."""
+    vehicle = OWN[name]
+    made, axes = autopilot_of(vehicle, step), vehicle.layout.bare_axes
+    corners = [
+        {"z": 10.0, "X_ext": 0.2}
+        | ({"Y_ext": 0.1} if "Y_ext" in vehicle.layout.inputs else {})
+        | {axis.coefficient("alpha"): thrust * vehicle[axis.coefficient("alpha")] for axis in axes}
+        | {axis.coefficient("beta"): vehicle[axis.coefficient("beta")] / inertia for axis in axes}
+        for thrust, inertia in ((1.0, 1.0), (1.3, 0.7), (0.7, 1.3), (1.3, 1.3), (0.7, 0.7))
+    ]
+    flights, steps = Flights(vehicle, made.sharing, corners, [1] * len(corners)), round(12.0 / step)
+    held = [axis for axis in made.axes if axis in (HEAVE, ROLL, PITCH, YAW)]
+    modes = np.tile([PLACE if axis in held else STICK for axis in AXES], (steps, 1))
+    aim = np.zeros(len(AXES))
+    for depth, heading in ((10.0, 0.0), (11.0, 0.0), (11.0, 1.5)):
+        aim[[2, 5]] = depth, heading
+        flight = flights.fly(made.loops, modes, np.tile(aim, (steps, 1)), step)
+        changes = np.abs(np.diff(flight.outputs[:, -round(2.0 / step) :], axis=1)).sum(axis=1).max() / 2.0
+        assert changes < 1.0, "the full command changes less than once in a second at rest"
+        if depth == 10.0:  # the hold begins without thrust, so that a heavy vehicle sinks at first
+            continue
+        errors = flight.sensors[:, :, [2, 5]] - [depth, heading]
+        assert (errors.max(axis=1) < [0.12, 0.12]).all()
+        assert (np.abs(errors[:, -1]) < [0.35, 0.4]).all()
+
+
+def test_a_step_is_quick_and_does_not_overshoot() -> None:
+    for vehicle in (VIDEORAY, SIX, HEAVY):
+        for axis, errors in flown(autopilot_of(vehicle)):
+            size = 1.0 if axis is HEAVE else np.pi / 2
+            assert errors.max() < 0.02 * size
+            assert abs(errors[-1]) < 0.005
+            assert abs(errors[round(5.0 / 0.02)]) < 0.05 * size
+
+
+def test_only_what_thrusters_push_is_held() -> None:
+    assert [axis.name for axis in autopilot_of(VIDEORAY).axes] == ["surge", "heave", "yaw"]
+    with pytest.raises(InputError, match="moves thrusters alone, and not the fins"):
+        autopilot_of(FINNED)
+    with pytest.raises(InputError, match="cannot hold sway, only surge, heave and yaw"):
+        Pilot(autopilot_of(VIDEORAY)).hold(sway=0.1)
+    with pytest.raises(InputError, match="north and east are held together"):
+        rov_fmu.load("bluerov2").hold(1.0, north=1.0)
+    with pytest.raises(InputError, match=r"there is no dept.*did you mean depth"):
+        rov_fmu.load("bluerov2").autopilot().hold(dept=1.0)
+
+
+def test_the_feed_forward_makes_a_speed_follow() -> None:
+    """A sine of 0.4 m/s in surge: without feed-forward the error is over ten times as large."""
+    made, h = autopilot_of(HEAVY), 0.02
+    wanted = 0.4 * np.sin(2.0 * np.pi * np.arange(2000) * h / 8.0)
+    aims = np.zeros((2000, len(AXES)))
+    aims[:, 0], aims[:, 2] = wanted, 10.0
+    modes = np.tile([RATE, STICK, PLACE, PLACE, PLACE, PLACE], (2000, 1))
+    sizes = []
+    for names in ((), ("d_1", "d_2", "inertia")):
+        loops = made.loops.copy()
+        for name in names:
+            loops[name] = 0.0
+        seen = Flights(HEAVY, made.sharing, [{"z": 10.0}]).fly(loops, modes, aims, h).sensors[0, :, 6]
+        sizes.append(np.sqrt(np.mean((seen - wanted)[500:] ** 2)))
+    assert sizes[0] < 0.02
+    assert sizes[1] > 5.0 * sizes[0]
+
+
+# ---- The same flight everywhere --------------------------------------------------------------------------------------
+
+AIMS = {"depth": 11.0, "heading": 1.0, "surge": 0.3}
+STEPS = 400
+
+
+def by_flights(made: Autopilot) -> Array:
+    pilot = Pilot(made).hold(**AIMS)
+    modes, aims = np.tile(pilot.modes, (STEPS, 1)), np.tile(pilot.aims, (STEPS, 1))
+    flight = Flights(made.vehicle, made.sharing, [{"z": 10.0}]).fly(made.loops, modes, aims, 0.02)
+    seen: Array = flight.sensors[0]
+    return seen
+
+
+@pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
+def test_python_flies_as_the_flights_in_c_do(name: str) -> None:
+    result = rov_fmu.load(name).hold(STEPS * 0.02, {}, start={"z": 10.0}, step=0.02, **AIMS)
+    seen = by_flights(autopilot_of(load_vehicle(SHIPPED[name])))
+    for variable in ("z", "psi", "u"):
+        assert result[variable][:STEPS] == pytest.approx(seen[:, SENSORS.index(variable)], abs=1e-9)
+
+
+@pytest.mark.parametrize("fmi", [2, 3])
+@pytest.mark.parametrize("vehicle", [VIDEORAY, HEAVY])
+def test_the_fmu_flies_as_flights_in_c_and_restores_its_state(vehicle: Vehicle, fmi: int, tmp_path: Path) -> None:
+    made = autopilot_of(vehicle)
+    path = tmp_path / "autopilot.fmu"
+    path.write_bytes(autopilot_fmu(made, ["host"], fmi))
+    assert validate_fmu(str(path)) == []
+    description = fmpy.read_model_description(str(path))
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    folder = fmpy.extract(str(path), unzipdir=str(tmp_path / "fmu"))
+    pilot = fmpy.instantiate_fmu(folder, description, "CoSimulation")
+    get, put = (pilot.getReal, pilot.setReal) if fmi == 2 else (pilot.getFloat64, pilot.setFloat64)
+    if fmi == 2:
+        pilot.setupExperiment(startTime=0.0)
+    pilot.enterInitializationMode()
+    aims = {"mode_w": 2.0, "ref_z": 11.0, "mode_r": 2.0, "ref_psi": 1.0, "mode_u": 1.0, "ref_u": 0.3}
+    put([reference[name] for name in aims], [*aims.values()])
+    pilot.exitInitializationMode()
+    layout = vehicle.layout
+    sensors = [*layout.pose, *layout.velocities, *layout.over_ground]
+    rov = Stepper(vehicle, {"z": 10.0}, [*sensors, *(("phi", "theta", "psi") if layout.has_attitude else ())])
+    seen, commands = by_flights(made), [reference[name] for name in layout.commands]
+    now = rov.recorded()
+    for n in range(STEPS):
+        for name in ("z", "psi", "u"):
+            at = dict(zip((*sensors, "phi", "theta", "psi"), now, strict=False))[name]
+            assert at == pytest.approx(seen[n, SENSORS.index(name)], abs=1e-9)
+        put([reference[name] for name in sensors], now[: len(sensors)])
+        if n == STEPS // 2:
+            saved = pilot.getFMUState() if fmi == 3 else pilot.getFMUstate()
+            pilot.doStep(n * 0.02, 0.02)
+            first = get(commands)
+            (pilot.setFMUState if fmi == 3 else pilot.setFMUstate)(saved)
+        pilot.doStep(n * 0.02, 0.02)
+        assert n != STEPS // 2 or get(commands) == first
+        now = rov.step(get(commands), 0.02)
+    pilot.terminate()
+    pilot.freeInstance()
+
+
+@pytest.mark.long
+def test_the_fmu_has_all_platforms(tmp_path: Path) -> None:
+    for fmi in (2, 3):
+        path = tmp_path / "a.fmu"
+        path.write_bytes(autopilot_fmu(autopilot_of(VIDEORAY), fmi=fmi))
+        folder = Path(fmpy.extract(str(path), unzipdir=str(tmp_path / f"fmu{fmi}")))
+        found = {one.name for one in (folder / "binaries").iterdir()}
+        assert found == {name if fmi == 2 else p.folder for name, p in PLATFORMS.items() if p.by_default}
+        shutil.rmtree(folder)
+
+
+# ---- The files -------------------------------------------------------------------------------------------------------
+
+
+def test_the_gains_are_a_table_for_any_controller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert main(["export", "bluerov2_heavy", "--to", "gains"]) == 0
+    table = yaml.safe_load((tmp_path / "bluerov2_heavy_gains" / "gains.yaml").read_text(encoding="utf-8"))
+    made = autopilot_of(HEAVY)
+    assert [*table["axes"]] == [axis.name for axis in made.axes]
+    assert table["axes"]["surge"]["k_p"] == pytest.approx(made.gain(SURGE, "k_p"), rel=1e-5)
+    down, up = table["forward_starboard_down"], table["forward_port_up"]
+    signs = {"surge": 1, "sway": -1, "heave": -1, "roll": 1, "pitch": -1, "yaw": -1}
+    for name, row in down["allocation"].items():
+        assert up["allocation"][name] == [sign * x for sign, x in zip(signs.values(), row, strict=True)]
+    assert up["bias"]["heave"] == -down["bias"]["heave"] > 0.0, "the Heavy floats up"
+    assert table["in_closed_loop"]["heave"]["overshoot"] < 0.02
+    forces, commands = np.array(table["force_to_command"]["t200"]).T
+    assert (np.diff(forces) > 0.0).all()
+    assert (np.diff(commands) > 0.0).all()
