@@ -24,7 +24,7 @@ from rov_fmu.io.columns import NO_OUTPUT, pulses
 from rov_fmu.io.file_kinds import is_mcap
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.io.output import Output, is_same, write_whole
-from rov_fmu.tank.readers.ardusub_frames import Servos, motors_of, question_of
+from rov_fmu.tank.readers.ardusub_frames import Servos, impossible_of, motors_of, question_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LEAST_RATE = 20
@@ -38,6 +38,9 @@ _OTHERS = (
     "packets of other senders, such as {}, are ignored, because {} is followed. An autopilot that was started again is "
     f"followed when the old one has been silent for {_SILENCE:g} s"
 )
+_CLIPPED, _FOREIGN, _FOREIGN_TIME = 0.98, 0.05, 3.0
+"""Motors above the first output may be clipped. Outputs that are farther than the second one from all that a frame
+makes are those of another frame; that is told after this time, s."""
 _LATE = 1.0
 """The time of the simulation for which servos must not fit before it is said, s."""
 MOST_LOGS = 20
@@ -77,6 +80,8 @@ class Setup:
     """The time between two rows of the log, s."""
     force: bool = False
     """True if logs may replace files that exist."""
+    frame: str = ""
+    """The frame of ArduSub whose motors the servos are, if it is one."""
 
 
 class Log:
@@ -148,8 +153,13 @@ class Outputs:
     others have their own pulse at rest.
     """
 
-    def __init__(self, servos: Servos, motors: int) -> None:
-        """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones."""
+    def __init__(self, servos: Servos, motors: int, frame: str = "") -> None:
+        """Begin without any pulse. ArduSub may drive so many motors, of which a vehicle may lack the last ones.
+
+        `frame` is the one that it must have, if the servos are those of a frame.
+        """
+        self._impossible, self._foreign_time = impossible_of(frame), 0.0
+        """Directions of outputs that no demands of the frame give, and the time with such outputs, s."""
         self._drives = {number: name for name, (number, _) in servos.items()}
         self._last = max([*self._drives, motors])
         self._silences = dict.fromkeys(self._drives, 0.0)
@@ -165,6 +175,9 @@ class Outputs:
         """Add a step of h seconds."""
         if all(pulse in NO_OUTPUT for pulse in pulses):
             return
+        outputs = np.array([_usual_fraction(pulse) for pulse in pulses[: self._impossible.shape[1]]])
+        if len(self._impossible) and np.abs(outputs).max() < _CLIPPED:
+            self._foreign_time += h * (np.abs(self._impossible @ outputs).max() > _FOREIGN)
         for number, silence in self._silences.items():
             self._silences[number] = silence + h if pulses[number - 1] in NO_OUTPUT else 0.0
         for number, pulse in enumerate(pulses[self._last :], self._last + 1):
@@ -184,6 +197,8 @@ class Outputs:
             yield "no pulses come to {} ({})", _numbered(silent), listed(self._drives[number] for number in silent)
         if self._moving_time > least and (extra := [*takewhile(self._moves, count(self._last + 1))]):
             yield "the pulses of {} change, but no thruster of the vehicle follows them", _numbered(extra)
+        if self._foreign_time > _FOREIGN_TIME:
+            yield ("no demands give these pulses together",)
 
 
 def _numbered(servos: list[int]) -> str:
@@ -205,7 +220,7 @@ class Flight:
         self._commands = {name: setup.servos.get(name) for name in layout.commands}
         self.is_above = False
         """True when the vehicle is above the surface, which its model does not have."""
-        self.outputs = Outputs(setup.servos, motors_of(layout))
+        self.outputs = Outputs(setup.servos, motors_of(layout), setup.frame)
         self._held = {**layout.usual_inputs, **setup.start}
         self.log = Log(setup, most_rows) if setup.log and most_rows else None
 

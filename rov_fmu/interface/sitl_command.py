@@ -116,8 +116,10 @@ def _setup(path: Path, options: Options) -> tuple[Setup, str]:
         if name in servos:
             raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
-    setup = Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force)
-    return setup, chosen_frame(*chosen)
+    frame = chosen_frame(*chosen)
+    own = "" if options.servos else frame
+    setup = Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force, own)
+    return setup, frame
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

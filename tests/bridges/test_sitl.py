@@ -22,12 +22,12 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rov_fmu
-from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Setup
+from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Outputs, Setup
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.tank.readers.ardusub_frames import servos_of
+from rov_fmu.tank.readers.ardusub_frames import FRAMES, servos_of
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.bridges.ardusub import START, ArduSub, packet, parsed, started
@@ -575,3 +575,31 @@ def test_bad_options_are_one_line(options: str, said: str, capsys: pytest.Captur
     assert main(["sitl", *split(options)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert line.startswith(f"rov-fmu: {said}")
+
+
+FAST = 400
+
+
+def frame_pulses(frame: str, seconds: float) -> list[list[int]]:
+    """Return what a frame sends when sticks move ahead, aside and around, one after the other and together."""
+    factors = np.array([["-.+".index(sign) - 1.0 for sign in motor] for motor in FRAMES[frame]])
+    time = np.arange(round(seconds * FAST)) / FAST
+    demands = np.array(
+        [0.0 * time, 0.0 * time, 0.2 * np.sin(time), 0.2 + 0.0 * time, 0.4 + 0.0 * time, 0.3 * np.cos(time)]
+    )
+    outputs = np.clip(factors @ demands, -1.0, 1.0).T.tolist()
+    return [[int(1500 + 400 * x) for x in row] for row in outputs]
+
+
+@pytest.mark.parametrize("name", ["vectored", "vectored_6dof", "bluerov1", "vectored_6dof_90deg"])
+def test_another_frame_with_as_many_motors_is_noticed_and_the_own_one_is_not(name: str) -> None:
+    """FRAME_CONFIG 0 for 1, or 3 for 2, drives the vehicle astern or sideways when the stick is ahead."""
+    own = "vectored" if len(FRAMES[name]) == 6 else "vectored_6dof"
+    vehicle = HEAVY if own == "vectored_6dof" else load_vehicle(SHIPPED["bluerov2"])
+    setup = replace(setup_of(vehicle, z=10.0), frame=own)
+    outputs = Outputs(setup.servos, len(FRAMES[own]), own)
+    found = []
+    for pulses in frame_pulses(name, 6.0):
+        outputs.add(1.0 / FAST, (*pulses, *[0] * (16 - len(pulses))))
+        found = [words for words, *_ in outputs.doubts()]
+    assert found == ([] if name == own else ["no demands give these pulses together"])

@@ -100,6 +100,13 @@ def frame_of(config: float | None) -> str:
     return next((name for number, name in enumerate(FRAMES) if number == config), "")
 
 
+def impossible_of(frame: str) -> Array:
+    """Return directions (k x motors) of outputs that no demands give to a frame, as far as no motor is clipped."""
+    factors = np.array([["-.+".index(sign) - 1.0 for sign in motor] for motor in FRAMES.get(frame, ())]).reshape(-1, 6)
+    left, singular, _ = np.linalg.svd(factors)
+    return left[:, int((singular > 1e-9).sum()) :].T
+
+
 def question_of(layout: Layout) -> str:
     """Return the question whether ArduSub has the frame that fits a vehicle."""
     own = listed(map(config_of, fitting_frames(layout)), "or")
