@@ -13,7 +13,7 @@ from rov_fmu.identify.likelihood.curves import NO_SHAPES, Motions, Shapes
 from rov_fmu.identify.likelihood.objective import Objective, TableRow, modelled
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
-from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike
+from rov_fmu.identify.result import CONSTANTS, LEAST_TESTED, Answer, Tested, are_alike, is_extrapolated
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.uncertainty import LEVEL
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -32,6 +32,9 @@ ROCKING = CONSTANTS["rocking"].value
 _STOPPED = 0.1
 _GRID = np.linspace(0.0, 1.0, 101)
 """The commands among which the one is found that holds a speed."""
+_DIFFERENT = np.array([0.15, 0.3, 0.3])
+"""Two vehicles differ along an axis if ln of a V_ss, a time or a stopping distance does by more: the half-widths up to
+which these are *good*."""
 _DRAWS = 256
 """The number of vehicles that are drawn from the estimates of a vehicle file."""
 
@@ -121,6 +124,13 @@ def logarithms(
         return values.reshape(values.shape[0] * values.shape[1], -1)
 
     return of
+
+
+def differs(table: Table, ends: Sequence[Array], axis: Axis, tested: Tested) -> bool:
+    """Return True if coordinates belong to vehicles whose answers within the tests differ along an axis."""
+    commands = [c for c in commands_of_answers(tested) if not is_extrapolated(c, tested)]
+    one, other = (logarithms(table, axis, commands)(z[:, None]).reshape(-1, 3) for z in ends)
+    return bool(np.any(np.abs(one - other) > _DIFFERENT))
 
 
 def answers(

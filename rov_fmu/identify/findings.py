@@ -32,6 +32,7 @@ from rov_fmu.identify.result import (
     Logging,
     Prediction,
     Structure,
+    Tested,
     half_width,
     is_extrapolated,
     is_known,
@@ -72,6 +73,8 @@ _LEAST_WANDER = 0.005
 """A wander of an estimator's velocity below this one is not told, m/s."""
 _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
+_COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
+"""What to do about a motion that turns the vehicle where the model leaves its moment out."""
 _SURE = 0.99
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
@@ -85,8 +88,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "slip": "{files}: check the {quantity}: {words}? The logs would agree much better",
         "second start": (
-            "two fits from different starts ended at different vehicles, so the data do not decide between them. "
-            "More or longer logs would"
+            "{axes}: two fits from different starts ended with different answers, so the data do not decide between "
+            "them. More or longer logs would"
         ),
         "implausible inertia": (
             "{axes}: the vehicle moves as if its inertia were {factor} times {inertia}. Check {mass}, the positions "
@@ -97,7 +100,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
             "many thrusters pulled together, and the battery"
         ),
         "unknown force": (
-            "{what} in {files}{since}. Check the tether, contact with the bottom or a wall, a current, and the payload"
+            "{what} in {files}{since}. Nothing in the logs explains it. If it comes again in another log, it belongs "
+            "to the vehicle"
         ),
         "beyond thrusters": (
             "{axes}: the logs have {largest} and the thrusters of rov.toml give {most} at full command. Check their "
@@ -107,11 +111,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
-            "moment), and is the likely cause. Turn on the spot in a log of its own, or log the velocity"
-        ),
-        "nearest": (
-            "the model lacks something that is not among the known causes. Of these, the nearest is: {nearest}. It "
-            "does not explain the errors, and the model is without it"
+            "moment), and is the likely cause. {coupling}turn on the spot in a log of its own, and leave yaw out of "
+            "the other logs by [leave_out] in rov.toml"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -252,14 +253,15 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         if result.structure > ALARM:
             findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
         if result.structure > USUAL and _turns_unseen(identification, result):
-            findings.append(Finding("unlogged motion", result.axis.name))
+            cure = "Log the velocity, or " if identification.vehicle.layout.coupled else _COUPLE
+            findings.append(about("", "unlogged motion", result.axis.name, coupling=cure))
         if may_rock(identification.folder, result.axis):
             findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
         findings += _not_identified(known, f"{curve} thrust", curve=curve)
     findings += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
-    if identification.agreement > DISAGREEMENT:
-        findings.append(Finding("second start"))
+    differing = (result.axis.name for result in identification.axes if result.difference > DISAGREEMENT)
+    findings += [Finding("second start", axis) for axis in differing]
     findings += [
         _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
     ]
@@ -462,7 +464,7 @@ def extrapolated(identification: Identification) -> list[str]:
     """Return sentences about answers to commands that were not tested, and about the voltage of all answers, if the
     thrust depends on it."""
     tested = [
-        f"{result.axis.name} from {0.0 - result.tested[0]:.0%} to {result.tested[1]:.0%}"
+        f"{result.axis.name} {tested_in_words(result.tested)}"
         for result in identification.axes
         if any(is_extrapolated(answer.command, result.tested) for answer in result.answers)
     ]
@@ -489,6 +491,25 @@ def with_lag(identification: Identification) -> list[str]:
     return [f"With the lag of the thrusters, the time is {listed(told)}."] if told else []
 
 
+def tested_in_words(tested: Tested) -> str:
+    """Return the commands of the tests of an axis: `from -58% to 64%`."""
+    return f"from {0.0 - tested[0]:.0%} to {tested[1]:.0%}"
+
+
+def headline(result: AxisResult) -> str:
+    """Return how fast the vehicle is at half command, or at the strongest tested one below it, with the interval:
+    `down 0.63 m/s at 50%, 0.57 to 0.68`; empty without answers."""
+    tested = [a for a in result.answers if 0.0 < a.command <= 0.5 and not is_extrapolated(a.command, result.tested)]
+    told = max(tested, key=lambda a: a.command, default=answer_at(result, 0.5))
+    if told is None:
+        return ""
+    value, _, ends = in_words(*told.steady, result.axis.unit).partition(" (")
+    if not is_known(half_width(told.steady)):
+        value, ends = "a speed that is not known", f"{ends[:-1]}"
+    way = result.axis.positive if told.steady[0] > 0.0 else result.axis.negative
+    return f"{way} {value.removeprefix('-')} at {told.command:.0%}, {ends.removesuffix(')')}"
+
+
 def with_error(estimate: Estimate, unit: str) -> str:
     """Return a value with half the width of its interval relative to it, such as `0.62 m/s ±2%`; one whose interval is
     wider than the value is not known."""
@@ -512,6 +533,13 @@ def effect_in_words(effect: Effect) -> str:
     if not KINDS[effect.kind].is_ratio or effect.value == 1.0:
         return size_in_words(effect.value, effect.unit)
     return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
+
+
+def effect_or_range(effect: Effect) -> str:
+    """Return the size of an effect, or that it is not known, with its interval."""
+    if not effect.value or is_known(half_width((effect.value, effect.interval))):
+        return effect_in_words(effect)
+    return f"not known: {in_words(effect.value, effect.interval, effect.unit)}"
 
 
 def in_words(value: float, interval: Interval, unit: str) -> str:
@@ -704,8 +732,8 @@ def _structure(structure: Structure) -> Finding | None:
         return None
     size = percent(value) if unit == "1" else size_in_words(value, unit)
     words = {"of": structure.of, "value": size, **dict(structure.words)}
-    if isnan(structure.probability):
-        return Finding("nearest", words={"nearest": hypothesis.sentence.format(odds="", **words)})
+    if isnan(structure.probability):  # it comes nearest and explains nothing, so no part is blamed
+        return None
     share = percent(structure.probability) if structure.probability < _SURE else "above 99%"
     odds = f" (probability {share} among the known causes)"
     return Finding(structure.kind, words={**words, "odds": odds})

@@ -24,9 +24,11 @@ from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Coefficient, Identification, Interval
 from rov_fmu.io.groups import grouped
+from rov_fmu.io.messages import brief
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.description import DRAFTED, ROV_FILE
 from rov_fmu.vehicle.checks import check_surface
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
 from rov_fmu.vehicle.schema import NOT_GIVEN, UNTUNED, Basis, Estimated
@@ -111,7 +113,7 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
     )
     vehicle = replace(
         rov,
-        **dict(tests.description.tables.vehicle or ()),
+        **_head(tests),
         basis={name: Basis(source, intervals.get(name), estimates.get(name)) for name, source in sources.items()},
         command_range=validity.command_range if validity else fit.command_range,
         tested=validity.tested if validity else {},
@@ -122,6 +124,17 @@ def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coeff
         measured_from=_data(fit),
     )
     return vehicle, coefficients
+
+
+def _head(tests: Tests) -> dict[str, Any]:
+    """Return [vehicle] of rov.toml. Where nobody has changed the description of a draft, it and the source name the
+    files that are used, which may have changed since."""
+    head = dict(tests.description.tables.vehicle or ())
+    if head and head["description"] == DRAFTED.format(head["source"]):
+        files = [name for name in tests.folder.inputs if name not in (ROV_FILE, tests.description.base_name)]
+        head["source"] = brief(", ".join(files))
+        head["description"] = DRAFTED.format(head["source"])
+    return head
 
 
 def with_own_inputs(vehicle: Vehicle, tests: Tests) -> Vehicle:

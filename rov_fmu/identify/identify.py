@@ -34,7 +34,7 @@ from rov_fmu.identify.result import (
     Slip,
     Tested,
 )
-from rov_fmu.identify.unexplained.disturbances import disturbances, followed, unknown_forces
+from rov_fmu.identify.unexplained.disturbances import disturbances, followed, largest, unknown_forces
 from rov_fmu.identify.unexplained.slips import slips
 from rov_fmu.identify.verdict import MOST_GAIN, most_inertia, verdict
 from rov_fmu.io.csv_table import DataFileError
@@ -88,8 +88,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         predicted.append(prediction)
         show(len(predicted))
     runs = followed(fit.objective, fit.best.z)
-    unexplained = disturbances(fit.objective, fit.best, fit.posterior, runs)
-    slow = [one for one in unexplained if one.axis is None or one.axis in known.fitted]
+    slow = tuple(disturbances(fit.objective, fit.best, fit.posterior, runs, known.fitted))
     vehicle, coefficients = identified_vehicle(tests, fit)
     for curve in vehicle.layout.curves:
         if mistake := next(no_thrust(curve, vehicle.coefficients, f"thrust_{curve.name}*.csv"), None):
@@ -105,12 +104,11 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
         forces=tuple(p for p in points if p.quantity == "force"),
         effects=tuple(effects_of(fit)),
-        disturbances=tuple(slow),
+        disturbances=slow,
         logging=tuple(loggers_of(fit)),
         sensors=tuple(sensors_of(fit)),
         correlation=(names, correlation(names, vehicle.estimates)),
         objective=fit.best.value,
-        agreement=fit.difference,
         unknown_forces=tuple(unknown_forces(fit.objective, runs)),
         slips=wrong,
         structures=tuple(structures_of(fit)),
@@ -121,6 +119,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
     for n, axis in enumerate(known.fitted):
         work.steps("what to measure next", f"what to measure next of {axis.name}")(n)
         axes.append(_axis(found, tests, fit, vehicle, coefficients, axis, tested[axis], predicted, points))
+    found = replace(found, disturbances=tuple(largest(slow)))
     of_file = found.vehicle
     if not tests.description.tables.validity:
         ends = {one.axis.name: (0.0 - round(one.tested[0], 2), round(one.tested[1], 2)) for one in axes}
@@ -142,10 +141,13 @@ def _axis(
     predicted: Sequence[Prediction],
     points: Sequence[Point],
 ) -> AxisResult:
-    """Return what concerns an axis; `found` has what concerns all axes, and `vehicle` is that of the fit."""
+    """Return what concerns an axis, of the logs that show it; `found` has what concerns all axes, also the disturbances
+    in all logs, and `vehicle` is that of the fit."""
     # The thrust of a wrench is the largest force in the logs, if there is any.
     is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
-    is_steady = all(d.share <= MOST_GAIN for d in found.disturbances if d.changes_thrust and d.kept)
+    files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    slow = [*largest(d for d in found.disturbances if d.concerns(axis) and d.file in files)]
+    is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
     least = assess.ROCKING if may_rock(tests.folder, axis) else assess.EXACT
     answers: tuple[Answer, ...] = ()
@@ -156,11 +158,11 @@ def _axis(
         posteriors = (*fit.rivals, *fit.posteriors)
         every = assess.answers(posteriors, axis, vehicle, tested, commands, pushes, least, fit.speeds)
         answers = tuple(a for a in every if abs(a.command) <= fit.most_followed * (1.0 + assess.EXACT))
-    files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
     misfits = [f.file for f in tests.folder.findings if f.kind in MISFITS and f.axis == axis.name and f.file in files]
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]
     limits = tests.description.tables.limits
+    is_other = not fit.ends or assess.differs(fit.objective.table, fit.ends, axis, tested)
     shown = replace(fit.posterior, z=fit.file.posterior.z)
     result = AxisResult(
         axis=axis,
@@ -173,13 +175,13 @@ def _axis(
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
         structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
         soon=fit.structure[axis].soon if axis in fit.structure else 0.0,
-        disturbances=[d for d in found.disturbances if d.concerns(axis)],
+        disturbances=slow,
         effects=acting,
         slips=[s for s in found.slips if s.file in files],
         misfits=misfits,
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
         is_assumed=bool(tests.description.assumed),
-        difference=fit.difference,
+        difference=fit.difference if is_other else 0.0,
     )
     return replace(result, verdict=verdict(result))
 

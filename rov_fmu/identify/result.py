@@ -410,7 +410,9 @@ class Verdict:
 
     word: Word
     reasons: tuple[str, ...]
-    """Sentences: what keeps it from being better, or for `good` what it rests on."""
+    """Sentences, the worst first: what keeps it from being better, or for `good` what it rests on."""
+    remedy: str = ""
+    """The one thing to do about the first reason, as a sentence; empty where nothing has to be done."""
 
     def of(self, axis: Axis) -> str:
         """Return the verdict of an axis as a sentence: `surge: good. The 95% bands contain 97% ...`."""
@@ -541,7 +543,7 @@ class AxisResult:
     is_assumed: bool = False
     """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
     difference: float = 0.0
-    """How much larger J is at the end of the second start."""
+    """How much larger J is at the end of the second start, if that differs along the axis."""
 
     @property
     def moving(self) -> list[Prediction]:
@@ -595,8 +597,6 @@ class Identification:
     """The names and the correlations of all identified coefficients."""
     objective: float
     """J at its minimum."""
-    agreement: float
-    """How much larger J is at the end of the second start."""
     unknown_forces: tuple[UnknownForce, ...] = ()
     """The slow force along each moving axis of each log."""
     slips: tuple[Slip, ...] = ()

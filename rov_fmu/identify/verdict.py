@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from math import inf, isfinite, nan
 
 from rov_fmu.equation.catalogue import Axis
-from rov_fmu.identify.findings import acting
+from rov_fmu.identify.findings import acting, tested_in_words
 from rov_fmu.identify.result import (
     DISAGREEMENT,
     MOST_UNKNOWN,
@@ -54,6 +54,8 @@ class Rule:
     """True if a value below the limit is beyond it."""
     is_told: bool = False
     """True if the reason is told even of a good model, as what it rests on."""
+    remedy: str = ""
+    """The one thing to do about it, as a sentence."""
 
     def word(self, value: float) -> Word:
         """Return the best verdict that a value allows."""
@@ -128,6 +130,7 @@ RULES = (
         "The motors of {file} are not the thrusters of the vehicle.",
         lambda e: {"file": listed(e.misfits)},
         "1",
+        remedy="Take a base with the motors that the warning names.",
     ),
     Rule(
         "unseen samples in the 95 % bands",
@@ -137,6 +140,7 @@ RULES = (
         "The 95% bands contain {share} of the unseen samples.",
         is_least=True,
         is_told=True,
+        remedy="See in the report which log is predicted badly, and leave the axis out of it by [leave_out].",
     ),
     Rule(
         "score G",
@@ -146,6 +150,7 @@ RULES = (
         "The predictions {reach}.",
         _reach,
         is_least=True,
+        remedy="Log this axis alone, both ways, each command for 8 s.",
     ),
     Rule(
         "moving quantities for which no change is a better prediction",
@@ -154,6 +159,7 @@ RULES = (
         0.5,
         "A prediction of no change is better for the {quantity} in {file}.",
         lambda e: {"quantity": e.worse[0].quantity, "file": e.worse[0].file},
+        remedy="Check signs and units with `rov-fmu inspect`; if they are right, log this axis alone, both ways.",
     ),
     Rule(
         "nothing predicted that moves",
@@ -162,6 +168,7 @@ RULES = (
         None,
         "Nothing of this axis was checked on unseen data.",
         unit="1",
+        remedy="Record another log that drives this axis.",
     ),
     Rule(
         "errors R of the fit to all data",
@@ -170,6 +177,7 @@ RULES = (
         WRONG,
         "The model's errors are {size} times what noise explains, so it lacks something.",
         unit="1",
+        remedy="Log this axis alone, and leave it out of the other logs by [leave_out] in rov.toml.",
     ),
     Rule(
         "errors R₂ of the fit over 2 s",
@@ -178,6 +186,7 @@ RULES = (
         None,
         "Over 2 s, the model's errors are {size} times the noise, so it lacks something fast.",
         unit="1",
+        remedy="Log at 20 Hz or more, with steps of the command from rest.",
     ),
     Rule(
         "unknown disturbances, relative to thrust or velocity",
@@ -186,6 +195,7 @@ RULES = (
         MOST_UNKNOWN,
         "{what} in {file}.",
         _largest,
+        remedy="Log it again. If that log is good, leave the axis out of this one by [leave_out] in rov.toml.",
     ),
     Rule(
         "no answers",
@@ -194,6 +204,7 @@ RULES = (
         0.0,
         "No steady velocity is determined.",
         unit="1",
+        remedy="Hold commands along this axis, both ways, for 8 s each.",
     ),
     Rule(
         "half-width of the widest V_ss, relative to the largest one",
@@ -202,6 +213,7 @@ RULES = (
         0.3,
         "The steady velocity at {command} is {known}.",
         lambda e: _known(e, "steady"),
+        remedy="Hold this command and the opposite one until the speed is steady.",
     ),
     Rule(
         "the same of times and stopping distances",
@@ -210,6 +222,7 @@ RULES = (
         None,
         "A time or a stopping distance at {command} is {known}.",
         lambda e: _known(e, "rise", "stop"),
+        remedy="Log how the vehicle speeds up from rest, and how it slows down without thrust.",
     ),
     Rule(
         "held-out V_ss of tables, error (RMS)",
@@ -218,6 +231,7 @@ RULES = (
         0.4,
         "The other commands predict a V_ss of the tables with an error of {share} (RMS).",
         is_told=True,
+        remedy="Measure the table again, both ways.",
     ),
     Rule(
         "upper end of the effective inertia, relative to that in air",
@@ -227,6 +241,7 @@ RULES = (
         "The inertia is at most {share} of that of the vehicle in air, which cannot be: check the unit of velocity, "
         "the mass, and a thrust that is assumed.",
         is_least=True,
+        remedy="Check the unit of the velocity, then the mass, then the thrust.",
     ),
     Rule(
         "effects of unusual size",
@@ -236,6 +251,7 @@ RULES = (
         "The {name} is unusual.",
         lambda e: {"name": listed([effect.name for effect in e.unusual])},
         "1",
+        remedy="If it is right, say so in [priors] of rov.toml.",
     ),
     Rule(
         "slips",
@@ -245,6 +261,7 @@ RULES = (
         "The {quantity} in {file} seems to have another unit or sign, and all axes are fitted to this log.",
         lambda e: {"quantity": e.slips[0].quantity, "file": e.slips[0].file},
         "1",
+        remedy="Check the file; [columns] of rov.toml changes a unit or a sign.",
     ),
     Rule(
         "an assumed vehicle",
@@ -253,6 +270,7 @@ RULES = (
         None,
         "The mass and the thrusters are assumed.",
         unit="1",
+        remedy="Write what you know into rov.toml: `rov-fmu inspect --draft` drafts it.",
     ),
     Rule(
         "difference of J to another vehicle of a second start",
@@ -261,24 +279,25 @@ RULES = (
         DISAGREEMENT,
         "Two starts of the fit led to different vehicles.",
         unit="1",
+        remedy="Record a longer log of this axis.",
     ),
 )
 """All rules, in the order in which their reasons are told."""
 
 
 def verdict(e: AxisResult) -> Verdict:
-    """Return the worst word of all rules, with a reason for each doubt, and for which commands it holds."""
-    values = [(rule, rule.value(e)) for rule in RULES]
+    """Return the worst word of all rules, with a reason for each doubt, the worst first, and the tested commands."""
+    values = sorted(((rule, rule.value(e)) for rule in RULES), key=lambda pair: -WORDS.index(pair[0].word(pair[1])))
+    worst, value = values[0]
+    word = worst.word(value)
     reasons = [
         rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
         for rule, value in values
         if rule.word(value) != "good" or (rule.is_told and isfinite(value))
     ]
-    word = max((rule.word(value) for rule, value in values), key=WORDS.index)
     if word != WORDS[-1] and not is_whole(e.tested):
-        astern, ahead = e.tested
-        reasons.append(f"It holds for commands from {0.0 - astern:.0%} to {ahead:.0%}.")
-    return Verdict(word, tuple(reasons))
+        reasons.append(f"It holds for commands {tested_in_words(e.tested)}.")
+    return Verdict(word, tuple(reasons), worst.remedy if word != "good" else "")
 
 
 def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> float:

@@ -10,13 +10,14 @@ from rov_fmu.identify.findings import (
     answer_at,
     by_heading,
     driven_aside,
-    effect_in_words,
+    effect_or_range,
     extrapolated,
     name_of,
     next_tests,
     repairs,
     sentences,
     size_in_words,
+    tested_in_words,
     with_error,
     with_lag,
 )
@@ -39,7 +40,7 @@ def print_identification(identification: Identification) -> None:
     for words in repairs(identification):
         paragraph(out, f"First: {words}")
     for axis, verdict in identification.verdicts.items():
-        paragraph(out, f"- {verdict.of(axis)}")
+        paragraph(out, f"- {verdict.of(axis)}{' To do: ' if verdict.remedy else ''}{verdict.remedy}")
     asides = [*with_lag(identification), *driven_aside(identification), *extrapolated(identification)]
     for shown, lines in ((_answers(identification.axes), asides), (_errors(identification.axes), [])):
         if shown.rows:
@@ -54,13 +55,14 @@ def print_identification(identification: Identification) -> None:
 
 def _answers(axes: Sequence[AxisResult]) -> Table:
     """Return the table of what an owner asks about each axis."""
-    speeds = [f"speed at {share:.0%}" for share in SHARES]
-    shown = table("What to expect, with 95% intervals", "", [*speeds, "time to it", "stopping distance"])
+    numbers = ["tested", *(f"speed at {share:.0%}" for share in SHARES), "time at 50%", "stopping from 50%"]
+    shown = table("What to expect, with 95% intervals", "", numbers)
     for result in axes:
         axis, half = result.axis, answer_at(result, 0.5)
         cells = [_known(answer_at(result, share), "steady", axis.unit) for share in SHARES]
         cells += [_known(half, "rise", "s"), _known(half, "stop", axis.position_unit)]
-        shown.add_row(f"{axis.positive} ({axis.name})", *cells)
+        tested = tested_in_words(result.tested).removeprefix("from ")
+        shown.add_row(f"{axis.positive} ({axis.name})", tested, *cells)
     shown.caption = STOPPING
     return shown
 
@@ -86,7 +88,7 @@ def _conclusions(identification: Identification) -> Iterator[str]:
     """Yield the paragraphs about other effects, warnings, unread files, how many other findings there are, and the next
     test."""
     if kept := [effect for effect in identification.effects if effect.kept]:
-        words = (f"{e.name} ({f'{e.of} {effect_in_words(e)}'.strip()})" for e in kept)
+        words = (f"{e.name} ({f'{e.of} {effect_or_range(e)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
     for kind in ("rests", "assumed thrust"):
         yield from (f"{sentence}." for sentence in sentences(identification.findings, kind))

@@ -9,7 +9,16 @@ from markupsafe import Markup
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmu.card import card
 from rov_fmu.identify import findings
-from rov_fmu.identify.result import AxisResult, Identification, Point, Prediction, relative_error, with_stop
+from rov_fmu.identify.result import (
+    AxisResult,
+    Identification,
+    Point,
+    Prediction,
+    half_width,
+    is_known,
+    relative_error,
+    with_stop,
+)
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.report.plots.identification import plot_answers, plot_forces
 from rov_fmu.report.plots.logs import height_of, plot_log
@@ -61,6 +70,7 @@ def report_page(results: Identification, on_progress: Progress = silent) -> str:
         by_all=lambda points, other: [_by(p, other) for p in points] if other else None,
         relative_error=relative_error,
         with_stop=with_stop,
+        is_known=lambda estimate: is_known(half_width(estimate)),
         in_degrees=in_degrees,
     )
 

@@ -57,6 +57,8 @@ from rov_fmu.vehicle.shipped import SHIPPED, VIDEORAY, shipped_name
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
 
 ROV_FILE = "rov.toml"
+DRAFTED = "A vehicle identified from {}"
+"""The description that a draft has, with its source."""
 _HARDWARE_TABLES = ("body", "arm", "curves", "thruster", "inputs", "point")
 """The tables that are not allowed together with `base`, because the base has its own; [body] may have `coupling`."""
 _FORM = "the form of the paper's vehicle: two rear thrusters ahead, one down"
@@ -202,6 +204,14 @@ _Flagged = Annotated[
 ]
 
 
+def _check_axes(names: tuple[str, ...]) -> tuple[str, ...]:
+    """Check the names of axes."""
+    for name in names:
+        if name not in AXES:
+            raise ValueError(f"must name axes{only(name, AXES, join_names(AXES))}: {shown(name)}")
+    return names
+
+
 class RovTables(Tables):
     """The tables of rov.toml that could be read."""
 
@@ -224,6 +234,8 @@ class RovTables(Tables):
     """What the fields of topics stand for: headers of a CSV file."""
     valid: dict[str, _Flagged] = Field(default={})
     """The quantities that are measured only where a column or a field is true, by its name."""
+    leave_out: dict[str, Annotated[tuple[str, ...], AS_TUPLE, AfterValidator(_check_axes)]] = Field(default={})
+    """The axes about which a log tells nothing that counts, by the file of the log."""
     dives: dict[str, Dive] = Field(default={})
     """The dives of several files, by name."""
     logs: LogKeys = LogKeys()

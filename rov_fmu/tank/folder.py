@@ -56,6 +56,7 @@ _LACKING = {
     "columns": "no CSV file has such a column",
     "topics": "no log has such a topic and field",
     "valid": "no log has such a column or field",
+    "leave_out": "there is no such log",
 }
 """What is wrong with a name in a table of rov.toml that no file has."""
 _LOADS = "The vehicle has these loads as inputs, and neither thrusters nor their lag"
@@ -157,6 +158,8 @@ class Folder:
                 self.read_dive(dive)
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
+        left_out = self.rov_file.tables.leave_out
+        self.logs = [log.without(left_out.get(log.file.partition(" (from ")[0], ())) for log in self.logs]
         self.logs = [piece for log in self.logs for piece in uninterrupted(checked(log))]
         if self.layout and self.layout.has_wrench:
             self._relate_to_full_force()
@@ -220,12 +223,14 @@ class Folder:
         self.logs += [log for log in logs if log.commands]
 
     def unknown_names(self) -> Iterator[str]:
-        """Yield a line for each entry of [columns], [topics] and [valid] that no file has."""
+        """Yield a line for each entry of [columns], [topics] and [valid] that no file has, and for each log in
+        [leave_out] that is none."""
         for table, what in _LACKING.items():
             names: Mapping[str, object] = getattr(self.rov_file.tables, table)
-            free = sorted(self.known - names.keys())
+            known = self.inputs.keys() if table == "leave_out" else self.known
+            free = sorted(known - names.keys())
             for name, value in names.items():
-                if name not in self.known:
+                if name not in known:
                     yield key_line(f"{table}.{name}", f"{what}{only(name, free) if free else ''}", value)
 
     def missing_columns(self, requests: Requests) -> Iterator[str]:

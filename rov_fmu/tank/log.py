@@ -4,7 +4,7 @@ Nothing in a log is resampled or copied onto the times of something else. Every 
 identification, `--inspect`, the flight page and `simulate` use it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from math import pi
@@ -198,6 +198,13 @@ class Log:
     def used(self, name: str) -> Channel | None:
         """Return the channel that is used for a quantity, by the quantity's name, or None if nothing measures it."""
         return next((c for c in self.channels if c.quantity.name == name and not c.unused and c.count), None)
+
+    def without(self, axes: Collection[str]) -> "Log":
+        """Return the log without the channels of some axes, which rov.toml leaves out."""
+        unused = "[leave_out] in rov.toml says so"
+        own = (c.quantity.axis is not None and c.quantity.axis.name in axes and not c.unused for c in self.channels)
+        channels = (replace(c, unused=unused) if is_one else c for c, is_one in zip(self.channels, own, strict=True))
+        return replace(self, channels=tuple(channels)) if axes else self
 
     @cached_property
     def shown(self) -> tuple[Channel, ...]:

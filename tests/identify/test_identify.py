@@ -14,6 +14,7 @@ from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
+from rov_fmu.identify.identified_vehicle import _head
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.kinds import PRIORS, USUAL_EXPONENT
 from rov_fmu.identify.result import AxisResult, Identification, coverage_of
@@ -442,3 +443,21 @@ def test_a_folder_that_cannot_be_used_is_one_line(
     lines = said.splitlines()
     assert all(str(folder) in line and line.isprintable() for line in lines), "a line for each mistake"
     assert all(word in line for word, line in zip(words.split(" … "), lines, strict=False)), lines
+
+
+@pytest.mark.parametrize(("written", "now"), [("old.csv", "log_heave_0.csv"), ("Nobody", "Nobody")])
+def test_the_sentence_of_a_draft_does_not_outlive_its_log(written: str, now: str, tmp_path: Path) -> None:
+    """A source that a person wrote stays."""
+    tests = load_tests(with_logs(tmp_path, HEAVE, 1))
+    head = tests.description.tables.vehicle
+    assert head
+    description = f"A vehicle identified from {written}" if now != written else "Mine"
+    tables = tests.description.tables.model_copy(
+        update={"vehicle": head.model_copy(update={"source": written, "description": description})}
+    )
+    rov_file = replace(tests.folder.rov_file, description=replace(tests.description, tables=tables))
+    tests.folder.rov_file = rov_file
+    tests.folder.inputs = {name: "" for name in tests.folder.inputs if not name.startswith("thrust")}
+    found = _head(tests)
+    assert found["source"] == now
+    assert found["description"] == description.replace(written, now)

@@ -172,7 +172,10 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
     data = objective.data(z, runs, exact=False)
     best = Minimum(z, objective.value(z, runs), runs, data, total(objective, z, data)[1])
     posterior = Posterior.of(objective.table, z, best.information)
-    found = {(str(one.kind), one.axis): one for one in disturbances(objective, best, posterior, [run])}
+    found = {
+        (str(one.kind), one.axis): one
+        for one in disturbances(objective, best, posterior, [run], VIDEORAY.layout.bare_axes)
+    }
     thrust = np.array([VIDEORAY.force(SURGE, c) for c in COMMAND])
     share = np.mean(since)
     sizes = {
@@ -206,5 +209,6 @@ def test_a_slow_force_that_the_other_parameters_explain_as_well_is_none(tmp_path
     drift = 0.1 * np.sin(2.0 * np.pi * recording.time / 60.0)
     write_log(path, "a", replace(recording, values=recording.values + drift))
     fit = fit_all(*begin(load_tests(path)))
-    found = disturbances(fit.objective, fit.best, fit.posterior, followed(fit.objective, fit.best.z))
+    runs = followed(fit.objective, fit.best.z)
+    found = disturbances(fit.objective, fit.best, fit.posterior, runs, [HEAVE])
     assert not [one for one in found if one.kept]

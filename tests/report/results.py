@@ -175,7 +175,6 @@ def without_findings() -> Identification:
         ),
         correlation=(names, correlation),
         objective=-1234.5,
-        agreement=0.0,
     )
 
 

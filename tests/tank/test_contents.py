@@ -14,6 +14,7 @@ from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.quality import checked
 from rov_fmu.tank.readers.tables import open_matlab
+from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import rows_of
 from tests.tank.logs import channel, commanded, commands, log, measured
 from tests.tank.readers import motion
@@ -191,3 +192,32 @@ def test_thrusters_with_a_toe_in_and_a_log_with_sway(axes: str, tmp_path: Path) 
     assert "dive.csv: the motion in sway is left out, because the thrusters drive it only together with" in (
         "\n".join(sentences(tests.folder.findings))
     )
+
+
+def test_rov_toml_leaves_an_axis_out_of_a_log(tmp_path: Path) -> None:
+    """Its channel is told as left out, and what the log shows of another axis stays."""
+    (log,) = load_tests(folder(dive(tmp_path / "dive.csv").parent)).folder.logs
+    assert log.used("depth")
+    names = ",".join(f"u_{name} [1]" for name in motion.THRUSTERS)
+    columns = TIME, *motion.THRUSTERS.values(), motion.DEPTH, np.sin(TIME)
+    table(tmp_path / "dive.csv", f"time [s],{names},depth [m],surge velocity [m/s]", *columns)
+    tests = load_tests(folder(tmp_path, '[leave_out]\n"dive.csv" = ["heave"]\n'))
+    (log,) = tests.folder.logs
+    assert not log.used("depth")
+    assert log.used("surge velocity")
+    told = [line for line in sentences(tests.folder.findings) if "[leave_out]" in line]
+    assert told == ["dive.csv: depth [m] is left out for depth: [leave_out] in rov.toml says so"]
+
+
+@pytest.mark.parametrize(
+    ("entry", "told"),
+    [
+        ('"dive2.csv" = ["heave"]', "leave_out.dive2.csv"),
+        ('"dive.csv" = ["depth"]', "must name axes"),
+    ],
+)
+def test_a_wrong_entry_of_leave_out_is_one_line(entry: str, told: str, tmp_path: Path) -> None:
+    dive(tmp_path / "dive.csv")
+    with pytest.raises(VehicleFileError, match=told) as error:
+        load_tests(folder(tmp_path, f"[leave_out]\n{entry}\n"))
+    assert len(str(error.value).splitlines()) == 1

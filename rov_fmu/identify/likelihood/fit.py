@@ -67,6 +67,8 @@ class Fit:
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
     """How much larger J is at the end of the second start."""
+    ends: tuple[Array, Array] | None = None
+    """The coordinates at the ends of both starts; None if the second one has none."""
     starts: Starts = field(default_factory=dict)
     """The hypotheses about the structure that won, with the coordinates of their rows."""
     odds: Mapping[Suspect, float] = field(default_factory=dict)
@@ -192,6 +194,7 @@ def fit_all(
         posterior,
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
+        (ends[0].z, ends[-1].z) if len(ends) > 1 or is_enough else None,
         {**dict.fromkeys(first), **search.now.starts},
         odds,
         tuple(one.posterior for one in search.rivals),

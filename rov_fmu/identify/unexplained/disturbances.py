@@ -1,12 +1,12 @@
 """What is slow and not explained by the model: forces, changes of all thrust, and velocities over ground."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from math import inf
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, HEAVE
+from rov_fmu.equation.catalogue import AXES, HEAVE, Axis
 from rov_fmu.identify.likelihood.filter import DivergedError, Run
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
@@ -15,6 +15,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior, around
 from rov_fmu.identify.likelihood.solve import Minimum, evidence, minimise
 from rov_fmu.identify.result import KEPT, Disturbance, UnknownForce
 from rov_fmu.identify.unexplained.causes import cause_of, thrust_along
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, rms
 
 _LITTLE = 0.05
@@ -29,19 +30,26 @@ def followed(objective: Objective, z: Array) -> list[Run]:
 
 
 def disturbances(
-    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[Run]
+    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[Run], fitted: Sequence[Axis]
 ) -> Iterator[Disturbance]:
-    """Yield each slow process of the model as it is in the log where it is largest, with the evidence for it."""
+    """Yield each slow process of the model in each log that has it, with the evidence for it: those along the axes that
+    are fitted, and along no axis."""
     for index, p in enumerate(objective.table.parameters):
         if p.kind in SLOW:
             gain, error = _evidence(objective, best, index), float(posterior.errors[index])
             in_logs = [_disturbance(objective, n, best.z, p, runs, gain, error) for n in range(len(runs))]
-            present = [one for one in in_logs if one]
+            present = [one for one in in_logs if one and (one.axis is None or one.axis in fitted)]
             if present:
-                largest, slow = max(present, key=lambda one: one.share), SLOW[p.kind]
-                if largest.kept and slow.acts_as != "velocity":  # nobody knows what a velocity over ground follows
-                    largest = replace(largest, cause=cause_of(objective, best.z, runs, slow, largest.axis))
-                yield largest
+                first, slow, cause = present[0], SLOW[p.kind], ""
+                if first.kept and slow.acts_as != "velocity":  # nobody knows what a velocity over ground follows
+                    cause = cause_of(objective, best.z, runs, slow, first.axis)
+                yield from (replace(one, cause=cause) for one in present)
+
+
+def largest(some: Iterable[Disturbance]) -> Iterator[Disturbance]:
+    """Yield each slow process as it is in the log where it is largest."""
+    for own in grouped(((one.kind, one.of), one) for one in some).values():
+        yield max(own, key=lambda one: one.share)
 
 
 def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[UnknownForce]:

@@ -15,6 +15,7 @@ from rov_fmu.equation.parts import SourcedVector
 from rov_fmu.io.messages import brief, first_of, listed, one_line
 from rov_fmu.io.templates import render
 from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
+from rov_fmu.tank.description import DRAFTED
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection
 from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, RADIUS, Moved
@@ -90,13 +91,15 @@ def draft(
     """
     word = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     vehicle = load_vehicle(SHIPPED[likely.base]) if likely.base else None
+    names = one_line(brief(", ".join(dict.fromkeys(one.path.name for one in inspections))))
     columns, headers = _columns([one for one in inspections if not _is_bag(one.path)], tables)
     return render(
         "rov.toml.j2",
         Path(__file__).parent,
         quoted=_quoted,
         asks=asks,
-        names=one_line(brief(", ".join(dict.fromkeys(one.path.name for one in inspections)))),
+        names=names,
+        description=DRAFTED.format(names),
         is_own=asks and not likely.base and len(likely.thrusters) > 1,
         is_wrench=asks and not EXTERNAL.isdisjoint(likely.thrusters),
         thrusters=likely.thrusters,

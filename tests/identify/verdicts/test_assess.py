@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import t
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
-from rov_fmu.identify.assess import answers, answers_of_file
+from rov_fmu.identify.assess import answers, answers_of_file, differs
 from rov_fmu.identify.assess import tested_commands as of_tests
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood.fit import Fit
@@ -98,3 +98,11 @@ def test_a_steady_table_tests_its_commands_and_thrust_tables_test_none(tmp_path:
     known, logs, rows = begin(tests)
     objective = Objective.of_known(known, logs, rows)
     assert of_tests(objective, objective.mean)[HEAVE] == (0.7, 0.8)
+
+
+def test_two_vehicles_differ_only_along_the_axes_whose_answers_differ(fit: Fit) -> None:
+    table = fit.objective.table
+    other = fit.best.z.copy()
+    for n, p in enumerate(table.parameters):
+        other[n] += p.of == "heave" and p.kind in ("quadratic drag", "linear drag")
+    assert [differs(table, (fit.best.z, other), axis, (0.5, 0.5)) for axis in (HEAVE, YAW)] == [True, False]

@@ -75,7 +75,8 @@ NO_CHANGE = "A prediction of no change is better for the depth in log_2.csv."
 )
 def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: str, reason: str) -> None:
     judged = verdict(AxisResult(HEAVE, **(USUAL | changes)))
-    assert (judged.word, judged.reasons) == (word, tuple(filter(None, [COVERED, reason])))
+    assert (judged.word, judged.reasons) == (word, tuple(filter(None, [reason, COVERED])))
+    assert bool(judged.remedy) == (word != "good")
 
 
 def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
