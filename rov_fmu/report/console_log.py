@@ -26,19 +26,20 @@ NOT_ENOUGH = (
 
 
 def print_inspected(inspected: Inspected, *, with_draft: bool = True) -> None:
-    """Print what logs contain, what they cannot determine, and, `with_draft`, the lines to paste into rov.toml."""
+    """Print what logs cannot determine, and how to log it, then what they contain, and, `with_draft`, lines for
+    rov.toml."""
     out = console()
-    for inspection in inspected.logs:
-        print_inspection(inspection)
     for line in inspected.warnings:
         print_message(f"rov-fmu: warning: {line}")
-    for line in inspected.notes:
-        paragraph(out, f"{line}.")
     if lines := inspected.undetermined:
         out.print(UNDETERMINED)
         for line in lines:
             paragraph(out, f"- {line}.")
         out.print()
+    for inspection in inspected.logs:
+        print_inspection(inspection)
+    for line in inspected.notes:
+        paragraph(out, f"{line}.")
     if with_draft and inspected.text:
         what = f"{inspected.path} lacks these lines" if inspected.own else f"A draft of {inspected.path}"
         paragraph(out, f"{what}; --draft writes them:")

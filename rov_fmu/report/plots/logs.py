@@ -40,13 +40,15 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
     groups = grouped(((p.quantity, p.span), p) for p in predictions).values()
     channels = _unpredicted(log, predictions) if log and measured else []
     commands = log.commands if log else None
+    times = [commands.rows] if commands else [*(p.time for p in predictions), *(c.samples[0] for c in channels)]
+    since = min((float(time[0]) for time in times), default=0.0)  # clocks may count from 1970
     count = len(groups) + len(channels) + bool(commands)
     panels = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     for panel, own in zip(panels, groups, strict=False):
         for n, p in enumerate(own):
-            _draw_prediction(panel, p, is_named=not n)
+            _draw_prediction(panel, p, since, is_named=not n)
     for panel, channel in zip(panels[len(groups) :], channels, strict=False):
-        _draw_channel(panel, channel)
+        _draw_channel(panel, channel, since)
     if commands:
         time = np.linspace(float(commands.rows[0]), commands.end, MOST_SAMPLES)
         values = dict(zip(commands.thrusters, commands.at(time).T, strict=True))
@@ -54,10 +56,11 @@ def plot_log(figure: Figure, log: Log | None, predictions: Sequence[Prediction] 
             values = {name: own for name, own in values.items() if np.ptp(own) > 0.0} or values
         is_force = any(name.endswith("_ext") for name in values)
         named = {name if name == "command" or is_force else f"u_{name}": own for name, own in values.items()}
-        draw_commands(panels[-1], time, named, "N, N.m" if is_force and _is_absolute(log) else "1")
+        draw_commands(panels[-1], time - since, named, "N, N.m" if is_force and _is_absolute(log) else "1")
     panels[-1].set_xlabel("time (s)")
     if predictions:
-        panels[-1].set_xlim(min(p.time[0] for p in predictions), max(p.time[-1] for p in predictions))
+        ends = min(p.time[0] for p in predictions), max(p.time[-1] for p in predictions)
+        panels[-1].set_xlim(ends[0] - since, ends[1] - since)
         columns = 4 if figure.get_figwidth() > _NARROW else 2
         figure.legend(*panels[0].get_legend_handles_labels(), loc="outside upper right", ncols=columns)
 
@@ -74,23 +77,23 @@ def _unpredicted(log: Log, predictions: Sequence[Prediction]) -> list[Channel]:
     return [c for c in used if np.ptp(c.samples[1]) > 0.0 and not (predictions and c.quantity.axis is None)]
 
 
-def _draw_channel(ax: Axes, channel: Channel) -> None:
+def _draw_channel(ax: Axes, channel: Channel, since: float) -> None:
     factor, unit = in_degrees(channel.quantity.unit)
     time, values = channel.unwrapped
     some = slice(None, None, max(1, len(time) // (5 * MOST_SAMPLES)))
-    time, values = time[some], factor * values[some]
-    breaks = np.searchsorted(time, [start for start, _ in gaps(*channel.samples)], side="right")
+    time, values = time[some] - since, factor * values[some]
+    breaks = np.searchsorted(time, [start - since for start, _ in gaps(*channel.samples)], side="right")
     ax.plot(np.insert(time, breaks, np.nan), np.insert(values, breaks, np.nan), color=LIGHT["orange"], label="measured")
     ax.margins(x=0.0, y=0.12)
     name_axes(ax, channel.quantity.name, unit)
 
 
-def _draw_prediction(ax: Axes, shown: Prediction, *, is_named: bool) -> None:
+def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: bool) -> None:
     """Draw what was measured of an unseen log and what was predicted, with the 95 % band."""
     names = ("measured", "predicted, with 95 % band", "compared") if is_named else (None,) * 3
     factor, unit = in_degrees(shown.unit)
     some = slice(None, None, max(1, len(shown.time) // MOST_SAMPLES))
-    time, half = shown.time[some], factor * NORMAL * shown.deviation[some]
+    time, half = shown.time[some] - since, factor * NORMAL * shown.deviation[some]
     predicted = factor * shown.predicted[some]
     draw_band(ax, time, predicted - half, predicted + half)
     ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label=names[0])

@@ -3,15 +3,19 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from lxml import html
+from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
 from rov_fmu.identify.inspection.inspected import inspect_logs
 from rov_fmu.report.inspection_page import inspection_page
+from rov_fmu.report.plots.logs import plot_log
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.report.pages import rows, text_of
+from tests.tank.logs import channel, commands, log
 from tests.tank.readers.motion import DIVE, THRUSTERS, TIME
 from tests.tank.readers.writers import LOGS, table
 
@@ -32,6 +36,15 @@ def test_commands_and_measurements_have_panels_of_one_size_over_one_time(page: s
         assert len({tuple(panel["x"]) for panel in panels}) == 1
         heights = [bottom - top for _, top, _, bottom in (panel["box"] for panel in panels)]
         assert max(heights) == pytest.approx(min(heights), rel=0.02)
+
+
+def test_a_clock_that_counts_from_1970_is_drawn_from_the_first_command() -> None:
+    time = 1.777e9 + TIME
+    figure = Figure()
+    plot_log(figure, log(commands(time, THRUSTERS), channel("depth", time, DIVE.position[:, 2])))
+    for ax in figure.axes:
+        assert ax.get_xlim()[0] == pytest.approx(0.0, abs=0.05 * np.ptp(TIME))
+        assert ax.get_xlim()[1] == pytest.approx(np.ptp(TIME), rel=0.1)
 
 
 def test_each_thruster_moves_the_model_as_the_page_says(page: str) -> None:
