@@ -50,7 +50,7 @@ _BESIDE, _ABOVE, _BELOW, _DEEP = 0.25, 0.35, 0.1, 1.0
 """A depth counts from the surface if the least one is between -_ABOVE and _BELOW, and the largest one exceeds _DEEP, m.
 The vehicle is at the surface while its depth is less than its height and _BESIDE. Above -_ABOVE it is in the air."""
 _STILL = 0.1
-"""The depth of a vehicle on a deck changes by less than this, m."""
+"""The depth of a vehicle on a deck or on the bottom changes by less than this, m."""
 _STANDING, _USUAL_SPEED = 0.05, 0.15
 """Before a wall, a vehicle is slower than the first number, m/s, and elsewhere faster than the second one. Currents
 slow it down, too, but not to a stop."""
@@ -182,8 +182,8 @@ def _contradicting(
     """Yield the first and the last step of each stay where equal pushes move the vehicle less than elsewhere.
 
     Elsewhere is where `place` differs by more than `apart`. Where equal pushes elsewhere tell nothing, weaker ones in
-    the same direction do: the stronger one must move the vehicle, too. `usual` is the least usual speed, m/s. A bottom
-    is left out wherever the vehicle stays on it.
+    the same direction do: the stronger one must move the vehicle, too. `usual` is the least usual speed, m/s. Where a
+    vehicle has rested on the bottom, it touches it whenever it comes so deep again.
     """
     at = np.flatnonzero(course.steady & (True if free is None else free))
     push, speed, there = course.push[at], course.speed[at], place[at]
@@ -218,8 +218,8 @@ def _contradicting(
     for start, end in _runs(stays) if place is course.place else ():
         if (bottom := float(np.median(place[start : end + 1]))) > place.max() - _BAND:
             for first, last in _runs(np.abs(place - bottom) < _BAND):
-                is_long = (last - first) * _STEP > _LEAST
-                stays[first : last + 1] |= is_long and not np.any(shares[first : last + 1] > _AGREES)
+                touches = np.any(np.abs(place[first : last + 1] - bottom) < _STILL)
+                stays[first : last + 1] |= touches and not np.any(shares[first : last + 1] > _AGREES)
     yield from _runs(stays)
 
 
