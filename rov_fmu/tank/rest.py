@@ -216,10 +216,9 @@ def _contradicting(
         agreeing = _STEP * np.sum(shares[start : end + 1] > _AGREES)
         stays[start : end + 1] = contradicting >= _LEAST and agreeing < _MOST_AGREEING * contradicting
     for start, end in _runs(stays) if place is course.place else ():
-        if (bottom := float(np.median(place[start : end + 1]))) > place.max() - _BAND:
+        if (bottom := float(np.median(place[start : end + 1]))) > place.max() - _STILL:
             for first, last in _runs(np.abs(place - bottom) < _BAND):
-                touches = np.any(np.abs(place[first : last + 1] - bottom) < _STILL)
-                stays[first : last + 1] |= touches and not np.any(shares[first : last + 1] > _AGREES)
+                stays[first : last + 1] |= np.any(np.abs(place[first : last + 1] - bottom) < _STILL)
     yield from _runs(stays)
 
 

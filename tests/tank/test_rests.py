@@ -172,3 +172,9 @@ def test_a_log_of_a_single_axis_and_one_that_only_rests_stay_as_they_are() -> No
     assert without_rests(dive, LAYOUT) == [dive]
     of_axis = replace(drawn(3, pushes_down, dives_to(7.0)), axis=HEAVE)
     assert without_rests(of_axis, LAYOUT) == [of_axis]
+
+
+def test_a_bottom_on_which_it_has_rested_is_left_out_at_each_short_touch() -> None:
+    for seed in range(4):
+        pieces = without_rests(drawn(20 + seed, pushes_down, dives_to(7.0)), LAYOUT)
+        assert max(used(piece, "depth").values.max() for piece in pieces) < 6.9
