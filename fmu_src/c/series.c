@@ -292,13 +292,14 @@ static double series_sign_kept(const series *s, int i, double length, bool *reve
     return length;
 }
 
-/* Shorten a piece to the first reversal. Return the velocity that reverses, or NONE. */
-static int series_cut(const series *s, double *length)
+/* Shorten a piece to the first reversal. Return the velocity that reverses, or NONE. The directions of those that are
+ * `faint` do not matter. */
+static int series_cut(const series *s, const bool faint[N_MONITORED], double *length)
 {
     int reversed = NONE;
     for (int k = 0; k < N_MONITORED; k++) {
         bool reverses;
-        if (s->pace[k] == 0.0) {
+        if (s->pace[k] == 0.0 || faint[k]) {
             continue;
         }
         const double end = series_sign_kept(s, k, *length, &reverses);

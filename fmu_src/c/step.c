@@ -18,6 +18,7 @@
 /* Of these, a step may take so many at once, and the others as time passes: evenly over the step, or over a second. With absurd
  * loads and velocities, time hardly passes, and the step is refused soon. */
 #define MOST_AT_ONCE 1000
+#define MOST_USUAL 64 /* a step of more pieces looks for velocities whose reversals do not matter */
 
 #if defined HAS_EARTH_LOADS && LANES == 1
 #define STRUCTURE_OF(m) ((m)->loaded ? &STRUCTURE : &FREE_STRUCTURE)
@@ -377,6 +378,33 @@ static bool motion_fades(motion *m, int component, double rest)
     return true;
 }
 
+/* Find the velocities that are so small throughout a series that their directions do not matter: with the other one, no state
+ * would change by more than a rounding error. Such velocities are themselves rounding errors of forces that balance each
+ * other. Their signs change at random, and a step would never pass all these reversals. */
+static void motion_find_faint(motion *m, const series *s, bool faint[N_MONITORED])
+{
+    double y[N_SERIES], rate[2][N_SERIES];
+    for (int k = 0; k < N_MONITORED; k++) {
+        const mask before = m->reverse[k];
+        memcpy(y, m->y, sizeof y);
+        y[k] = 0.0;
+        for (int n = 0; n <= s->order; n++) {
+            y[k] += fabs(s->c[n][k]);
+        }
+        for (int side = 0; side < 2; side++) {
+            m->reverse[k] = side;
+            model_direct(m->n, m->reverse, &m->q);
+            model_rates(m->n, &m->q, y, rate[side]);
+        }
+        faint[k] = true;
+        for (int i = 0; i < N_USED; i++) {
+            faint[k] &= fabs(rate[1][i] - rate[0][i]) * s->unit <= 0.25 * DBL_EPSILON * s->size[i];
+        }
+        m->reverse[k] = before;
+    }
+    model_direct(m->n, m->reverse, &m->q);
+}
+
 /* Find the components that have settled. A component has settled when those that it depends on have settled, and when each of
  * its rates is a rounding error of the terms. */
 static void motion_settle(motion *m, double rest)
@@ -465,7 +493,11 @@ static int motion_step(const double at[], const model_numbers *n, double h, doub
         double length = reach;
         int reversed = NONE;
         if (reach < 1.0 || !series_keeps_directions(&s, 1.0)) {
-            reversed = series_cut(&s, &length);
+            bool faint[N_MONITORED] = {false};
+            if (pieces > MOST_USUAL) {
+                motion_find_faint(&m, &s, faint);
+            }
+            reversed = series_cut(&s, faint, &length);
         }
         const bool ends = motion_pass(&m, at, &s, length, reach, change);
         if (reversed != NONE) { /* exactly at rest, so that the next piece has the other direction */

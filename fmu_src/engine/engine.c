@@ -101,7 +101,7 @@ double single_cut(const double c[], int order, double reach, int *reversed)
         s.pace[i] = 1.0;
     }
     memcpy(s.c, c, (size_t)(order + 1) * sizeof s.c[0]);
-    *reversed = series_cut(&s, &reach);
+    *reversed = series_cut(&s, (const bool[N_MONITORED]){false}, &reach);
     return reach;
 }
 

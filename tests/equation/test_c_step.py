@@ -4,8 +4,9 @@ from functools import partial
 
 import pytest
 
+from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.equation.steps import Step, in_fmu, in_python
+from tests.equation.steps import Step, in_engine, in_fmu, in_python
 from tests.fmi2 import Fmu
 from tests.vehicles import EVERYTHING, VIDEORAY, at_rest, still
 
@@ -41,3 +42,20 @@ def test_a_step_of_too_many_pieces_is_refused(steps: list[Step]) -> None:
     frictionless = rov.with_(a_d_r=0.0, b_d_r=0.0)
     with pytest.raises(AssertionError):
         step(frictionless, still(rov), at_rest(rov) | {"u": 1.0, "r": 1e30}, 1.0)
+
+
+def test_velocities_that_are_rounding_errors_end_no_piece() -> None:
+    """Forces that balance each other move a vehicle that turns on the spot by their rounding errors, ahead and back."""
+    light = load_vehicle(SHIPPED["bluerov2"])
+    masses = [name for name in light.coefficients if name in ("m_rov", "I_r") or name.startswith("m_a_")]
+    rov = light.with_(T_t200=0.25, **{name: 25.0 / light["m_rov"] * light[name] for name in masses})
+    commands = (0.13376067396440378, -0.14438975879007687, -0.14438975879007684, 0.13376067396440378)
+    inputs = still(rov) | {f"u_{n}": u for n, u in enumerate((*commands, 0.11776245973202579, 0.11776245973202579), 1)}
+    forces = (1.2350727047449537, -1.2349844606235059, -1.2349844606235059, 1.2350727047449537)
+    lagging = {f"F_{n}": F for n, F in enumerate((*forces, 0.9874606525547448, 0.9874606525547448), 1)}
+    moving = {"z": 11.0, "w": -0.0011534743904937595, "r": 0.04539919836761995, "psi": 0.0007070504401306937}
+    for u, v in ((-7.667995353260742e-25, -1.4924776701225512e-21), (1e-24, 1e-21), (3e-27, -2e-26), (0.0, 1e-30)):
+        state = at_rest(rov) | moving | lagging | {"u": u, "v": v}
+        for h in (0.02, 0.5):
+            moved, other = in_engine(rov, inputs, state, h), in_python(rov, inputs, state, h)
+            assert moved == pytest.approx(other, rel=1e-12, abs=1e-15)
