@@ -167,7 +167,7 @@ def test_every_module_of_tests_keeps_a_promise_that_the_page_has() -> None:
 def test_commands_and_options_exist(page: Path) -> None:
     for words in commands(page):
         asked, rest = module_of(words)
-        if asked[-1] in {"venv", "fmpy.webapp"}:
+        if asked[-1] == "venv":
             continue
         options = [word for word in rest if word.startswith("-")]
         if not options and asked[1:2] != ("rov_fmu",):
@@ -182,13 +182,12 @@ def test_commands_and_options_exist(page: Path) -> None:
 
 
 @pytest.fixture
-def workplace(tmp_path: Path, videoray_fmu: Path, videoray3_fmu: Path) -> Path:
-    """What a reader has at hand: both FMUs, a folder of tank tests, the command (it builds for this machine alone), and
+def workplace(tmp_path: Path, videoray_fmu: Path) -> Path:
+    """What a reader has at hand: the FMU, a folder of tank tests, the command (it builds for this machine alone), and
     the plan that docs/system.md begins with."""
     plan, *_ = blocks(ROOT / "docs" / "system.md", "toml")
     (tmp_path / "tether.toml").write_text(plan, encoding="utf-8")
     shutil.copy(videoray_fmu, tmp_path)
-    shutil.copy(videoray3_fmu, tmp_path)
     shutil.copytree(SHIPPED["videoray_refit"].parent / "tank_tests", tmp_path / "my_tests")
     shutil.copytree(ROOT / "examples" / "remus100", tmp_path / "examples" / "remus100")
     program = tmp_path / "bin" / "rov-fmu"
