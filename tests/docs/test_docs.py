@@ -129,10 +129,10 @@ def test_pages_that_begin_with_a_task_are_short_and_every_page_is_in_one_part() 
         assert len(re.sub(r"^```\{code-cell\}.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL).split()) <= 1200, page
 
 
-def test_the_first_page_says_how_far_its_models_are_off() -> None:
+def test_the_page_of_the_vehicles_says_how_far_they_are_off() -> None:
     _, *rows = compared.tables()["videoray_measured"]
     paper, refit = (max(abs(float(row[n].rstrip("%"))) for row in rows) for n in (1, 2))
-    text = " ".join(README.read_text(encoding="utf-8").split())
+    text = " ".join((ROOT / "docs" / "vehicles.md").read_text(encoding="utf-8").split())
     assert (
         f"up to {paper:.0f} % off the steady velocities that the paper measured, and the refit is up to {refit:.0f} %"
         in text
@@ -342,7 +342,7 @@ def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() ->
     assert "- run: pytest -rs -m weekly" in weekly
     contributing = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     assert all(f"`pytest -m {marker}`" in contributing for marker in ("long", "interop", "weekly"))
-    for line in lines(blocks(README, "sh")[0]):
+    for line in lines(blocks(README, "sh")[1]):
         assert f"- run: {line.split('#')[0].strip()}\n" in workflow
     assert site.endswith('pip install -e ".[docs]" && sphinx-build -W docs site "${@:2}"\n')
     assert '- run: .ci/build-site "$RUNNER_TEMP/docs"\n' in workflow, "with the notebooks executed"
