@@ -202,7 +202,7 @@ def test_the_picture_of_a_tether_shows_it(tmp_path: Path) -> None:
 
 
 def test_the_controller_of_the_page_holds_the_depth(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     text = (ROOT / "docs" / "autopilot.md").read_text(encoding="utf-8")
     hold, block = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
@@ -210,5 +210,6 @@ def test_the_controller_of_the_page_holds_the_depth(
     assert capsys.readouterr().out == "2.00 m\n"
     assert len(block.splitlines()) <= 20
     monkeypatch.chdir(folder)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))  # where FMPy unpacks
     exec(compile(block, "autopilot.md", "exec"), {})
     assert capsys.readouterr().out == "2.000 m\n"
