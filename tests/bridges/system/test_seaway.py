@@ -1,5 +1,6 @@
 """The companion `seaway` against the theory of waves, and vehicles in its water against theirs (docs/waves.md)."""
 
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from math import pi, sqrt, tanh
@@ -17,6 +18,7 @@ from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 from rov_fmu.vehicle.writer import vehicle_text
+from tests.commands import ROOT
 from tests.vehicles import a_vehicle, in_waves, passed, tied
 
 Array = NDArray[np.float64]
@@ -168,3 +170,21 @@ def test_a_vehicle_that_the_current_passes_is_refused_in_a_sea(
     )
     assert main(["system", "sea.toml", "-o", "sea.ssp"]) == 2
     assert 'sea.current moves rov, whose vehicle file has current = "passes"' in capsys.readouterr().err
+
+
+@pytest.mark.long
+def test_a_held_vehicle_keeps_station_up_to_the_sea_of_the_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    plan, _ = re.findall(r"^```toml\n(.*?)^```", (ROOT / "docs" / "waves.md").read_text("utf-8"), re.M | re.S)
+    Path("my_rov.toml").write_text(f"waves = true\n{SHIPPED['bluerov2_heavy'].read_text()}")
+    off = {}
+    for height in (0.5, 1.5, 2.0):
+        Path("station.toml").write_text(plan.replace("H_s = 0.5", f"H_s = {height}"))
+        assert main(["system", "station.toml", "-o", "station.ssp", "--run", "--force"]) == 0, capsys.readouterr().err
+        motion = np.genfromtxt("station.csv", delimiter=",", names=True, deletechars="")
+        x, y, z = (motion[next(name for name in motion.dtype.names if name.startswith(f"rov.{x}"))] for x in "xyz")
+        off[height] = float(np.sqrt(x**2 + y**2 + (z - 3.0) ** 2).max())
+    assert off[0.5] < 0.065
+    assert off[1.5] < 0.3 < off[2.0]
