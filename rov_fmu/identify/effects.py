@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from math import inf, nan
+from math import inf
 
 import numpy as np
 
@@ -62,15 +62,12 @@ def _beside_base(table: Table, p: Parameter) -> str:
 
 
 def structures_of(fit: Fit) -> Iterator[Structure]:
-    """Yield the hypotheses about the structure that won, with the numbers of their rows, and those that come nearest
-    where the model lacks something."""
+    """Yield the hypotheses about the structure that won, with the numbers of their rows."""
     parameters = fit.objective.table.parameters
-    won = [(suspect, fit.starts[suspect], fit.odds[suspect]) for suspect in in_order(fit.odds)]
-    for suspect, start, odds in (*won, *((suspect, start, nan) for suspect, start in fit.nearest.items())):
-        structure, n = _named(fit, suspect, start, odds), row_of(fit.objective, suspect)
+    for suspect in in_order(fit.odds):
+        structure, n = _named(fit, suspect, fit.starts[suspect], fit.odds[suspect]), row_of(fit.objective, suspect)
         if n is not None:
-            value = _number(fit, n)[0] if suspect in fit.odds else float(parameters[n].number(start))
-            structure = replace(structure, value=value, unit=parameters[n].unit)
+            structure = replace(structure, value=_number(fit, n)[0], unit=parameters[n].unit)
         yield structure
     if files := tuple(one.log.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
         yield _named(fit, ("momentary commands", files), None, inf)

@@ -5,7 +5,7 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import floor, inf, isfinite, isnan, log, log10
+from math import floor, inf, isfinite, log, log10
 
 import numpy as np
 
@@ -732,8 +732,6 @@ def _structure(structure: Structure) -> Finding | None:
         return None
     size = percent(value) if unit == "1" else size_in_words(value, unit)
     words = {"of": structure.of, "value": size, **dict(structure.words)}
-    if isnan(structure.probability):  # it comes nearest and explains nothing, so no part is blamed
-        return None
     share = percent(structure.probability) if structure.probability < _SURE else "above 99%"
     odds = f" (probability {share} among the known causes)"
     return Finding(structure.kind, words={**words, "odds": odds})

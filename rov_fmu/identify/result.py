@@ -283,8 +283,7 @@ class Structure:
     of: str
     """The thrusters or files in words; empty where it is about all of them."""
     probability: float
-    """Against the model without it; NaN for one that comes nearest, and does not explain what the model lacks. The
-    model is then without it."""
+    """Against the model without it."""
     value: float = nan
     """The number of its parameter; NaN if it has none."""
     unit: str = "1"

@@ -75,8 +75,6 @@ class Fit:
     """2 ln of the posterior odds of each against the best model without it."""
     rivals: tuple[Posterior, ...] = ()
     """Fits with others, which the data do not exclude."""
-    nearest: Starts = field(default_factory=dict)
-    """Hypotheses that come nearest, but do not explain what the model lacks, with the coordinates of their rows."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the data do not tell apart."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
@@ -198,7 +196,6 @@ def fit_all(
         {**dict.fromkeys(first), **search.now.starts},
         odds,
         tuple(one.posterior for one in search.rivals),
-        search.nearest,
         search.alike,
         misfits,
     )

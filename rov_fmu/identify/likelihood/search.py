@@ -593,11 +593,6 @@ class StructureSearch:
         }
 
     @property
-    def nearest(self) -> Starts:
-        """The hypotheses that come nearest to what the model lacks, unless others explain it."""
-        return {} if self.now.starts and worst(self.now.misfits) <= USUAL else self.refuted
-
-    @property
     def _valid(self) -> list[StructureFit]:
         """The fits without hypotheses that were refuted."""
         return [one for one in self.tried.values() if one and not one.starts.keys() & self.refuted]

@@ -184,7 +184,9 @@ def test_a_held_vehicle_keeps_station_up_to_the_sea_of_the_page(
         Path("station.toml").write_text(plan.replace("H_s = 0.5", f"H_s = {height}"))
         assert main(["system", "station.toml", "-o", "station.ssp", "--run", "--force"]) == 0, capsys.readouterr().err
         motion = np.genfromtxt("station.csv", delimiter=",", names=True, deletechars="")
-        x, y, z = (motion[next(name for name in motion.dtype.names if name.startswith(f"rov.{x}"))] for x in "xyz")
+        x, y, z = (
+            motion[next(name for name in motion.dtype.names or () if name.startswith(f"rov.{x}"))] for x in "xyz"
+        )
         off[height] = float(np.sqrt(x**2 + y**2 + (z - 3.0) ** 2).max())
     assert off[0.5] < 0.065
     assert off[1.5] < 0.3 < off[2.0]

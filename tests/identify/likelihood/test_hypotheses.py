@@ -741,7 +741,7 @@ def test_a_cause_is_named_if_it_explains_the_errors_along_its_axes_and_makes_no_
     search = searching(plain, dead, monkeypatch)
     search.run()
     assert [*search.odds] == names
-    assert search.nearest == ({} if names else {DEAD: 0.0})
+    assert search.refuted == ({} if names else {DEAD: 0.0})
     assert search.now is (dead if names else plain)
 
 
@@ -774,7 +774,7 @@ def test_no_cause_is_named_at_a_bound_of_the_search_nor_a_lag_where_no_axis_is_r
     search = searching(plain, StructureFit({suspect: end}, changed, cast("Minimum", "with"), 100.0, 100.0), monkeypatch)
     search.run()
     assert [*search.odds] == [suspect] * is_named
-    assert [*search.nearest] == [suspect] * (not is_named)
+    assert [*search.refuted] == [suspect] * (not is_named)
 
 
 @pytest.mark.parametrize(("before", "after", "is_named"), [(20.0, 2.9, True), (20.0, 5.0, False), (100.0, 9.0, True)])
@@ -853,7 +853,7 @@ def test_what_explains_nothing_keeps_no_other_hypothesis_from_being_named(
     monkeypatch.setattr(search, "_ranked", lambda sets: [(some, 1.0) for some in sets])
     search.run()
     assert search.odds == {ROTORS: 30.0}
-    assert [*search.nearest] == [SLEW] * (surge > USUAL)
+    assert [*search.refuted] == [SLEW]
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])
