@@ -129,6 +129,8 @@ def logarithms(
 def differs(table: Table, ends: Sequence[Array], axis: Axis, tested: Tested) -> bool:
     """Return True if coordinates belong to vehicles whose answers within the tests differ along an axis."""
     commands = [c for c in commands_of_answers(tested) if not is_extrapolated(c, tested)]
+    if not commands:
+        return False
     one, other = (logarithms(table, axis, commands)(z[:, None]).reshape(-1, 3) for z in ends)
     return bool(np.any(np.abs(one - other) > _DIFFERENT))
 

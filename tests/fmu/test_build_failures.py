@@ -77,7 +77,7 @@ def test_a_compile_error_is_printed_with_the_compilers_message(
     broken = tmp_path / "c"
     shutil.copytree(fmu_compile.C_SOURCES, broken)
     (broken / "step.c").write_text("int no semicolon", encoding="utf-8")
-    monkeypatch.setattr("rov_fmu.fmu.content.C_SOURCES", broken)
+    monkeypatch.setattr("rov_fmu.c.source.C_SOURCES", broken)
     assert _build(tmp_path / "rov.fmu") == 1
     error = capsys.readouterr().err
     assert error.startswith(f"rov-fmu: {fmu_compile.host_platform()}: the compiler failed")
