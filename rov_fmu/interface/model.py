@@ -283,6 +283,9 @@ class VehicleModel(Vehicle):
         """
         import numpy as np
 
+        for name, value in (("seconds", seconds), ("step", step)):
+            if not (isinstance(value, (int, float, np.number)) and 0.0 < value <= 1e6):
+                raise InputError(f"{name} = {shown(value)}: must be more than 0, and at most 1e6")
         pilot, stepper = self.autopilot(step).hold(**aims), self.stepper(start=start)
         if wrong := [name for name in inputs if name in self.layout.commands or name in self.layout.by_name]:
             raise InputError(f"inputs[{wrong[0]!r}]: the autopilot gives the commands")

@@ -50,7 +50,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         (["--to", "mujoco", "-o", "none/rov"], "none/rov: there is no folder none"),
         (
             ["--to", "mjcf"],
-            "Invalid value for '--to': 'mjcf' must be one of mujoco, allocation, autopilot, gains, ardusub-gains, sdf, urdf; did",
+            "Invalid value for '--to': 'mjcf' must be one of mujoco, allocation, autopilot, gains, ardusub-gains, sdf,",
         ),
         (["--to", "mujoco", "--draws", "0"], "Invalid value for '--draws': '0' must be a whole number from 1 to 1e6"),
         (

@@ -43,15 +43,18 @@ class Pilot:
         """
         if len({"north", "east"} & aims.keys()) == 1:
             raise InputError("north and east are held together")
+        held: dict[Axis, str] = {}
         for name, value in aims.items():
             axis = PLACES.get(name) or RATES.get(name)
             if axis is None:
                 raise InputError(f"hold: there is no {name}{only(name, [*PLACES, *RATES])}")
+            if (other := held.setdefault(axis, name)) != name:
+                raise InputError(f"hold: {other} and {name} are aims of one axis, {axis.name}: leave one out")
             if axis not in self.autopilot.axes:
                 own = listed(one.name for one in self.autopilot.axes)
                 vehicle = self.autopilot.vehicle.identifier
                 raise InputError(f"{name}: the thrusters of {vehicle} cannot hold {axis.name}, only {own}")
-            if not isfinite(value):
+            if not (isinstance(value, (int, float, np.number)) and isfinite(value)):
                 raise InputError(f"{name} = {shown(value)}: must be a finite number")
             n = AXES.index(axis)
             self.modes[n], self.aims[n] = PLACE if name in PLACES else RATE, value

@@ -33,7 +33,7 @@ from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, InputError, lines_on, listed
+from rov_fmu.io.messages import FileError, InputError, lines_on, listed, only
 from rov_fmu.io.output import kept
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes
@@ -180,7 +180,8 @@ def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
     held = plan.component[name].held or ""
     table = plan.component.get(held)
     if not table or not table.vehicle:
-        reason = "must be a component that has a vehicle"
+        has = [one for one, other in plan.component.items() if other.vehicle]
+        reason = f"must be a component that has a vehicle{only(held, has)}"
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', reason, held)}")
     try:
         made = autopilot_of(_vehicle(held, table, path), plan.step)
@@ -245,6 +246,8 @@ def _set_values(
                 values[name][one] = parts[name].start_value(one, value)
             except ValueError as error:
                 yield key_line(where, str(error), value)
+        if table.companion and "step" in parts[name].variables:
+            values[name].setdefault("step", plan.step)
 
 
 def _connect(

@@ -93,6 +93,13 @@ def test_only_what_thrusters_push_is_held() -> None:
         rov_fmu.load("bluerov2").hold(1.0, north=1.0)
     with pytest.raises(InputError, match=r"there is no dept.*did you mean depth"):
         rov_fmu.load("bluerov2").autopilot().hold(dept=1.0)
+    for arguments, aims, reason in (
+        ((5.0,), {"depth": "deep"}, "depth = 'deep': must be a finite number"),
+        ((5.0,), {"depth": 2.0, "heave": 0.1}, "depth and heave are aims of one axis, heave"),
+        ((-1.0,), {"depth": 2.0}, "seconds = -1.0: must be more than 0"),
+    ):
+        with pytest.raises(InputError, match=reason):
+            rov_fmu.load("bluerov2").hold(*arguments, **aims)
 
 
 def test_the_feed_forward_makes_a_speed_follow() -> None:
