@@ -258,7 +258,7 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     import fmpy
     from fmpy.validation import validate_fmu
 
-    from rov_fmu.prove.runs import keep_message
+    from rov_fmu.prove.runs import keep_message, restore_logger
 
     if problems := validate_fmu(str(path)):
         raise BuildError(f"the FMU is not valid: {problems[0]}")
@@ -271,7 +271,10 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
         fmpy.extract(str(path), unzipdir=folder)
         axis, others = vehicle.shown_axis, vehicle.unidentified
         start = vehicle.layout.example(axis)
-        result = fmpy.simulate_fmu(folder, start_values=start, logger=keep_message)
+        try:
+            result = fmpy.simulate_fmu(folder, start_values=start, logger=keep_message)
+        finally:
+            restore_logger()
     by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
     commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())
     end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {result['time'][-1]:g} s"

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from itertools import pairwise
 from time import perf_counter
 from typing import Any
@@ -248,6 +248,32 @@ def keep_message(*arguments: Any) -> None:
     status, _, text = arguments[-3:]
     if status >= WARNING:
         _MESSAGE[0] = (text or b"").decode(errors="replace")
+
+
+@cache
+def _lasting_logger() -> Any:
+    """Return FMPy's usual logger of FMI 2.0, which is never freed."""
+    from fmpy.fmi2 import fmi2CallbackFunctions, fmi2CallbackLoggerTYPE, printLogMessage
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = fmi2CallbackLoggerTYPE(printLogMessage)
+    return callbacks.logger
+
+
+def restore_logger() -> None:
+    """Let FMPy print messages again, after a run with a logger of ours.
+
+    FMPy 0.3 passes the messages of all instances without a logger to the one that it was given last in the process.
+    Once that is freed, a message of an FMU that a user runs later would end the process.
+    """
+    from ctypes import byref
+
+    from fmpy.fmi2 import fmi2CallbackFunctions
+    from fmpy.logging import addLoggerProxy
+
+    callbacks = fmi2CallbackFunctions()
+    callbacks.logger = _lasting_logger()
+    addLoggerProxy(byref(callbacks))
 
 
 def forget_message() -> None:

@@ -1,5 +1,7 @@
 """The archive that a build writes."""
 
+import subprocess
+import sys
 import zipfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -114,3 +116,17 @@ def test_another_coefficient_gives_another_guid(videoray_fmu: Path, vehicle: Veh
     guid = fmpy.read_model_description(str(videoray_fmu)).guid
     assert native_content(vehicle).guid == guid
     assert native_content(vehicle.with_(m_rov=6.58)).guid != guid
+
+
+def test_after_a_build_fmpy_prints_what_an_fmu_says(videoray_fmu: Path) -> None:
+    """The logger of the build's own run is gone then, and FMPy 0.3 would call it (in a process that may crash)."""
+    program = (
+        "import fmpy, gc, sys, rov_fmu\nfrom pathlib import Path\nfrom rov_fmu.build import _check\n"
+        "path = Path(sys.argv[1])\n_check(path, rov_fmu.load('videoray'), None, 2)\ngc.collect()\n"
+        "fmpy.simulate_fmu(str(path), start_values={'u_t': -0.5}, stop_time=1.0)\n"
+    )
+    ran = subprocess.run(
+        [sys.executable, "-c", program, str(videoray_fmu)], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    assert "the vehicle has left the water" in ran.stdout
