@@ -1,11 +1,12 @@
-"""Where a vehicle rests against something: the surface, the bottom, a deck, a wall, or a hand.
+"""Where a vehicle rests against something in depth: the surface, the bottom, a deck, or a hand.
 
 Its motion there does not follow from thrust, drag and weight, so these times are left out before a fit. Mostly a
 contradiction tells them: the vehicle hardly moves by a command that moves it elsewhere. Nothing else is assumed about
 the vehicle than that an equal command, held for long enough, gives about an equal velocity.
 
-"Elsewhere" is at another depth, or for a motion ahead and sideways, at another time. A right dive has no such
-contradiction: of 57 logs that were tried, the rule touches none, and with 2.5 s for _LEAST it would touch one.
+"Elsewhere" is at another depth. A right dive has no such contradiction: of 57 logs that were tried, the rule touches
+none, and with 2.5 s for _LEAST it would touch one. Horizontal rests cannot be told so: a current that turns with the
+heading stops a vehicle, too.
 """
 
 from collections.abc import Iterator
@@ -14,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
+from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.messages import MOST, first_of
 from rov_fmu.tank.arrays import Array, Flags
@@ -37,8 +38,6 @@ _LEAST_PUSH = 0.1
 """A motion against the push is usual only below this push: that of the load."""
 _BAND = 0.45
 """A vehicle that rests stays within this distance, m. Elsewhere is twice as far."""
-_LATER = 10.0
-"""A horizontal motion is elsewhere if it is so much earlier or later, s."""
 _LEAST = 3.0
 """The least time for which a vehicle rests, s. Shorter contacts hardly count in a fit."""
 _SLOW, _AGREES, _ALIKE = 0.45, 0.6, 0.6
@@ -51,9 +50,6 @@ _BESIDE, _ABOVE, _BELOW, _DEEP = 0.25, 0.35, 0.1, 1.0
 The vehicle is at the surface while its depth is less than its height and _BESIDE. Above -_ABOVE it is in the air."""
 _STILL = 0.1
 """The depth of a vehicle on a deck or on the bottom changes by less than this, m."""
-_STANDING, _USUAL_SPEED = 0.05, 0.15
-"""Before a wall, a vehicle is slower than the first number, m/s, and elsewhere faster than the second one. Currents
-slow it down, too, but not to a stop."""
 _USUAL_RATE = 0.06
 """The least usual rate of the depth, m/s."""
 _LEAST_PIECE = 5.0
@@ -99,22 +95,9 @@ def without_rests(log: Log, layout: Layout, height: float = USUAL_HEIGHT) -> lis
 
 def _rests(log: Log, commands: Commands, layout: Layout, height: float) -> Iterator[tuple[float, float, str]]:
     """Yield the start and the end of each rest, s, and against what it is in words."""
-    values = commands.in_rows
     for channel in log.shown:
-        axis = channel.quantity.axis
-        if axis is None or not layout.has(axis) or not channel.count or axis not in (HEAVE, SURGE, SWAY):
-            continue
-        course = _course(channel, commands, push_along(layout, axis, values))
-        if axis is not HEAVE and channel.quantity.is_velocity:
-            some, why = _contradicting(course, course.time, _LATER, _USUAL_SPEED), f"no motion in {axis.name}"
-            for start, end in some:
-                yield (
-                    float(course.time[start]),
-                    float(course.time[end]),
-                    f"{why} by a push that moves it at other times",
-                )
-        elif axis is HEAVE and not channel.quantity.is_velocity:
-            yield from _vertical(course, height)
+        if channel.quantity.axis is HEAVE and layout.has(HEAVE) and channel.count and not channel.quantity.is_velocity:
+            yield from _vertical(_course(channel, commands, push_along(layout, HEAVE, commands.in_rows)), height)
 
 
 def _vertical(course: _Course, height: float) -> Iterator[tuple[float, float, str]]:
@@ -132,7 +115,7 @@ def _vertical(course: _Course, height: float) -> Iterator[tuple[float, float, st
             last = _moved_by_hand(course.told, end, 1)
             free[first : last + 1] = False
             yield float(time[first]), float(time[last]), "on deck" if in_air else "at the surface"
-    for start, end in _contradicting(course, depth, 2.0 * _BAND, _USUAL_RATE, free):
+    for start, end in _contradicting(course, free):
         where = f"at a depth of {np.median(depth[start : end + 1]):.3g} m"
         yield float(time[start]), float(time[end]), f"{where}, hardly moving by a push that moves it elsewhere"
 
@@ -176,16 +159,15 @@ def _course(channel: Channel, commands: Commands, push: Array) -> _Course:
     return _Course(time, place, rates, mean, told, steady)
 
 
-def _contradicting(
-    course: _Course, place: Array, apart: float, usual: float, free: Flags | None = None
-) -> Iterator[tuple[int, int]]:
+def _contradicting(course: _Course, free: Flags) -> Iterator[tuple[int, int]]:
     """Yield the first and the last step of each stay where equal pushes move the vehicle less than elsewhere.
 
-    Elsewhere is where `place` differs by more than `apart`. Where equal pushes elsewhere tell nothing, weaker ones in
-    the same direction do: the stronger one must move the vehicle, too. `usual` is the least usual speed, m/s. Where a
-    vehicle has rested on the bottom, it touches it whenever it comes so deep again.
+    Only `free` steps are compared. Where equal pushes elsewhere tell nothing, weaker ones in the same direction do: the
+    stronger one must move the vehicle, too. Where a vehicle has rested on the bottom, it touches it whenever it comes
+    so deep again.
     """
-    at = np.flatnonzero(course.steady & (True if free is None else free))
+    place, apart = course.place, 2.0 * _BAND
+    at = np.flatnonzero(course.steady & free)
     push, speed, there = course.push[at], course.speed[at], place[at]
     cells = np.column_stack([np.round(push / (0.5 * _EQUAL)), np.round(there / (0.2 * apart))])
     cells, cell = np.unique(cells, axis=0, return_inverse=True)
@@ -197,13 +179,11 @@ def _contradicting(
         weaker = away & (push * np.sign(p) > _LEAST_PUSH) & (np.abs(push) < abs(p))
         for some in (equal, weaker):
             middle = float(np.median(speed[some])) if np.sum(some) * _STEP > 1.0 else 0.0
-            is_usual = abs(middle) > usual and np.mean(speed[some] / middle > 0.5) > _ALIKE
+            is_usual = abs(middle) > _USUAL_RATE and np.mean(speed[some] / middle > 0.5) > _ALIKE
             if is_usual and (middle * p > 0.0 or abs(p) < _LEAST_PUSH):
                 shares[at[own]] = speed[own] / middle
                 break
     slow = shares < _SLOW
-    if place is course.time:
-        slow &= np.abs(course.speed) < _STANDING
     stays, anchor = np.zeros(len(slow), bool), np.inf
     for n in np.flatnonzero(slow).tolist():
         if not stays[n] or abs(course.place[n] - anchor) > _STILL:
@@ -215,7 +195,7 @@ def _contradicting(
         contradicting = _STEP * np.sum(slow[start : end + 1])
         agreeing = _STEP * np.sum(shares[start : end + 1] > _AGREES)
         stays[start : end + 1] = contradicting >= _LEAST and agreeing < _MOST_AGREEING * contradicting
-    for start, end in _runs(stays) if place is course.place else ():
+    for start, end in _runs(stays):
         if (bottom := float(np.median(place[start : end + 1]))) > place.max() - _STILL:
             for first, last in _runs(np.abs(place - bottom) < _BAND):
                 stays[first : last + 1] |= np.any(np.abs(place[first : last + 1] - bottom) < _STILL)

@@ -115,14 +115,6 @@ def holds_depth(t: float, s: State) -> None:
     s.down = float(np.clip(1.2 * (goal - s.z) - 0.9 * s.w + noise, -0.8, 0.8))
 
 
-def faces_wall(t: float, s: State) -> None:
-    s.ahead = 0.4 if 45.0 < t < 62.0 else s.ahead
-
-
-def wall(t: float, s: State) -> None:
-    s.u = min(s.u, 0.0) if 48.0 < t < 62.0 else s.u
-
-
 def hand(rate: float) -> Change:
     def limit(t: float, s: State) -> None:
         s.w = rate if 46.0 < t < 56.0 and s.z > 1.0 else s.w
@@ -142,11 +134,10 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(3, pushes_down, dives_to(7.0)), [(0.0, 110.0)], [(54.0, 61.0)]),
         (drawn(4, holds_depth, dives_to(6.5)), [(44.0, 78.0)], [(50.0, 74.0)]),
         (drawn(5, waits, on_deck, start=-1.2), [(0.0, 24.5)], [(0.0, 23.5)]),
-        (drawn(6, faces_wall, wall), [(45.0, 66.0)], [(51.0, 61.0)]),
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
     ],
-    ids=["surface", "depth set to zero", "bottom", "depth held on the bottom", "deck", "wall", "hand", "pulled up"],
+    ids=["surface", "depth set to zero", "bottom", "depth held on the bottom", "deck", "hand", "pulled up"],
 )
 def test_a_rest_is_left_out_with_one_finding(
     dive: Log, within: list[tuple[float, float]], at_least: list[tuple[float, float]]
