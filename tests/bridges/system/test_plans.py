@@ -141,11 +141,6 @@ WRONG = {
         'fmu = "foreign.fmu"\nport = { tip = { x = ["y", 0.0] } }',
         "must be { member = ",
     ),
-    "a port of the plan by half": (
-        "length = 20.0 }",
-        'length = 20.0 }\nport = { tip = { x = "vg_D_top", vg_N = "vg_N_top" } }',
-        "connect: tether.tip is connected by half: nothing is connected to tether.vg_D_top",
-    ),
     "a file that nobody reads": (
         'companion = "tether"',
         'companion = "tether"\nfile = "foreign.fmu"',
@@ -154,7 +149,7 @@ WRONG = {
     "two seabeds": (
         "length = 20.0 }\n[component.water]",
         "length = 20.0, seabed = 20 }\n[component.water]\nstart = { seabed = 30 }",
-        "component.tether.start.seabed = 20: component.water.start.seabed is 30.0: there is one seabed",
+        "component.tether.start.seabed = 20.0: component.water.start.seabed is 30.0: there is one seabed",
     ),
     "a loop": (LAST, '["a.y", "b.u"], ["b.y", "a.u"],', "connect: a.y -> b.u -> b.y -> a.u -> a.y is a loop without"),
     "a loop of one": (LAST, '["a.y", "a.u"],', "connect: a.y -> a.u -> a.y is a loop without delay"),
