@@ -10,12 +10,12 @@ of the range that has the energy of the spectrum, so that the sea does not repea
 mean level, the water moves as there.
 """
 
-import json
 from math import cos, exp, pi, sin, sqrt, tanh
-from pathlib import Path
 from random import Random
 
-from pythonfmu import DefaultExperiment, Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
+from pythonfmu import DefaultExperiment, Fmi2Slave
+
+from rov_fmu.bridges.system.companions._common import Variables, register, shape_of
 
 G = 9.80665
 RANGE = (0.5, 4.0)  # of the frequencies over that of the peak: 99.7 % of the energy for gamma = 3.3
@@ -25,7 +25,7 @@ PLACE, STEADY = ("x", "y", "z"), ("U_N", "U_E", "U_D")
 VELOCITY, ACCELERATION = ("V_N", "V_E", "V_D"), ("A_N", "A_E", "A_D")
 
 # name: causality, start, unit, description
-VARIABLES: dict[str, tuple[str, float, str, str]] = {
+VARIABLES: Variables = {
     "H_s": ("parameter", 0.5, "m", "Significant wave height; of one component, the height from trough to crest"),
     "T_p": ("parameter", 6.0, "s", "Period of the peak of the spectrum"),
     "gamma": ("parameter", 3.3, "1", "Peak enhancement factor of JONSWAP; 1 is Pierson and Moskowitz"),
@@ -38,7 +38,7 @@ VARIABLES: dict[str, tuple[str, float, str, str]] = {
 }
 
 
-def place(suffix: str) -> dict[str, tuple[str, float, str, str]]:
+def place(suffix: str) -> Variables:
     """Return the variables of a place in the water."""
     groups = (
         (PLACE, "input", "m", "Position of the vehicle"),
@@ -46,7 +46,7 @@ def place(suffix: str) -> dict[str, tuple[str, float, str, str]]:
         (VELOCITY, "output", "m/s", "Velocity of the water there"),
         (ACCELERATION, "output", "m/s2", "Acceleration of the water there"),
     )
-    found = {
+    found: Variables = {
         f"{name}{suffix}": (causality, 0.0, unit, f"{what}, {to}")
         for names, causality, unit, what in groups
         for name, to in zip(names, WORDS, strict=True)
@@ -75,23 +75,17 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        file = Path(str(arguments.get("resources")), "shape.json")
-        shape = json.loads(file.read_text("utf-8")) if file.is_file() else {}
         self.before: dict[str, list[float]] = {}
         self.waves: list[tuple[float, ...]] = []
-        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
-        self.variables = place("") | VARIABLES
+        self.suffixes = ["", *(f"_{name}" for name in shape_of(arguments).get("places", ()))]
+        variables = place("") | VARIABLES
         self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = []
         for suffix in self.suffixes:
-            self.variables |= place(suffix)
+            variables |= place(suffix)
             for port, names in self.places:
                 self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
             self.terminals.append((f"steady{suffix}", [f"{name}{suffix}" for name in STEADY], VELOCITY))
-        for name, (causality, start, _, text) in self.variables.items():
-            setattr(self, name, start)
-            changes = Fmi2Variability.fixed if causality == "parameter" else Fmi2Variability.continuous
-            kind = {"causality": Fmi2Causality[causality], "variability": changes}
-            self.register_variable(Real(name, description=text, **kind))
+        register(self, variables, "fixed")
 
     def exit_initialization_mode(self) -> None:
         """Draw the waves, and begin with the middle of the first step. Raises ValueError for a sea that cannot be."""
