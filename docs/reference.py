@@ -233,7 +233,8 @@ def _gallery() -> str:
 def _command_reference() -> str:
     """Every command with its arguments and its first sentence; --help prints the options."""
     root, rows = click.Context(_commands, info_name="rov-fmu"), []
-    for name, command in _commands.commands.items():
+    for name in _commands.list_commands(root):
+        command = _commands.commands[name]
         with click.Context(command, root, name) as context:
             usage = " ".join([context.command_path, *command.collect_usage_pieces(context)])
         rows.append((f"`{usage}`", escape(command.get_short_help_str(limit=1000), quote=False)))

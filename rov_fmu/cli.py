@@ -7,8 +7,8 @@ fast.
 
 import re
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from functools import partial
 from math import inf, isfinite, nan, nextafter
 from pathlib import Path
@@ -28,6 +28,7 @@ from rov_fmu.io.messages import (
     StudyError,
     did_you_mean,
     listed,
+    one_line,
     print_message,
     shown,
 )
@@ -153,14 +154,39 @@ _force_option = partial(
 _set_option = partial(click.option, "--set", "settings", multiple=True, type=_setting, metavar="NAME=VALUE")
 
 
-class _Commands(click.Group):
-    """The commands. Without a command, the help is printed. It shows the complete summary of each command."""
+_SECTIONS = ("Your vehicle", "At work", "For others")
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:  # noqa: ARG002
-        """Write the commands with their summaries, which Click would cut to a line."""
-        summaries = [(name, command.get_short_help_str(limit=1000)) for name, command in self.commands.items()]
-        with formatter.section("Commands"):
-            formatter.write_dl(summaries)
+
+class _Command(click.Command):
+    """A command of one of the sections, with an example, which is the end of its help."""
+
+    def __init__(self, *, section: str, example: str, **options: Any) -> None:
+        super().__init__(epilog=f"Example: {example}", **options)
+        self.section, self.example = _SECTIONS.index(section), example
+
+
+class _Commands(click.Group):
+    """The commands by their sections. Without a command, the help is printed.
+
+    It shows the complete summary of each command, and its example.
+    """
+
+    command_class = _Command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write each section. Click would cut the summaries to a line."""
+        rows: list[list[tuple[str, str]]] = [[] for _ in _SECTIONS]
+        for name in self.list_commands(ctx):
+            if isinstance(command := self.commands[name], _Command):
+                summary = command.get_short_help_str(limit=1000)
+                rows[command.section] += [(name, summary), ("", command.example)]
+        for title, own in zip(_SECTIONS, rows, strict=True):
+            with formatter.section(title):
+                formatter.write_dl(own)
+
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
+        """Return the names of the commands in the order of the sections."""
+        return sorted(self.commands, key=lambda name: getattr(self.commands[name], "section", 0))
 
 
 @click.group(
@@ -174,7 +200,8 @@ class _Commands(click.Group):
 def _commands(context: click.Context) -> None:
     """Make an FMU of an identified underwater vehicle (ROV).
 
-    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships, which `rov-fmu list` lists.
+    VEHICLE is a vehicle file (TOML) or the name of a vehicle that ships, which `rov-fmu list` lists. An example follows
+    what each command does.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -183,7 +210,7 @@ def _commands(context: click.Context) -> None:
 # ---- build -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("build")
+@_commands.command("build", section="For others", example="rov-fmu build bluerov2 -o bluerov2.fmu")
 @_vehicle_or_videoray()
 @_output_option(
     metavar="FILE.fmu",
@@ -274,22 +301,47 @@ def _print_built(built: "Built", seconds: float) -> None:
 # ---- list ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("list")
-def _list() -> None:
-    """List the vehicles that ship."""
-    from rov_fmu.report.console import print_table, table
+@_commands.command("list", section="Your vehicle", example="rov-fmu list")
+@click.argument("folder", type=_FILE, default=".")
+def _list(folder: Path) -> None:
+    """List the vehicles and companions that ship, and a folder's files.
+
+    Each file is listed with what it is for. The default is the current folder.
+    """
+    from rov_fmu.bridges.system.system_command import companions
+    from rov_fmu.io.file_kinds import kind_of, use_of
+    from rov_fmu.io.toml_file import read_toml
+    from rov_fmu.report.console import console, print_table, table
     from rov_fmu.vehicle.vehicle import load_vehicle
 
-    found = table("", "VEHICLE", [], ["what it is"])
-    for name, path in SHIPPED.items():
-        found.add_row(name, load_vehicle(path).description)
-    print_table(found)
+    if not folder.is_dir():
+        raise FileError(f"{folder}: must be a folder")
+    files: list[tuple[str, ...]] = []
+    for path in sorted(folder.iterdir()):
+        keys: Iterable[str] = ()
+        if path.suffix.lower() == ".toml" and path.is_file():
+            with suppress(FileError):
+                keys = read_toml(path, FileError)
+        if path.is_file() and (kind := kind_of(path, keys)):
+            files.append((one_line(path.name), kind, use_of(kind)))
+    vehicles = [(name, load_vehicle(path).description) for name, path in SHIPPED.items()]
+    for titles, rows in {
+        ("VEHICLE", "what it is"): vehicles,
+        ("COMPANION", "what it is; `rov-fmu system --list` has its variables"): companions().items(),
+        ("FILE", "what it is", "what it is for"): files,
+    }.items():
+        shown_table = table("", titles[0], [], titles[1:])
+        for row in rows:
+            shown_table.add_row(*row)
+        if rows:
+            print_table(shown_table)
+            console().print()
 
 
 # ---- simulate --------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("simulate")
+@_commands.command("simulate", section="At work", example="rov-fmu simulate bluerov2 --set surge=0.3 --plot")
 @_vehicle_or_videoray()
 @_set_option(
     help="Set an input, a coefficient, or a state at the start, in SI units. The name of an axis commands all "
@@ -368,7 +420,7 @@ def _warn(message: str) -> None:
 # ---- fly -------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("fly")
+@_commands.command("fly", section="At work", example="rov-fmu fly bluerov2")
 @_vehicle_or_videoray()
 @click.option(
     "--against",
@@ -416,7 +468,7 @@ def _fly(
 # ---- sitl ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("sitl")
+@_commands.command("sitl", section="At work", example="rov-fmu sitl bluerov2 --log dive.csv")
 @_vehicle()
 @click.option(
     "--frame",
@@ -483,7 +535,7 @@ _added_mass = partial(click.option, "--added-mass", type=_Choice(["link", "plugi
 _world = partial(click.option, "--world", "in_world", is_flag=True)
 
 
-@_commands.command("export")
+@_commands.command("export", section="For others", example="rov-fmu export bluerov2 --to mujoco")
 @_vehicle_or_videoray()
 @click.option(
     "--to",
@@ -550,7 +602,7 @@ def _write_export(
     print_end(exported.written, exported.following)
 
 
-@_commands.command("sdf")
+@_commands.command("sdf", section="For others", example="rov-fmu sdf bluerov2")
 @_vehicle_or_videoray()
 @_output_option(metavar="FILE.sdf|.urdf", help="File to write. The default is <identifier>.sdf.")
 @_world(help="Add a world with water, which Gazebo can run (sdf).")
@@ -565,7 +617,7 @@ def _sdf(vehicle: Path, output: Path | None, **options: Any) -> None:
 # ---- prove -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("prove")
+@_commands.command("prove", section="For others", example="rov-fmu prove bluerov2.fmu")
 @click.argument("fmu", type=_FILE)
 @click.option(
     "--interface",
@@ -610,7 +662,7 @@ def _prove(fmu: Path, **options: Any) -> None:
 # ---- system ----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("system")
+@_commands.command("system", section="At work", example="rov-fmu system plan.toml -o dive.ssp --run")
 @click.argument("plan", type=_FILE, required=False)
 @_output_option(metavar="FILE.ssp", help="System to write.")
 @click.option("--run", "runs", is_flag=True, help="Run it, also with half the step, and write FILE.csv and FILE.svg.")
@@ -635,7 +687,7 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
 # ---- study -----------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("study")
+@_commands.command("study", section="At work", example="rov-fmu study plan.toml -o results")
 @click.argument("plan", type=_FILE)
 @_output_option(required=True, metavar="RESULTS", help="Folder of the results.")
 @click.option(
@@ -687,7 +739,9 @@ def _study(plan: Path, output: Path, workers: int | None, scheduler: str | None,
 _tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type=_FILE)
 
 
-@_commands.command("identify")
+@_commands.command(
+    "identify", section="Your vehicle", example="rov-fmu identify tests -o my_rov.toml --report my_rov.html"
+)
 @_tests_argument(metavar="TESTS...")
 @_output_option(metavar="VEHICLE.toml", help="Vehicle file to write.")
 @_file_option(
@@ -753,7 +807,7 @@ def _identify(
 # ---- inspect ---------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("inspect")
+@_commands.command("inspect", section="Your vehicle", example="rov-fmu inspect dive.csv --draft")
 @_tests_argument(metavar="LOG...")
 @_file_option("--report", metavar="PAGE.html", help="Page to write, with pictures of the logs.")
 @click.option(
@@ -781,7 +835,9 @@ def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, f
 # ---- tune ------------------------------------------------------------------------------------------------------------
 
 
-@_commands.command("tune")
+@_commands.command(
+    "tune", section="Your vehicle", example="rov-fmu tune my_rov.toml --axis surge --command 0.5 --v-ss 0.8"
+)
 @_vehicle()
 @click.option(
     "--axis",
@@ -835,7 +891,7 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
 # ---- schema, tables --------------------------------------------------------------------------------------------------
 
 
-@_commands.command("schema")
+@_commands.command("schema", section="For others", example="rov-fmu schema")
 def _schema() -> None:
     """Print the JSON schema of the vehicle file, for editors."""
     from rov_fmu.vehicle.json_schema import json_schema_text
@@ -843,7 +899,7 @@ def _schema() -> None:
     click.echo(json_schema_text(), nl=False)
 
 
-@_commands.command("tables")
+@_commands.command("tables", section="For others", example="rov-fmu tables")
 @_vehicle_or_videoray()
 def _tables(vehicle: Path) -> None:
     """Print Tables 6-8 of the paper with the printed, computed and measured values."""

@@ -47,16 +47,30 @@ _BY_KEY = {
     **dict.fromkeys(("thruster", "axes"), VEHICLE_FILE),
 }
 """Keys at the top of a TOML file, each with the only or the most likely kind of file that has it."""
+_BY_NAME = {"rov.toml": TESTS_FILE}
+"""Files whose name alone tells their kind: a rov.toml may have the thrusters of a vehicle file."""
 _HINTS = {
     VEHICLE_FILE: "`rov-fmu build` makes an FMU of it, and a plan names it as `vehicle`",
     PLAN: "`rov-fmu study` carries it out",
     SYSTEM_PLAN: "`rov-fmu system` makes a system of it",
     SYSTEM: "a plan of a study names it as `system`",
+    FMU: "`rov-fmu prove` runs its experiments, and a plan names it as `fmu`",
     TESTS_FILE: "`rov-fmu identify FOLDER -o VEHICLE.toml` makes a vehicle file of the folder",
     _TOML: "`rov-fmu build` makes an FMU of a vehicle file",
     _TABLE: "to see a recording beside a vehicle, run `rov-fmu fly VEHICLE` and choose the recording on the page",
     _LOG: "`rov-fmu inspect` lists what it contains, and `rov-fmu identify` makes a vehicle file of it",
 }
+
+
+def kind_of(path: Path, keys: Iterable[str] = ()) -> str:
+    """Return the kind of a file by its name, the keys at its top, or its suffix; empty for an unknown one."""
+    named = [_BY_NAME[path.name]] if path.name in _BY_NAME else [_BY_KEY[key] for key in keys if key in _BY_KEY]
+    return (named or [_BY_SUFFIX.get(path.suffix.lower(), "")])[0]
+
+
+def use_of(kind: str) -> str:
+    """Return what a kind of file is for, in words; empty where that needs none."""
+    return _HINTS.get(kind, "")
 
 
 def check_suffix(path: Path, wanted: str, failure: type[FileError] = FileError) -> None:

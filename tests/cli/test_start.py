@@ -2,17 +2,20 @@
 
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
 import zipfile
 from pathlib import Path
 
+import click
 import pytest
 from fmpy import read_model_description
 
+from rov_fmu.bridges.system.companion import COMPANIONS
 from rov_fmu.c.compile import PLATFORMS, host_platform
-from rov_fmu.cli import main
+from rov_fmu.cli import _Command, _commands, main
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.vehicle.shipped import SHIPPED
 from tests.commands import BARE, ROOT, without_progress
@@ -74,7 +77,7 @@ _NEEDED: list[tuple[list[str], set[str]]] = [
 _IMPORTED = """
 import sys
 before = set(sys.modules)
-from rov_fmu.cli import main
+from rov_fmu.cli import _Command, _commands, main
 for arguments in {!r}:
     try:
         code = main(arguments)
@@ -100,25 +103,60 @@ def test_a_vehicle_is_loaded_without_what_takes_long_to_import() -> None:
     assert {*ran.stdout.split()} & {*_SLOW} == {"pydantic"}
 
 
+# ---- Help and list ---------------------------------------------------------------------------------------------------
+
+
+def test_the_help_shows_each_command_in_its_section_with_an_example_that_it_takes(capsys: Capsys) -> None:
+    assert main([]) == 0
+    printed = capsys.readouterr().out
+    assert re.findall(r"^(\S.*):$", printed, re.MULTILINE) == ["Options", "Your vehicle", "At work", "For others"]
+    context = click.Context(_commands, info_name="rov-fmu")
+    for name, command in _commands.commands.items():
+        assert isinstance(command, _Command), name
+        program, own, *arguments = shlex.split(command.example)
+        assert (program, own) == ("rov-fmu", name)
+        assert command.example in printed
+        shown = command.make_context(name, ["--help", *arguments], context, resilient_parsing=True)
+        assert f"Example: {command.example}" in command.get_help(shown)
+        parsed = command.make_parser(shown).parse_args([*arguments])
+        assert len(parsed[1]) <= sum(parameter.param_type_name == "argument" for parameter in command.params)
+
+
+def test_list_has_vehicles_and_companions_and_says_what_the_files_of_a_folder_are_for(
+    tmp_path: Path, capsys: Capsys
+) -> None:
+    for name in ("dive.bin", "my.fmu", "notes.txt"):
+        (tmp_path / name).touch()
+    (tmp_path / "plan.toml").write_text("stop_time = 1.0\n")
+    (tmp_path / "rov.toml").write_text("[[thruster]]\n")
+    (tmp_path / "broken.toml").write_text("[")
+    shutil.copy(BARE, tmp_path / "mine.toml")
+    assert main(["list", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    rows = dict(re.split(r"  +", line, maxsplit=1) for line in printed.splitlines() if re.search(r"\S  ", line))
+    assert {*SHIPPED, *COMPANIONS} < rows.keys()
+    assert "notes.txt" not in printed
+    kinds = {name: rows[name].split("  ")[0] for name in rows if "." in name}
+    assert kinds == {
+        "broken.toml": "a TOML file",
+        "dive.bin": "the log of an autopilot, of ROS or of MATLAB",
+        "mine.toml": "a vehicle file (TOML)",
+        "my.fmu": "an FMU",
+        "plan.toml": "the plan of a study (TOML)",
+        "rov.toml": "the rov.toml of a folder of tank tests",
+    }
+    assert "`rov-fmu study` carries it out" in rows["plan.toml"]
+    assert main(["list", str(tmp_path / "notes.txt")]) == 2
+    assert "must be a folder" in capsys.readouterr().err
+
+
 # ---- Completion ------------------------------------------------------------------------------------------------------
 
 
 COMMANDS = [
-    "build",
-    "export",
-    "fly",
-    "identify",
-    "inspect",
-    "list",
-    "prove",
-    "schema",
-    "sdf",
-    "simulate",
-    "sitl",
-    "study",
-    "system",
-    "tables",
-    "tune",
+    *("list", "identify", "inspect", "tune"),
+    *("simulate", "fly", "sitl", "system", "study"),
+    *("build", "export", "sdf", "prove", "schema", "tables"),
 ]
 
 

@@ -25,6 +25,7 @@ from rov_fmu.report.progress import Parts, parts
 from rov_fmu.vehicle.shipped import find_vehicle, named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
+_AUTOPILOT = "holds the vehicle of `for`, with gains that are made for it"
 _MOST_SHOWN = 10
 """The most variables of the table of what half the step changes."""
 
@@ -107,7 +108,7 @@ def _inputs(plan: SystemPlan, path: Path) -> Iterator[Path]:
 def _autopilot_table() -> Table:
     """Return the inputs of the autopilot of the vehicle that ships first, and its gains in depth."""
     model = autopilot_model(autopilot_of(load_vehicle(find_vehicle("videoray"))))
-    title = f"{AUTOPILOT}: holds the vehicle of `for`, here a VideoRay, with gains that are made for it"
+    title = f"{AUTOPILOT}: {_AUTOPILOT}, here for a VideoRay"
     shown = console.table(title, "variable", ["start"], ["unit", "causality", "description"])
     for one in model.variables:
         if one.causality in ("input", "output") or (one.name.endswith("_w") and one.causality == "parameter"):
@@ -115,14 +116,19 @@ def _autopilot_table() -> Table:
     return shown
 
 
+def companions() -> dict[str, str]:
+    """Return what each companion is, by its name."""
+    return {name: _AUTOPILOT if name == AUTOPILOT else slave_of(name).description for name in COMPANIONS}
+
+
 def list_companions() -> None:
     """Print the companions with their variables."""
-    for name in COMPANIONS:
+    for name, words in companions().items():
         if name == AUTOPILOT:
             console.print_table(_autopilot_table())
             continue
         slave = slave_of(name)(instance_name=name)
-        title = f"{name}: {type(slave).description}"
+        title = f"{name}: {words}"
         if reason := lack(name):
             title += f"; {reason}"
         groups = [*(terminal for terminal, *_ in getattr(slave, "terminals", ())), *getattr(slave, "points", ())]
