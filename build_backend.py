@@ -52,7 +52,7 @@ class Prebuilt(BuildHookInterface[Any]):
 def prebuild(folder: Path) -> None:
     """Compile everything into a folder."""
     from rov_fmu.bridges.autopilot.law import FILES, law_sources
-    from rov_fmu.build import build
+    from rov_fmu.build import build_fmu
     from rov_fmu.c.compile import HOSTS, compile_engine, compile_module
     from rov_fmu.c.library import engine_sources
     from rov_fmu.c.prebuilt import MODULE, prebuilt_path
@@ -65,7 +65,7 @@ def prebuild(folder: Path) -> None:
         prebuilt_path(folder, kind, law).write_bytes(compile_engine(law, kind))
     for name, file in SHIPPED.items():
         vehicle = load_vehicle(file)
-        build(vehicle, folder / f"{name}.fmu")
+        build_fmu(vehicle, folder / f"{name}.fmu")
         module, engine = module_sources(vehicle.layout), engine_sources(vehicle.layout)
         # Vehicles with the same equation share these files.
         for kind in (MODULE, *HOSTS):

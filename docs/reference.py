@@ -15,7 +15,7 @@ import click
 from matplotlib.figure import Figure
 
 from docs import compared
-from rov_fmu import homes
+from rov_fmu import HOMES
 from rov_fmu.bridges.system.plan import ComponentTable, SystemPlan
 from rov_fmu.cli import _commands
 from rov_fmu.equation.catalogue import AXIS, ROLL, SURGE, TUNING, axis_words
@@ -281,8 +281,7 @@ def _described(name: str, value: Any) -> tuple[str, str]:
 
 def _said_of_data(name: str) -> str:
     """The first sentence of the text below an assignment of a public name."""
-    module, _ = homes()[name]
-    (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(module)), re.MULTILINE | re.DOTALL)
+    (words,) = re.findall(rf'^{name}\b.*?^"""(.*?)"""', getsource(import_module(HOMES[name])), re.MULTILINE | re.DOTALL)
     return _first_sentence(words)
 
 

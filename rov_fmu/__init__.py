@@ -10,144 +10,52 @@
 may change with any version.
 """
 
-from functools import cache
 from importlib import import_module
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-# The public names. Each is imported when it is first used, because most need packages that take long to import.
-if TYPE_CHECKING:
-    from rov_fmu.bridges.gym import RovEnv, RovVectorEnv
-    from rov_fmu.bridges.jacobian import StepJacobian, step_jacobian
-    from rov_fmu.bridges.mujoco import load as load_mujoco
-    from rov_fmu.build import Built
-    from rov_fmu.build import build as build_fmu
-    from rov_fmu.c.compile import BuildError, OptionError
-    from rov_fmu.equation.alone import steady_velocity, time_constant
-    from rov_fmu.equation.layout import Layout
-    from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis
-    from rov_fmu.identify.findings import by_heading
-    from rov_fmu.identify.inspection.inspected import Inspected
-    from rov_fmu.identify.likelihood.kinds import PRIORS
-    from rov_fmu.identify.result import (
-        Answer,
-        AxisResult,
-        Coefficient,
-        Disturbance,
-        Effect,
-        Identification,
-        Logging,
-        NextTest,
-        Point,
-        Prediction,
-        SensorNoise,
-        Slip,
-        Verdict,
-    )
-    from rov_fmu.identify.tuning import Target, Tuning, TuningError, tune
-    from rov_fmu.interface.identify_command import identify_folder
-    from rov_fmu.interface.inspect_command import inspect_logs
-    from rov_fmu.interface.model import VehicleModel
-    from rov_fmu.interface.result import Result
-    from rov_fmu.interface.stepper import VehicleStepper
-    from rov_fmu.io.csv_table import DataFileError, UnreadableFileError
-    from rov_fmu.io.messages import FileError, InputError, ProofError, RovError, StudyError, UnknownNameError
-    from rov_fmu.io.output import WriteError
-    from rov_fmu.prove.experiments import NoResultsError
-    from rov_fmu.prove.proof import Finding
-    from rov_fmu.prove.proof import prove as prove_fmu
-    from rov_fmu.study.plan.plan import PlanError
-    from rov_fmu.study.results.results import Results
-    from rov_fmu.study.run.run_study import study as run_study
-    from rov_fmu.vehicle.shipped import SHIPPED, find_vehicle
-    from rov_fmu.vehicle.steady import Steady
-    from rov_fmu.vehicle.uncertainty import Uncertainty
-    from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle
-    from rov_fmu.vehicle.writer import write_tuned, write_vehicle
-
-__all__ = [
-    "PRIORS",
-    "SHIPPED",
-    "Answer",
-    "AxisResult",
-    "BuildError",
-    "Built",
-    "Coefficient",
-    "Curve",
-    "DataFileError",
-    "Disturbance",
-    "Effect",
-    "FileError",
-    "Finding",
-    "Identification",
-    "InputError",
-    "Inspected",
-    "Layout",
-    "Logging",
-    "NextTest",
-    "NoResultsError",
-    "OptionError",
-    "PlanError",
-    "Point",
-    "Prediction",
-    "ProofError",
-    "Result",
-    "Results",
-    "RovEnv",
-    "RovError",
-    "RovVectorEnv",
-    "SensorNoise",
-    "Slip",
-    "Steady",
-    "StepJacobian",
-    "StudyError",
-    "Target",
-    "Thruster",
-    "Tuning",
-    "TuningError",
-    "Uncertainty",
-    "UnknownNameError",
-    "UnreadableFileError",
-    "Vehicle",
-    "VehicleAxis",
-    "VehicleFileError",
-    "VehicleModel",
-    "VehicleStepper",
-    "Verdict",
-    "WriteError",
-    "build_fmu",
-    "by_heading",
-    "find_vehicle",
-    "identify_folder",
-    "inspect_logs",
-    "load",
-    "load_mujoco",
-    "load_vehicle",
-    "prove_fmu",
-    "run_study",
-    "steady_velocity",
-    "step_jacobian",
-    "time_constant",
-    "tune",
-    "write_tuned",
-    "write_vehicle",
-]
 __version__ = "0.2.0"
-
-
-def load(vehicle: "str | Path | Vehicle") -> "VehicleModel":
-    """Load a vehicle that ships, by its name, or a vehicle file, by its path.
-
-    - `vehicle`: a name, a path, or a vehicle from elsewhere, such as that of an identification, which is returned
-      with the functions of the result.
-
-        rov_fmu.load("bluerov2").response("surge", 0.3)  # V_ss, m/s, and Tau, s, at 30 %
-
-    Raises FileError, a ValueError, with one line for each mistake.
-    """
-    from rov_fmu.interface.model import load as load_model
-
-    return load_model(vehicle)
+HOMES = {
+    name: f"rov_fmu.{module}"
+    for module, names in {
+        "bridges.gym": "RovEnv RovVectorEnv",
+        "bridges.jacobian": "StepJacobian step_jacobian",
+        "bridges.mujoco": "load_mujoco",
+        "build": "Built build_fmu",
+        "c.compile": "BuildError OptionError",
+        "equation.alone": "steady_velocity time_constant",
+        "equation.layout": "Coefficient Layout",
+        "equation.parts": "Curve Point Thruster VehicleAxis",
+        "identify.findings": "by_heading",
+        "identify.inspection.inspected": "Inspected",
+        "identify.likelihood.kinds": "PRIORS",
+        "identify.result": "Answer AxisResult Disturbance Identification IdentifiedCoefficient IdentifiedEffect "
+        "Logging MeasuredPoint NextTest Prediction SensorNoise Slip Verdict",
+        "identify.tuning": "Target Tuning TuningError tune",
+        "interface.identify_command": "identify_folder",
+        "interface.inspect_command": "inspect_logs",
+        "interface.model": "VehicleModel load",
+        "interface.result": "Result",
+        "interface.stepper": "VehicleStepper",
+        "io.csv_table": "DataFileError UnreadableFileError",
+        "io.messages": "FileError InputError ProofError RovError StudyError UnknownNameError",
+        "io.output": "WriteError",
+        "prove.experiments": "NoResultsError",
+        "prove.proof": "ProofFinding prove_fmu",
+        "study.plan.plan": "PlanError",
+        "study.results.results": "Results",
+        "study.run.run_study": "run_study",
+        "tank.findings": "Finding",
+        "vehicle.shipped": "SHIPPED find_vehicle",
+        "vehicle.steady": "Steady",
+        "vehicle.uncertainty": "Uncertainty",
+        "vehicle.vehicle": "Vehicle VehicleFileError load_vehicle",
+        "vehicle.writer": "write_tuned write_vehicle",
+    }.items()
+    for name in names.split()
+}
+"""The module of each public name. It is imported when the name is first used, because most need packages that take
+long. The table is internal."""
+__all__ = sorted(HOMES)  # noqa: PLE0605 (type checkers read __init__.pyi)
 
 
 def __dir__() -> list[str]:
@@ -156,18 +64,6 @@ def __dir__() -> list[str]:
 
 def __getattr__(name: str) -> Any:
     """Import a public name (PEP 562)."""
-    if name not in __all__:
+    if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    module, there = homes()[name]
-    return getattr(import_module(module), there)
-
-
-@cache
-def homes() -> dict[str, tuple[str, str]]:
-    """Return the module of each public name, and its name there, as the imports at the top say. It is internal."""
-    import ast
-
-    nodes = ast.walk(ast.parse(Path(__file__).read_text(encoding="utf-8")))
-    imports = [node for node in nodes if isinstance(node, ast.ImportFrom)]
-    found = {one.asname or one.name: (str(node.module), one.name) for node in imports for one in node.names}
-    return {name: found[name] for name in __all__ if name in found}
+    return getattr(import_module(HOMES[name]), name)

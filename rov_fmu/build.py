@@ -62,7 +62,7 @@ class Built:
     """The folders of binaries/ that the replaced FMU had and this one does not have."""
 
 
-def build(
+def build_fmu(
     vehicle: Vehicle,
     output: str | Path | None = None,
     *,

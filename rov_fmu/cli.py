@@ -258,7 +258,7 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     """Build the FMU of a vehicle. The default is the VideoRay Pro 4."""
     if backend == "pythonfmu" and platforms:
         raise click.UsageError("--platform: the PythonFMU flavour is the same for all platforms")
-    from rov_fmu.build import build, chosen_platforms
+    from rov_fmu.build import build_fmu, chosen_platforms
     from rov_fmu.report.progress import compiling
     from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -266,7 +266,7 @@ def _build(vehicle: Path, backend: str, fmi: int, platforms: tuple[str, ...], **
     loaded = load_vehicle(vehicle)
     chosen = chosen_platforms(platforms, fmi) if backend == "native" else []
     with compiling() as (begin, done):
-        built = build(
+        built = build_fmu(
             loaded,
             platforms=chosen,
             backend=backend,
@@ -654,9 +654,9 @@ def _prove(fmu: Path, **options: Any) -> None:
     """
     if str(fmu) in SHIPPED and not fmu.exists():
         raise FileError(f"{fmu}: must be an FMU. `rov-fmu build {fmu}` builds one from the vehicle with this name")
-    from rov_fmu.interface.prove_command import Options, prove_fmu
+    from rov_fmu.interface.prove_command import print_proof_of
 
-    prove_fmu(fmu, Options(**options))
+    print_proof_of(fmu, **options)
 
 
 # ---- system ----------------------------------------------------------------------------------------------------------

@@ -21,7 +21,7 @@ import pandas as pd
 from fmpy.validation import validate_fmu
 
 from rov_fmu import __version__
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -107,7 +107,7 @@ def _write_fmu(folder: Path, name: str, version: int, platforms: str | None) -> 
     folder.mkdir(parents=True)
     vehicle, flown = load_vehicle(SHIPPED[name]), manoeuvre(name)
     fmu = folder / f"{name}.fmu"
-    build(vehicle, fmu, platforms=platforms, fmi=version)
+    build_fmu(vehicle, fmu, platforms=platforms, fmi=version)
     _write_csv(folder / f"{name}_in.csv", ["time", *vehicle.layout.inputs], flown.corners)
     names = ["time", *recorded(vehicle)]
     _write_csv(folder / f"{name}_ref.csv", names, [[row[key] for key in names] for row in flown.reference])

@@ -29,7 +29,7 @@ from packageurl import PackageURL
 from packaging.requirements import Requirement
 
 from rov_fmu import __version__
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -52,10 +52,10 @@ def fmus(folder: Path, vehicles: Iterable[str] = tuple(SHIPPED), platforms: str 
     """Build the FMUs of vehicles that ship: FMI 2.0 with its OSP description, FMI 3.0, and the VideoRay's in Python."""
     for name in vehicles:
         vehicle = load_vehicle(SHIPPED[name])
-        build(vehicle, folder / f"{name}.fmu", platforms=platforms, osp=True)
-        build(vehicle, folder / f"{name}.fmi3.fmu", platforms=platforms, fmi=3)
+        build_fmu(vehicle, folder / f"{name}.fmu", platforms=platforms, osp=True)
+        build_fmu(vehicle, folder / f"{name}.fmi3.fmu", platforms=platforms, fmi=3)
     if "videoray" in vehicles:
-        build(load_vehicle(SHIPPED["videoray"]), folder / "videoray.python.fmu", backend="pythonfmu")
+        build_fmu(load_vehicle(SHIPPED["videoray"]), folder / "videoray.python.fmu", backend="pythonfmu")
 
 
 def differences(first: Path, second: Path) -> list[str]:

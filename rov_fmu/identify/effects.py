@@ -14,7 +14,7 @@ from rov_fmu.identify.likelihood.parameters import Parameter, Table, with_same_l
 from rov_fmu.identify.likelihood.posterior import hull
 from rov_fmu.identify.likelihood.records import SampledLog
 from rov_fmu.identify.likelihood.search import MOST_OF_ROW
-from rov_fmu.identify.result import CONSTANTS, Effect, Estimate, Logging, SensorNoise, Structure
+from rov_fmu.identify.result import CONSTANTS, Estimate, IdentifiedEffect, Logging, SensorNoise, Structure
 from rov_fmu.io.groups import grouped
 
 _OUTLIER = 6.0
@@ -23,7 +23,7 @@ _SHARED = CONSTANTS["shared"].value
 """A time is not told from another one whose knowledge would take away this share of its variance."""
 
 
-def effects_of(fit: Fit) -> Iterator[Effect]:
+def effects_of(fit: Fit) -> Iterator[IdentifiedEffect]:
     """Yield all optional effects with their evidence, beside those that are kept.
 
     That of a hypothesis about the structure, which is no effect of unusual size, is that with which it won.
@@ -39,7 +39,7 @@ def effects_of(fit: Fit) -> Iterator[Effect]:
         is_usual = p.log is not None or p.of_kind.is_of_structure or (p.of_kind.is_usual_if_right and is_right)
         beyond = 0.0 if is_usual else abs(posterior.z[n] - p.mean) / (p.of_kind.unusual * p.deviation)
         evidence, least = odds.get(n, posterior.evidence(n)), _shortest(fit, p)
-        yield Effect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
+        yield IdentifiedEffect(p.kind, p.of, name, value, interval, p.unit, evidence, float(beyond), least)
 
 
 def _number(fit: Fit, n: int) -> Estimate:

@@ -23,11 +23,11 @@ from rov_fmu.identify.result import (
     USUAL,
     Answer,
     AxisResult,
-    Coefficient,
     Disturbance,
-    Effect,
     Estimate,
     Identification,
+    IdentifiedCoefficient,
+    IdentifiedEffect,
     Interval,
     Logging,
     Prediction,
@@ -528,14 +528,14 @@ def size_in_words(value: float, unit: str) -> str:
     return f"{significant(factor * value, 2)}{unit_after(shown)}"
 
 
-def effect_in_words(effect: Effect) -> str:
+def effect_in_words(effect: IdentifiedEffect) -> str:
     """Return the size of an effect; a ratio has two digits of how far it is from 1."""
     if not KINDS[effect.kind].is_ratio or effect.value == 1.0:
         return size_in_words(effect.value, effect.unit)
     return f"{effect.value:.{max(1 - floor(log10(abs(effect.value - 1.0))), 1)}f}"
 
 
-def effect_or_range(effect: Effect) -> str:
+def effect_or_range(effect: IdentifiedEffect) -> str:
     """Return the size of an effect, or that it is not known, with its interval."""
     if not effect.value or is_known(half_width((effect.value, effect.interval))):
         return effect_in_words(effect)
@@ -594,7 +594,7 @@ def _on_coefficients(identification: Identification, result: AxisResult) -> Iter
 
 
 def _not_identified(
-    known: Sequence[Coefficient], of: str, instead: str = "", *, axis: str = "", curve: str = ""
+    known: Sequence[IdentifiedCoefficient], of: str, instead: str = "", *, axis: str = "", curve: str = ""
 ) -> Iterator[Finding]:
     if names := [one.name for one in known if one.interval is None]:
         words = {"of": of, "coefficients": listed(names), "instead": instead}
@@ -755,7 +755,7 @@ def _rounded(time: float) -> float:
     return float(significant(abs(time), 2))
 
 
-def _effect(identification: Identification, effect: Effect) -> Iterator[Finding]:
+def _effect(identification: Identification, effect: IdentifiedEffect) -> Iterator[Finding]:
     """Yield the fact about an effect that is kept, after the doubt about one of an unusual size."""
     of, is_curve = effect.of, effect.of in identification.vehicle.layout.curves_by_name
     words = {"of": f"{of}{' thrust' if is_curve else ''}: " if of else "", "name": effect.name}

@@ -22,7 +22,7 @@ from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.records import unchanged
 from rov_fmu.identify.likelihood.search import SETTLING
 from rov_fmu.identify.likelihood.solve import Minimum, information_of, refits
-from rov_fmu.identify.result import Point, Prediction
+from rov_fmu.identify.result import MeasuredPoint, Prediction
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.vehicle.uncertainty import NORMAL
@@ -243,14 +243,14 @@ def ahead(
 # ---- Rows of tables --------------------------------------------------------------------------------------------------
 
 
-def points_of(tests: Tests, values: Values, vehicle: Vehicle) -> Iterator[Point]:
+def points_of(tests: Tests, values: Values, vehicle: Vehicle) -> Iterator[MeasuredPoint]:
     """Yield the rows of all tables with what the vehicle says about them, also held out."""
     for row, file, counts in table_rows(tests, vehicle.layout):
         subject = row.subject.name
         unit = {"force": "N", "Tau": "s"}.get(row.quantity) or AXES[subject].unit
         out = values.get((row.quantity, subject, row.command), np.nan)
         numbers = row.command, row.measured, float(modelled([row], vehicle, NO_SHAPES)[0]), out
-        yield Point(subject, row.quantity, unit, file, *numbers, counts)  # type: ignore[arg-type]
+        yield MeasuredPoint(subject, row.quantity, unit, file, *numbers, counts)  # type: ignore[arg-type]
 
 
 def held_out_rows(objective: Objective, best: Minimum) -> Values:

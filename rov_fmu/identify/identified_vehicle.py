@@ -22,7 +22,7 @@ from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
-from rov_fmu.identify.result import Coefficient, Identification, Interval
+from rov_fmu.identify.result import Identification, IdentifiedCoefficient, Interval
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief
 from rov_fmu.io.numbers import with_interval
@@ -51,7 +51,7 @@ _SAME = 0.1
 """The difference of J that makes no other vehicle; 1 is one unit of 2 ln of the likelihood."""
 
 
-def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, Coefficient]]:
+def identified_vehicle(tests: Tests, fit: Fit) -> tuple[Vehicle, dict[str, IdentifiedCoefficient]]:
     """Return the vehicle with its sources, intervals and correlations, and the coefficients that the fit changes.
 
     These have intervals where the tests determine them.
@@ -346,7 +346,7 @@ def _data(fit: Fit) -> str:
 
 def _coefficients(
     fit: Fit, vehicle: Vehicle, changed: Sequence[str], numbers: Sequence[_Numbers]
-) -> Iterator[Coefficient]:
+) -> Iterator[IdentifiedCoefficient]:
     """Yield the coefficients that the fit changes, with intervals where the tests determine them.
 
     They come first among the `numbers` by the posteriors.
@@ -359,7 +359,9 @@ def _coefficients(
         interval = _interval(vehicle, name, n, numbers) if told <= _TOLD and error > 0.0 else None
         unit = "" if declaration.unit == "1" else f" {declaration.unit}"
         centre, _, _ = with_interval(began[name], (began[name] - before, began[name] + before))
-        yield Coefficient(name, value, interval, declaration.unit, f"{float(centre):g} ± {before:.2g}{unit}", told)
+        yield IdentifiedCoefficient(
+            name, value, interval, declaration.unit, f"{float(centre):g} ± {before:.2g}{unit}", told
+        )
 
 
 def _interval(vehicle: Vehicle, name: str, index: int, numbers: Iterable[_Numbers]) -> Interval:

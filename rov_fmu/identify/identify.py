@@ -27,9 +27,9 @@ from rov_fmu.identify.result import (
     Answer,
     AxisOfBase,
     AxisResult,
-    Coefficient,
     Identification,
-    Point,
+    IdentifiedCoefficient,
+    MeasuredPoint,
     Prediction,
     Slip,
     Tested,
@@ -135,11 +135,11 @@ def _axis(
     tests: Tests,
     fit: Fit,
     vehicle: Vehicle,
-    coefficients: Mapping[str, Coefficient],
+    coefficients: Mapping[str, IdentifiedCoefficient],
     axis: Axis,
     tested: Tested,
     predicted: Sequence[Prediction],
-    points: Sequence[Point],
+    points: Sequence[MeasuredPoint],
 ) -> AxisResult:
     """Return what concerns an axis, of the logs that show it; `found` has what concerns all axes, also the disturbances
     in all logs, and `vehicle` is that of the fit."""
@@ -209,7 +209,9 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
         yield AxisOfBase(axis, "" if axis in lacking else source, told, tuple(lost))
 
 
-def _those_of(coefficients: Mapping[str, Coefficient], part: Part, *more: str) -> tuple[Coefficient, ...]:
+def _those_of(
+    coefficients: Mapping[str, IdentifiedCoefficient], part: Part, *more: str
+) -> tuple[IdentifiedCoefficient, ...]:
     """Return the coefficients of a curve or an axis, of those that the fit changes. `more` are keys beside its own."""
     names = map(part.coefficient, (*part.keys, *more))
     return tuple(coefficients[name] for name in names if name in coefficients)

@@ -119,7 +119,7 @@ DISAGREEMENT = 40.0
 
 
 @dataclass(frozen=True)
-class Coefficient:
+class IdentifiedCoefficient:
     """An identified number with its 95 % interval."""
 
     name: str
@@ -239,7 +239,7 @@ def score_of(predictions: Sequence[Prediction]) -> float:
 
 
 @dataclass(frozen=True)
-class Effect:
+class IdentifiedEffect:
     """An optional part of the model: what it is, of what, its size, and the evidence for it."""
 
     kind: str
@@ -292,7 +292,7 @@ class Structure:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Disturbance(Effect):
+class Disturbance(IdentifiedEffect):
     """An effect that is slow: a force, a change of all thrust, or a velocity over ground.
 
     Its value is its RMS in the log where it is largest.
@@ -378,7 +378,7 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
-class Point:
+class MeasuredPoint:
     """A row of a table of tank tests, and what the model says about it."""
 
     subject: str
@@ -395,7 +395,7 @@ class Point:
     """False outside the window of rov.toml."""
 
 
-def relative_error(points: Iterable[Point], of: Literal["model", "held_out"], quantity: str = "") -> float:
+def relative_error(points: Iterable[MeasuredPoint], of: Literal["model", "held_out"], quantity: str = "") -> float:
     """Return the RMS of the relative errors of the points that count, or of those of a quantity; NaN without any."""
     some = (p for p in points if p.quantity == (quantity or p.quantity))
     off = [getattr(p, of) / p.measured - 1.0 for p in some if p.counts and p.measured]
@@ -519,11 +519,11 @@ class AxisResult:
     tested: Tested = (1.0, 1.0)
     """Answers to stronger commands, and those in a direction that no test has, are extrapolated, and do not count for
     the verdict."""
-    known: tuple[Coefficient, ...] = ()
+    known: tuple[IdentifiedCoefficient, ...] = ()
     """The coefficients of the axis; those of curves stand in `Identification.curves`."""
     predictions: tuple[Prediction, ...] = ()
     """Held-out predictions; empty where the axis has only tables or a single short log."""
-    points: tuple[Point, ...] = ()
+    points: tuple[MeasuredPoint, ...] = ()
     next_test: NextTest | None = None
     compared: tuple[Answer, ...] = ()
     """The answers of the vehicle to compare with."""
@@ -532,7 +532,7 @@ class AxisResult:
     soon: float = 0.0
     """That over 2 s, relative to the noise (`search.with_steps`); 0 where nothing tells it."""
     disturbances: Sequence[Disturbance] = ()
-    effects: Sequence[Effect] = ()
+    effects: Sequence[IdentifiedEffect] = ()
     slips: Sequence[Slip] = ()
     """The mistakes in the logs that show the axis."""
     misfits: Sequence[str] = ()
@@ -560,7 +560,7 @@ class AxisResult:
         return [d for d in self.disturbances if d.kept and not d.cause]
 
     @property
-    def unusual(self) -> list[Effect]:
+    def unusual(self) -> list[IdentifiedEffect]:
         """The effects of unusual size."""
         return [effect for effect in self.effects if effect.is_unusual]
 
@@ -584,11 +584,11 @@ class Identification:
     against: Vehicle | None
     """The vehicle to compare with."""
     axes: tuple[AxisResult, ...]
-    curves: Mapping[str, tuple[Coefficient, ...]]
+    curves: Mapping[str, tuple[IdentifiedCoefficient, ...]]
     """The coefficients of each thrust curve."""
-    forces: tuple[Point, ...]
+    forces: tuple[MeasuredPoint, ...]
     """The measured forces of thrust tables."""
-    effects: tuple[Effect, ...]
+    effects: tuple[IdentifiedEffect, ...]
     disturbances: tuple[Disturbance, ...]
     logging: tuple[Logging, ...]
     sensors: tuple[SensorNoise, ...]

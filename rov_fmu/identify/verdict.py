@@ -12,7 +12,7 @@ from rov_fmu.identify.result import (
     WRONG,
     Answer,
     AxisResult,
-    Coefficient,
+    IdentifiedCoefficient,
     Verdict,
     coverage_of,
     is_extrapolated,
@@ -300,7 +300,7 @@ def verdict(e: AxisResult) -> Verdict:
     return Verdict(word, tuple(reasons), worst.remedy if word != "good" else "")
 
 
-def most_inertia(vehicle: Vehicle, axis: Axis, beta: Coefficient | None) -> float:
+def most_inertia(vehicle: Vehicle, axis: Axis, beta: IdentifiedCoefficient | None) -> float:
     """Return the largest effective inertia by the interval of β, relative to the inertia in air; inf if unknown."""
     if beta is None or beta.interval is None:
         return inf

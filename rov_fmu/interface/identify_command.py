@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify.identify import identify, load_tests
-from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.identify.progress import OnAnswer
 from rov_fmu.identify.result import Identification
 from rov_fmu.interface.arguments import checked_paths
@@ -86,7 +86,7 @@ def identify_tests(
     begin("reading the tests")
     folder, files = folder_and_files(paths)
     with one_parser():
-        draft = None if (folder / ROV_FILE).exists() else inspect_logs(paths).draft_for(base)
+        draft = None if (folder / ROV_FILE).exists() else inspect_paths(paths).draft_for(base)
         tests = load_tests(folder, check_outputs, base, files, draft)
     identification = identify(tests, begin("identifying the vehicle"), on_answer)
     outputs = []

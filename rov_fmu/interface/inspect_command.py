@@ -5,8 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.inspection import inspected as inspection
-from rov_fmu.identify.inspection.inspected import Inspected
+from rov_fmu.identify.inspection.inspected import Inspected, inspect_paths
 from rov_fmu.interface.arguments import checked_paths
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import FileError
@@ -27,7 +26,7 @@ def inspect_logs(logs: str | Path | Sequence[str | Path]) -> Inspected:
 
     Raises FileError if no log can be read.
     """
-    return inspection.inspect_logs(checked_paths("logs", logs))
+    return inspect_paths(checked_paths("logs", logs))
 
 
 @one_parser()
@@ -40,7 +39,7 @@ def inspect_tests(
     written, each with what it replaced. Raises FileError, and WriteError if a file cannot be written.
     """
     check_targets([(report, PAGE)], paths, force=force)
-    inspected = inspection.inspect_logs(paths)
+    inspected = inspect_paths(paths)
     drafts = drafts and bool(inspected.text)
     if inspected.is_enough and not inspected.missing and (inspected.own or not drafts):  # a draft is edited first
         inspected = _tried(paths, inspected, drafts=drafts)

@@ -31,7 +31,15 @@ _NONE: Mapping[str, float] = MappingProxyType({})
 
 
 def load(vehicle: str | Path | Vehicle) -> "VehicleModel":
-    """Load a vehicle, as `rov_fmu.load` says."""
+    """Load a vehicle that ships, by its name, or a vehicle file, by its path.
+
+    - `vehicle`: a name, a path, or a vehicle from elsewhere, such as that of an identification, which is returned
+      with the functions of the result.
+
+        rov_fmu.load("bluerov2").response("surge", 0.3)  # V_ss, m/s, and Tau, s, at 30 %
+
+    Raises FileError, a ValueError, with one line for each mistake.
+    """
     if not isinstance(vehicle, str | Path | Vehicle):
         raise InputError(f"vehicle = {shown(vehicle)}: must be the name of a vehicle that ships, or the path of a file")
     loaded = vehicle if isinstance(vehicle, Vehicle) else load_vehicle(find_vehicle(vehicle))
@@ -383,13 +391,13 @@ class VehicleModel(Vehicle):
     ) -> "Built":
         """Build the FMU of the vehicle.
 
-        The arguments, the result and the errors are those of `rov_fmu.build.build`.
+        The arguments, the result and the errors are those of `rov_fmu.build.build_fmu`.
 
             rov.with_(health_l=0.5).build("fouled.fmu", fmi=3, platforms="host")
         """
-        from rov_fmu.build import build
+        from rov_fmu.build import build_fmu
 
-        return build(
+        return build_fmu(
             self,
             output,
             platforms=platforms,

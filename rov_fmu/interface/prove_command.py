@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from typing import Any
@@ -11,12 +10,13 @@ import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.io.file_kinds import PAGE
-from rov_fmu.io.messages import Progress, ProofError, listed
+from rov_fmu.io.messages import Progress, ProofError, listed, silent
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
+from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
-from rov_fmu.prove.proof import prove
+from rov_fmu.prove.proof import prove_fmu
 from rov_fmu.prove.runs import Array, Plan
 from rov_fmu.prove.signature import signature_path
 from rov_fmu.prove.subject import Subject
@@ -32,62 +32,61 @@ _LOSS = 1e-12
 """The increase of an energy, relative to the energy, that is a rounding error."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of the command. They are arguments of `rov_fmu.prove.proof.prove`, besides the last three."""
+def print_proof_of(
+    fmu: Path,
+    *,
+    interface: str | None,
+    tolerance: float | None,
+    time_limit: float,
+    key: Path | None,
+    report: Path | None,
+    force: bool,
+) -> None:
+    """Run the experiments of an FMU, or with a page to write (`report`) check all claims, and print the results.
 
-    interface: str | None
-    tolerance: float | None
-    time_limit: float
-    key: Path | None
-    """The public key that must have signed the FMU."""
-    report: Path | None
-    """The page to write, with more evidence."""
-    force: bool
-
-
-def prove_fmu(fmu: Path, options: Options) -> None:
-    """Run the experiments of an FMU, or with a report check all claims, and print the results.
-
-    Raises ProofError if a result is not as expected, and what `prove` and `prove_claims` raise.
+    `key` is the public key that must have signed the FMU. Raises ProofError if a result is not as expected, and what
+    `prove_fmu` and `prove_claims` raise.
     """
-    if options.report:
-        _with_report(fmu, options.report, options)
+    how = interface, tolerance, time_limit
+    if report:
+        with parts() as shown:
+            proof, written = prove_with_report(
+                fmu, report, *how, key=key, force=force, on_progress=shown.begin("checking the claims")
+            )
+        print_claims(proof)
+        print_evidence(proof.origin)
+        print_end(written, "open it in a browser")
+        if failed := proof.with_result("fails"):
+            lines = (f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed)
+            raise ProofError(*lines)
         return
-    evidence = check_evidence(fmu, options.key)
+    evidence = check_evidence(fmu, key)
     with parts() as shown:
-        begin = shown.begin("running the experiments")
-        findings = prove(fmu, options.interface, options.tolerance, options.time_limit, begin)
+        findings = prove_fmu(fmu, *how, shown.begin("running the experiments"))
     print_proof(findings)
     print_evidence(evidence)
     if wrong := sum(not finding.passed for finding in findings):
         raise ProofError(f"{fmu}: {wrong} of {len(findings)} results are not as expected")
 
 
-def _with_report(fmu: Path, report: Path, options: Options) -> None:
-    """Check the claims about an FMU, write the page about them, and print them."""
-    with parts() as shown:
-        proof, written = prove_with_report(fmu, report, options, shown.begin("checking the claims"))
-    print_claims(proof)
-    print_evidence(proof.origin)
-    print_end(written, "open it in a browser")
-    if failed := proof.with_result("fails"):
-        raise ProofError(*(f"{fmu}: {claim.name.lower()} fails: {one.sentence.rstrip('.')}" for claim, one in failed))
-
-
 def prove_with_report(
-    fmu: Path, report: Path, options: Options, on_progress: Progress
+    fmu: Path,
+    report: Path,
+    interface: str | None = None,
+    tolerance: float | None = None,
+    time_limit: float = TIME_LIMIT,
+    *,
+    key: Path | None = None,
+    force: bool = False,
+    on_progress: Progress = silent,
 ) -> tuple[Proof, dict[Path, str]]:
     """Check the claims about an FMU, and write the page about them. Return what it replaced, too.
 
     Raises what `prove_claims` does.
     """
-    read = [fmu, signature_path(fmu), *([options.key] if options.key else [])]
-    check_targets([(report, PAGE)], read, force=options.force)
-    proof = prove_claims(
-        fmu, options.interface, options.tolerance, options.time_limit, options.key, CLAIMS_OF_VEHICLES, on_progress
-    )
-    return proof, write_whole(Output(report, sealed(proof_page(proof), "prove").encode()), force=options.force)
+    check_targets([(report, PAGE)], [fmu, signature_path(fmu), *([key] if key else [])], force=force)
+    proof = prove_claims(fmu, interface, tolerance, time_limit, key, CLAIMS_OF_VEHICLES, on_progress)
+    return proof, write_whole(Output(report, sealed(proof_page(proof), "prove").encode()), force=force)
 
 
 def conservation(subject: Subject) -> Evidence:

@@ -35,7 +35,7 @@ _LEAST_OF_SOLVER = 1e-7
 
 
 @dataclass(frozen=True)
-class Finding:
+class ProofFinding:
     """The result for one variable of an experiment, or for an experiment that fails as a whole."""
 
     experiment: str
@@ -51,13 +51,13 @@ class Finding:
         return self.deviation <= self.tolerance
 
 
-def prove(
+def prove_fmu(
     fmu: str | Path,
     interface: str | None = None,
     tolerance: float | None = None,
     time_limit: float = TIME_LIMIT,
     on_experiment: Progress = silent,
-) -> list[Finding]:
+) -> list[ProofFinding]:
     """Run the experiments of an FMU in a child process and compare the results with the expected ones.
 
     - `fmu`: an FMU of any exporter with experiments by FMI-LS-REF.
@@ -75,14 +75,14 @@ def prove(
         return compare(subject, on_experiment)
 
 
-def compare(subject: Subject, on_experiment: Progress = silent) -> list[Finding]:
+def compare(subject: Subject, on_experiment: Progress = silent) -> list[ProofFinding]:
     """Run the experiments of an FMU and compare the results, as `prove` does."""
     fmu, wanted = subject.path, subject.interface
     has = [name for name, of in INTERFACES.items() if getattr(subject.description, of)]
     if not has or (wanted and wanted not in has):
         raise FileError(f"{fmu}: has no {wanted or 'interface that can be run'}, only {', '.join(has) or 'none'}")
     chosen = [replace(x, tolerance=subject.tolerance or x.tolerance) for x in subject.experiments]
-    experiment, findings = chosen[0], list[Finding]()
+    experiment, findings = chosen[0], list[ProofFinding]()
     try:
         with subject.runs(kind=_Experiments) as child:
             for n, experiment in enumerate(chosen):
@@ -107,7 +107,7 @@ def least_divisor(variable: Any) -> float:
 class _Experiments(Runs):
     """The experiments of an unpacked FMU."""
 
-    def findings(self, experiment: Experiment, interface: str) -> list[Finding]:
+    def findings(self, experiment: Experiment, interface: str) -> list[ProofFinding]:
         """Run an experiment and compare its results: a finding for each variable, or a single one if it fails."""
         if experiment.references is None:
             return [_failed(experiment, "has no expected results, so nothing is compared")]
@@ -125,7 +125,7 @@ class _Experiments(Runs):
         for name, values in zip(names, expected, strict=True):
             scale = max(float(np.abs(values).max()), least_divisor(self._variables[name]))
             off = _deviation(result["time"], result[name], times, values)
-            findings.append(Finding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
+            findings.append(ProofFinding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
         return findings
 
     def _result(self, experiment: Experiment, interface: str, names: Sequence[str]) -> Any:
@@ -152,8 +152,8 @@ class _Experiments(Runs):
             )
 
 
-def _failed(experiment: Experiment, reason: str) -> Finding:
-    return Finding(experiment.name, "-", inf, experiment.tolerance, reason)
+def _failed(experiment: Experiment, reason: str) -> ProofFinding:
+    return ProofFinding(experiment.name, "-", inf, experiment.tolerance, reason)
 
 
 def _signals(stimuli: Series | None) -> Any:

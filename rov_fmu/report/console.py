@@ -24,7 +24,7 @@ from rov_fmu.vehicle.vehicle import Vehicle
 if TYPE_CHECKING:
     from rov_fmu.prove.check import MetaData
     from rov_fmu.prove.claims import Proof
-    from rov_fmu.prove.proof import Finding
+    from rov_fmu.prove.proof import ProofFinding
 
 DEVIATION = "+.1%"
 """The format of a relative deviation."""
@@ -149,7 +149,7 @@ def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
         paragraph(out, line)
 
 
-def print_proof(findings: "Sequence[Finding]") -> None:
+def print_proof(findings: "Sequence[ProofFinding]") -> None:
     """Print how many results are as expected, then the largest deviation of each experiment and each failed result."""
     out = console()
     experiments = [*dict.fromkeys(f.experiment for f in findings)]
@@ -188,7 +188,7 @@ def print_claims(proof: "Proof") -> None:
         paragraph(console(), words)
 
 
-def _deviation(f: "Finding") -> tuple[str, str]:
+def _deviation(f: "ProofFinding") -> tuple[str, str]:
     return text(f.deviation, ".1e"), text(f.tolerance, ".1e")
 
 

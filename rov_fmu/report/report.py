@@ -12,7 +12,7 @@ from rov_fmu.identify import findings
 from rov_fmu.identify.result import (
     AxisResult,
     Identification,
-    Point,
+    MeasuredPoint,
     Prediction,
     half_width,
     is_known,
@@ -103,7 +103,7 @@ def _picture(results: Identification, shown: Sequence[Prediction], plot: Callabl
     return in_both_widths(partial(plot, predictions=shown, log=log, measured=False), height)
 
 
-def _by(p: Point, other: Vehicle) -> float | None:
+def _by(p: MeasuredPoint, other: Vehicle) -> float | None:
     """Return the value of a point by another vehicle; None if it lacks the curve or the axis."""
     layout = other.layout
     if p.quantity == "force":

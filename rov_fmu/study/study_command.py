@@ -12,7 +12,7 @@ from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import vehicle_file
 from rov_fmu.study.results.store import PAGE, STUDY, Part, is_description
-from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.run_study import do_study
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
@@ -44,7 +44,7 @@ def study_plan(
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
     with parts() as shown:
-        spent, store = run_study(
+        spent, store = do_study(
             plan,
             output,
             workers,

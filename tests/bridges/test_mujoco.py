@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 import rov_fmu
 from rov_fmu.bridges.gym import RovVectorEnv
-from rov_fmu.bridges.mujoco import load, mujoco_files, mujoco_texts
+from rov_fmu.bridges.mujoco import load_mujoco, mujoco_files, mujoco_texts
 from rov_fmu.bridges.mujoco.plugin import show
 from rov_fmu.c.compile import host_platform
 from rov_fmu.cli import main
@@ -658,7 +658,7 @@ def test_where_no_window_can_open_the_reason_and_the_remedy_are_told(
     viewer: MagicMock, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     viewer.side_effect = RuntimeError("it needs the main thread")
-    rov = load(rov_fmu.load(BARE))
+    rov = load_mujoco(rov_fmu.load(BARE))
     with pytest.raises(SystemExit, match=r"\(it needs the main thread\).* run mjpython"):
         show(rov)
     monkeypatch.delenv("DISPLAY")
@@ -682,7 +682,7 @@ def test_a_window_shows_steps_in_real_time_until_it_is_closed(
         shown.append(clock.now)
 
     viewer.return_value.sync = show_late
-    rov = load(rov_fmu.load(BARE))
+    rov = load_mujoco(rov_fmu.load(BARE))
     show(rov)
     step = rov.model.opt.timestep
     assert rov.data.time == pytest.approx(4.0 * step)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.c import library, prebuilt
 from rov_fmu.c.compile import BuildError, compile_engine, host_platform
 from rov_fmu.fmu import content
@@ -59,9 +59,9 @@ def test_the_module_of_a_page_is_taken_for_its_sources_alone(folder: Path) -> No
 def test_binaries_are_taken_for_their_guid_alone(folder: Path, tmp_path: Path) -> None:
     rov = load_vehicle(BARE)
     with without_page():
-        build(rov, folder / "bare.fmu", platforms="host")
-        same = build(rov, tmp_path / "same.fmu", platforms="host")
-        changed = build(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
+        build_fmu(rov, folder / "bare.fmu", platforms="host")
+        same = build_fmu(rov, tmp_path / "same.fmu", platforms="host")
+        changed = build_fmu(rov.with_(m_rov=2.0 * rov["m_rov"]), tmp_path / "changed.fmu", platforms="host")
     assert not same.seconds
     assert same.was_run
     assert changed.seconds.keys() == changed.binaries.keys()

@@ -15,7 +15,7 @@ from pythonfmu import FmuBuilder
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import FOLDER, MANIFEST, META_DATA
 from rov_fmu.fmu.reference_results import reference_results
-from rov_fmu.prove.proof import prove
+from rov_fmu.prove.proof import prove_fmu
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import ALONE
 
@@ -51,7 +51,7 @@ def test_the_videoray_proves_itself(interface: str | None, videoray_fmu: Path, c
     assert err == ""
     assert "FAIL" not in out
     assert out.startswith(f"{6 + 1} experiments, {6 * 2 + 7} results: {6 * 2 + 7} of {6 * 2 + 7} pass. ")
-    found = prove(videoray_fmu, interface)
+    found = prove_fmu(videoray_fmu, interface)
     assert max(f.deviation for f in found) < (1e-9 if interface == "model-exchange" else 1e-10)
     assert {f.tolerance for f in found} == {1e-7 if interface == "model-exchange" else 1e-9}
 
@@ -127,7 +127,7 @@ def foreign(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_an_fmu_of_another_exporter_is_proved(foreign: Path, capsys: Capsys) -> None:
     assert main(["prove", str(foreign)]) == 0
-    found = [(f.experiment, f.variable, f.passed) for f in prove(foreign)]
+    found = [(f.experiment, f.variable, f.passed) for f in prove_fmu(foreign)]
     assert found == [(x, v, True) for x in ("step", "draft") for v in ("y", "on")]
     assert "missing" not in capsys.readouterr().out, "what FMPy and the FMU say stays out of the table"
 
@@ -181,7 +181,7 @@ def test_what_deviates_or_fails_is_printed(
 def test_the_reason_why_an_fmu_fails_is_given(
     fmu: str, begin: str, change: Change, reason: str, tmp_path: Path, request: pytest.FixtureRequest
 ) -> None:
-    first = prove(_with(request.getfixturevalue(fmu), {}, tmp_path / "other.fmu", begin, change))[0]
+    first = prove_fmu(_with(request.getfixturevalue(fmu), {}, tmp_path / "other.fmu", begin, change))[0]
     assert not first.passed
     assert re.match(reason, first.error)
     assert str(Path(tempfile.gettempdir())) not in first.error

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.cli import _commands, main
 from rov_fmu.io.output import Output, WriteError, check_targets, sealed, write_whole
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -80,12 +80,12 @@ def test_the_list_of_what_was_written_forgets_the_oldest_half(tmp_path: Path, mo
 _WORK = (
     "rov_fmu.tank.folder.read_rows",
     "rov_fmu.interface.identify_command.identify",
-    "rov_fmu.identify.inspection.inspected.inspect_logs",
+    "rov_fmu.identify.inspection.inspected.inspect_paths",
     "rov_fmu.interface.fly_command.fly_page",
     "rov_fmu.interface.simulate_command.run",
     "rov_fmu.interface.tune_command.tune",
     "rov_fmu.interface.prove_command.prove_claims",
-    "rov_fmu.study.study_command.run_study",
+    "rov_fmu.study.study_command.do_study",
     "rov_fmu.build.compile_all",
 )
 _SLOW = ("build", "study", "identify", "inspect", "prove")
@@ -161,11 +161,11 @@ def test_an_fmu_proves_itself_on_any_machine(
     path = tmp_path / "rov.fmu"
     path.write_bytes(whole)
     with pytest.raises(pytest.fail.Exception):
-        build(vehicle, path, platforms="host")
+        build_fmu(vehicle, path, platforms="host")
     with zipfile.ZipFile(path, "a") as archive:
         archive.writestr("extra/notes.txt", "my notes")
     changed = path.read_bytes()
     for content in (changed, whole + b"x", b"x" + whole, whole[:-1000], b"PK\x03\x04"):
         path.write_bytes(content)
         with pytest.raises(WriteError, match="--force"):
-            build(vehicle, path, platforms="host")
+            build_fmu(vehicle, path, platforms="host")

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu import __version__
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, FEW_TESTS, ROOT
@@ -107,7 +107,7 @@ def test_the_fmus_in_the_wheel_are_those_of_a_build(full_wheel: Path, tmp_path: 
     inside = {Path(name).name: content for name, content in _content(full_wheel).items() if name.endswith(".fmu")}
     assert {*inside} == {f"{name}.fmu" for name in SHIPPED}
     for name, file in SHIPPED.items():
-        own = build(load_vehicle(file), tmp_path / f"{name}.fmu")
+        own = build_fmu(load_vehicle(file), tmp_path / f"{name}.fmu")
         assert own.seconds.keys() == own.binaries.keys(), "all of it was compiled"
         assert own.path.read_bytes() == inside[f"{name}.fmu"]
 

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import rov_fmu
-from rov_fmu.bridges.mujoco import load
+from rov_fmu.bridges.mujoco import load_mujoco
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.interface.model import VehicleModel
 from rov_fmu.io.messages import InputError
@@ -165,7 +165,7 @@ def test_without_the_correlations_the_interval_would_be_wide() -> None:
 def test_at_full_thrust_a_bluerov2_turns_aside_in_mujoco_and_its_fmu_does_not() -> None:
     vehicle = rov_fmu.load("bluerov2")
     ahead = vehicle.layout.commands_along(SURGE, 1.0)
-    rov = load(vehicle)
+    rov = load_mujoco(vehicle)
     rov.model.geom_contype[:] = 0
     for name, value in ahead.items():
         rov.data.actuator(name).ctrl = value
@@ -180,7 +180,7 @@ def test_at_full_thrust_a_bluerov2_turns_aside_in_mujoco_and_its_fmu_does_not() 
 def test_in_mujoco_there_is_no_surface_and_a_current_takes_a_vehicle_at_rest_along(heavy: VehicleModel) -> None:
     depths = []
     for height in (-1.0, 3.0):
-        rov = load(surfaced(heavy))
+        rov = load_mujoco(surfaced(heavy))
         rov.data.qpos[2], rov.inputs["V_N"] = height, 0.3
         rov.step(500)
         depths.append(rov.data.qpos[2] - height)
@@ -193,7 +193,7 @@ def test_a_payload_in_mujoco_has_no_buoyancy(heavy: VehicleModel) -> None:
 
     from rov_fmu.bridges.mujoco import mujoco_texts
 
-    texts, connected = mujoco_texts(heavy, "rov", {}, {}), load(heavy)
+    texts, connected = mujoco_texts(heavy, "rov", {}, {}), load_mujoco(heavy)
     spec = mujoco.MjSpec.from_string(texts["scene.xml"], include={"vehicle.xml": texts["vehicle.xml"].encode()})
     payload = spec.body(heavy.identifier).add_body()
     payload.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0.0, 0.0], mass=2.0, contype=0, conaffinity=0)

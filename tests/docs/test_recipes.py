@@ -172,7 +172,7 @@ found = {
     "read": [*entries],
     "suffixes": LOG_SUFFIXES,
 }
-swims = mujoco.load(rov)
+swims = mujoco.load_mujoco(rov)
 swims.model.opt.timestep, swims.data.actuator("u_t").ctrl, swims.data.qvel[2] = 1e-9, inputs["u_t"], -state["w"]
 swims.step()
 found["mujoco w"] = [-float(swims.data.qacc[2]), rov.derivatives(inputs, state | {"z": 0.0})["w"]]

@@ -151,7 +151,7 @@ PAGE = (ROOT / "docs" / "system.md").read_text(encoding="utf-8")
 
 def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every input that hangs on the world is connected."""
-    monkeypatch.setattr(system, "build", undescribed_build)
+    monkeypatch.setattr(system, "build_fmu", undescribed_build)
     monkeypatch.setattr(system, "lack", lambda _: "")
     path = tmp_path / "tether.toml"
     (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)

@@ -12,13 +12,13 @@ import pytest
 
 from examples.dive_log import CURRENT, LAG, bluerov2, dive, write_log
 from examples.tank_tests import DELAY, OTTER, bollard_pull, write_tests
+from rov_fmu import Results
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.identify import identify
-from rov_fmu.identify.result import Effect, Identification, coverage_of
+from rov_fmu.identify.result import Identification, IdentifiedEffect, coverage_of
 from rov_fmu.report.plots.steps import tables_by_axis
-from rov_fmu.study import Results
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import REFIT, ROOT
@@ -57,7 +57,7 @@ def misses(found: Identification, truth: Vehicle) -> list[str]:
     return [name for name, (low, high) in intervals.items() if not low <= truth[name] <= high]
 
 
-def kept(found: Identification) -> dict[str, Effect]:
+def kept(found: Identification) -> dict[str, IdentifiedEffect]:
     """What else acts, by its name."""
     return {effect.name: effect for effect in found.effects if effect.kept}
 

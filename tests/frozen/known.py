@@ -175,7 +175,7 @@ def _printed(command: str, *more: str) -> str:
 
 def _study(folder: Path) -> str:
     """Return the page and the summary of a saved study."""
-    from rov_fmu.study import Results
+    from rov_fmu import Results
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.summary import print_summary
     from rov_fmu.study.run.work import Spent

@@ -66,7 +66,7 @@ def _plan(path: Path) -> Any:
 
 
 def _study(path: Path) -> Any:
-    from rov_fmu.study import Results
+    from rov_fmu import Results
 
     results = Results(path.parent)
     frames = {"runs": results.runs.reset_index(), "trajectories": results.trajectories()}

@@ -22,12 +22,12 @@ from rov_fmu.identify.findings import (
     with_error,
 )
 from rov_fmu.identify.result import (
-    Coefficient,
-    Effect,
     Identification,
+    IdentifiedCoefficient,
+    IdentifiedEffect,
     Logging,
+    MeasuredPoint,
     NextTest,
-    Point,
     Slip,
     Structure,
     UnknownForce,
@@ -95,13 +95,13 @@ def with_outliers(share: float) -> Identification:
     return quiet(sensors=(replace(example().sensors[0], outliers=share),))
 
 
-def unidentified(*names: str) -> tuple[Coefficient, ...]:
-    return tuple(Coefficient(name, 1.0, None, "1", "1 within a factor of 3", 1.0) for name in names)
+def unidentified(*names: str) -> tuple[IdentifiedCoefficient, ...]:
+    return tuple(IdentifiedCoefficient(name, 1.0, None, "1", "1 within a factor of 3", 1.0) for name in names)
 
 
-def forces(*ratios: float) -> tuple[Point, ...]:
+def forces(*ratios: float) -> tuple[MeasuredPoint, ...]:
     return tuple(
-        Point("top", "force", "N", "thrust_top.csv", 0.1 * n, 10.0 * n * ratio, 10.0 * n, 10.0 * n, counts=True)
+        MeasuredPoint("top", "force", "N", "thrust_top.csv", 0.1 * n, 10.0 * n * ratio, 10.0 * n, 10.0 * n, counts=True)
         for n, ratio in enumerate(ratios, 1)
     )
 
@@ -112,12 +112,12 @@ def turning(*names: str) -> Identification:
     return replace(dive, axes=(replace(dive.axes[0], axis=YAW, structure=2.0),))
 
 
-BETA = Coefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
-SCALE = Coefficient("a_t_top", 6.5, (6.0, 7.0), "N", "6.5 ± 0.6 N", 0.9)
+BETA = IdentifiedCoefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
+SCALE = IdentifiedCoefficient("a_t_top", 6.5, (6.0, 7.0), "N", "6.5 ± 0.6 N", 0.9)
 DISTANCE = prediction(SURGE, "distance", error=0.9, span=10.0, coverage=0.7)
 DRIFTING = prediction(YAW, "heading", error=0.9)
-OF_FILE = Effect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
-SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
+OF_FILE = IdentifiedEffect("current", "log_1.csv", "current to the north", -0.1, (-0.11, -0.09), "m/s", 12.0)
+SLOW = IdentifiedEffect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 LATE = Logging("log_1.csv", 0.1, -0.08, (-0.09, -0.07), 0.1)
 
 HEALTH = Structure("health", "l", 0.999, 0.5)
@@ -303,7 +303,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
     ),
     (
         "points differ",
-        surge(points=(Point("surge", "V_ss", "m/s", "steady.csv", 0.3, 0.2, 0.25, 0.25, counts=True),)),
+        surge(points=(MeasuredPoint("surge", "V_ss", "m/s", "steady.csv", 0.3, 0.2, 0.25, 0.25, counts=True),)),
         "surge: V_ss of the tables differs by 25% (RMS) from the model",
         quiet(),
     ),

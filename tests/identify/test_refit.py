@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.result import Identification, Point, relative_error
+from rov_fmu.identify.result import Identification, MeasuredPoint, relative_error
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.commands import REFIT, TESTS
@@ -33,13 +33,13 @@ def refit(identified: Identified) -> Identification:
     return identified("refit", lambda _: load_tests(TESTS))
 
 
-def points(refit: Identification, axis: str, quantity: str) -> list[Point]:
+def points(refit: Identification, axis: str, quantity: str) -> list[MeasuredPoint]:
     """Return the measured rows of an axis that count."""
     (result,) = (result for result in refit.axes if result.axis.name == axis)
     return [p for p in result.points if p.quantity == quantity and p.counts]
 
 
-def by_paper(vehicle: Vehicle, some: list[Point]) -> float:
+def by_paper(vehicle: Vehicle, some: list[MeasuredPoint]) -> float:
     """Return the RMS relative error of the paper's scaled model for some rows."""
     axis = next(form.axis for form in vehicle.layout.axes if form.axis.name == some[0].subject)
     responses = [vehicle.response(axis, p.command)[p.quantity == "Tau"] for p in some]

@@ -13,7 +13,7 @@ import tomlkit
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
-from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.io.messages import FileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
@@ -170,7 +170,7 @@ def test_the_frame_of_the_autopilot_tells_the_base(frame: int, base: str, tmp_pa
     assert parsed(inspect()[1]).get("base", "") == base
     (tmp_path / "rov.toml").unlink()
     if base:
-        reason = inspect_logs([tmp_path / "dive.tlog"]).draft_for(None).reason
+        reason = inspect_paths([tmp_path / "dive.tlog"]).draft_for(None).reason
         assert reason == "the log has FRAME_CONFIG 1 (vectored)"
 
 

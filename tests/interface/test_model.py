@@ -13,7 +13,7 @@ import pytest
 
 import rov_fmu
 from rov_fmu.bridges.jacobian import step_jacobian
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.fmu.content import native_content
@@ -376,11 +376,11 @@ def test_a_vehicle_that_cannot_be_is_neither_built_nor_simulated(videoray: Vehic
     """However it came about."""
     for name, value in (("a_du", 1.0), ("a_d_u", float("nan"))):
         wrong = replace(videoray, coefficients={**videoray.coefficients, name: value})
-        for action in (lambda v: build(v, tmp_path / "x.fmu"), lambda v: v.simulate(TIMES)):
+        for action in (lambda v: build_fmu(v, tmp_path / "x.fmu"), lambda v: v.simulate(TIMES)):
             with pytest.raises(InputError, match=rf"^{name}( = nan)?: "):
                 action(wrong)
     with pytest.raises(ValueError, match=r"^there is no backend 'nativ', only native, pythonfmu$"):
-        build(videoray, tmp_path / "x.fmu", backend="nativ")
+        build_fmu(videoray, tmp_path / "x.fmu", backend="nativ")
     assert not list(tmp_path.iterdir())
 
 

@@ -11,7 +11,7 @@ import tomlkit
 from lxml import html
 from pythonfmu import FmuBuilder
 
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import FOLDER, META_DATA
 from rov_fmu.interface.prove_command import CLAIMS_OF_VEHICLES, conservation
@@ -124,7 +124,7 @@ def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
     vehicle, path = load_vehicle(folder / "vehicle.toml"), folder / "harbour.fmu"
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr("rov_fmu.build.web_module", lambda _: b"")  # no question is about the page that flies
-        return build(vehicle, path, platforms=["host"], sign=folder / "key").path
+        return build_fmu(vehicle, path, platforms=["host"], sign=folder / "key").path
 
 
 def _text(proof: Proof) -> str:

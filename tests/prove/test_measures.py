@@ -16,7 +16,7 @@ from rov_fmu.interface.prove_command import conservation
 from rov_fmu.io.csv_table import Series
 from rov_fmu.prove import measures
 from rov_fmu.prove.experiments import Experiment
-from rov_fmu.prove.proof import Finding
+from rov_fmu.prove.proof import ProofFinding
 from rov_fmu.prove.runs import Answer, Plan, RunError
 from rov_fmu.prove.subject import Subject
 
@@ -91,7 +91,7 @@ def test_of_each_experiment_the_worst_variable_is_told(
     count: int, off: float, rows: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     near = {"x": 2e-10, "y": 5e-10, "z": 1e-10}
-    found = [Finding(f"e{n}", name, near[name], 1e-9) for n in range(count) for name in near]
+    found = [ProofFinding(f"e{n}", name, near[name], 1e-9) for n in range(count) for name in near]
     found[1] = replace(found[1], deviation=off)
     monkeypatch.setattr(measures, "compare", lambda _: found)
     evidence = measures.expected(subject(_unasked, _TWO_PIECES))

@@ -18,13 +18,13 @@ from rov_fmu.identify.findings import told
 from rov_fmu.identify.result import (
     Answer,
     AxisResult,
-    Coefficient,
     Disturbance,
-    Effect,
     Identification,
+    IdentifiedCoefficient,
+    IdentifiedEffect,
     Logging,
+    MeasuredPoint,
     NextTest,
-    Point,
     Prediction,
     SensorNoise,
     Slip,
@@ -80,14 +80,18 @@ def axis_result(
     """Return an axis whose V_ss is `scale` times the command."""
     name = axis.coefficient
     known = (
-        Coefficient(name("a_d"), 10.0, (9.0, 11.0), "N.s2/m2", "20 within a factor of 2, from the base", 0.1),
-        Coefficient(name("b_d"), 2.0, (0.5, 3.5), "N.s/m", "4 within a factor of 3, from the base", 0.4),
-        Coefficient(name("beta"), 0.8, (0.7, 0.9), "1", "0.65 within a factor of 1.5", 0.2),
+        IdentifiedCoefficient(name("a_d"), 10.0, (9.0, 11.0), "N.s2/m2", "20 within a factor of 2, from the base", 0.1),
+        IdentifiedCoefficient(name("b_d"), 2.0, (0.5, 3.5), "N.s/m", "4 within a factor of 3, from the base", 0.4),
+        IdentifiedCoefficient(name("beta"), 0.8, (0.7, 0.9), "1", "0.65 within a factor of 1.5", 0.2),
     )
     points = (
-        Point(axis.name, "V_ss", axis.unit, "steady.csv", 0.3, 0.29 * scale, 0.3 * scale, 0.31 * scale, counts=True),
-        Point(axis.name, "V_ss", axis.unit, "steady.csv", 0.5, 0.51 * scale, 0.5 * scale, 0.5 * scale, counts=True),
-        Point(axis.name, "Tau", "s", "times.csv", 0.5, 1.1, 1.0, 1.0, counts=False),
+        MeasuredPoint(
+            axis.name, "V_ss", axis.unit, "steady.csv", 0.3, 0.29 * scale, 0.3 * scale, 0.31 * scale, counts=True
+        ),
+        MeasuredPoint(
+            axis.name, "V_ss", axis.unit, "steady.csv", 0.5, 0.51 * scale, 0.5 * scale, 0.5 * scale, counts=True
+        ),
+        MeasuredPoint(axis.name, "Tau", "s", "times.csv", 0.5, 1.1, 1.0, 1.0, counts=False),
     )
     next_test = NextTest(axis, "hold 0.6 for 8 s, then -0.6 for 8 s", "V_ss at 50 %", 2.0 * share, share)
     own = tuple(replace(answer, axis=axis) for answer in answers(scale, share))
@@ -143,7 +147,7 @@ def without_findings() -> Identification:
         ),
     )
     forces = tuple(
-        Point("top", "force", "N", "thrust_top.csv", c, 10.0 * c, 10.5 * c, 10.2 * c, counts=c > 0.2)
+        MeasuredPoint("top", "force", "N", "thrust_top.csv", c, 10.0 * c, 10.5 * c, 10.2 * c, counts=c > 0.2)
         for c in (0.2, 0.4, 0.6)
     )
     names = tuple(known.name for result in axes for known in result.known)
@@ -157,12 +161,14 @@ def without_findings() -> Identification:
         vehicle=vehicle,
         against=None,
         axes=axes,
-        curves={"top": (Coefficient("b_t_top", 10.0, (9.0, 11.0), "N", "11 within 10 %, from the forces", 0.9),)},
+        curves={
+            "top": (IdentifiedCoefficient("b_t_top", 10.0, (9.0, 11.0), "N", "11 within 10 %, from the forces", 0.9),)
+        },
         forces=forces,
         effects=(
-            Effect("lag", "top", "lag of the thrusters", 0.12, (0.11, 0.13), "s", 50.0),
-            Effect("current", FILES[0], "current to the north", 0.1, (0.09, 0.11), "m/s", 12.0),
-            Effect("load", "heave", "constant load", 0.01, (-0.5, 0.5), "N", -3.0),
+            IdentifiedEffect("lag", "top", "lag of the thrusters", 0.12, (0.11, 0.13), "s", 50.0),
+            IdentifiedEffect("current", FILES[0], "current to the north", 0.1, (0.09, 0.11), "m/s", 12.0),
+            IdentifiedEffect("load", "heave", "constant load", 0.01, (-0.5, 0.5), "N", -3.0),
         ),
         disturbances=(
             disturbance("slow force", HEAVE, FILES[1], 2.1, "N", 0.16, 41.0, 30.0),
@@ -204,7 +210,7 @@ def driven_by(names: Sequence[str]) -> Identification:
 
 def doubtful() -> Identification:
     """The example with one rear thruster, an assumed thrust and a depth in cm in one of its logs."""
-    curves = {"top": (Coefficient("a_t_top", 6.0, (5.0, 7.0), "N", "6.0 ± 1.0 N", 0.5),)}
+    curves = {"top": (IdentifiedCoefficient("a_t_top", 6.0, (5.0, 7.0), "N", "6.0 ± 1.0 N", 0.5),)}
     slips = (Slip(FILES[1], "depth", "is it in cm", 20.0),)
     return told(replace(driven_by(["l", "t"]), slips=slips, forces=(), curves=curves))
 

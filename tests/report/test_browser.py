@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.prove.claims import prove_claims
 from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.proof_page import proof_page
@@ -64,7 +64,7 @@ def inspection(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """What `rov-fmu inspect --report` writes about a dive."""
     folder = tmp_path_factory.mktemp("inspection")
     path = folder / "logs.html"
-    path.write_text(inspection_page(inspect_logs([LOGS[".tlog"](folder, DIVE)])), encoding="utf-8")
+    path.write_text(inspection_page(inspect_paths([LOGS[".tlog"](folder, DIVE)])), encoding="utf-8")
     return path
 
 

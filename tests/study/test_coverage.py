@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu import Results, run_study
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.identify import identify
-from rov_fmu.study import Results, study
 from rov_fmu.vehicle.vehicle import Vehicle
 from rov_fmu.vehicle.writer import write_vehicle
 from tests.folders import FORCE, HEAD, MASS, SPEED, TAU
@@ -128,7 +128,7 @@ def test_bands_hold_what_is_true(kind: str, vehicles: int, width: float, schedul
         found = identify(load_tests(folder / "tests")).vehicle
         write_vehicle(found, folder / "found.toml")
         (folder / "plan.toml").write_text(PLAN.format(seed=seed), encoding="utf-8")
-        results = study(folder / "plan.toml", folder / "results", scheduler=scheduler)
+        results = run_study(folder / "plan.toml", folder / "results", scheduler=scheduler)
         assert results.warnings == ()
         for of, true in true_motion(k).items():
             for level, quantiles in LEVELS.items():

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.study import Results, study
 from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.model import Variable
 from rov_fmu.study.plan.plan import Plan
@@ -174,7 +174,7 @@ def test_sobol_indices_are_those_of_groups_in_closed_form(videoray_fmu: Path, tm
 
     If a_d_u and b_d_u were independent, they would have 0.60 of it.
     """
-    results = study(planned(tmp_path, videoray_fmu, 2560), tmp_path / "results", scheduler=scheduler)
+    results = run_study(planned(tmp_path, videoray_fmu, 2560), tmp_path / "results", scheduler=scheduler)
     assert results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])

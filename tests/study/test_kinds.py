@@ -14,9 +14,10 @@ import pandas as pd
 import pytest
 from distributed import LocalCluster
 
+from rov_fmu import Results, run_study
 from rov_fmu.cli import main
-from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.results.store import Store
+from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
@@ -54,7 +55,7 @@ def _plan(folder: Path, fmu: Path | None) -> Path:
 @pytest.fixture(scope="module")
 def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, scheduler: str) -> Results:
     folder = tmp_path_factory.mktemp("native")
-    return study(_plan(folder, videoray_fmu), folder / "results", scheduler=scheduler)
+    return run_study(_plan(folder, videoray_fmu), folder / "results", scheduler=scheduler)
 
 
 def _close(results: Results, other: Results, rtol: float = 1e-11) -> None:
@@ -94,7 +95,7 @@ def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were
 ) -> None:
     progress: list[Progress] = []
     plan, address = _plan(tmp_path, videoray3_fmu), cluster.scheduler_address
-    _close(study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native)
+    _close(run_study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native)
     link = cluster.dashboard_link
     assert [progress[0], progress[-1]] == [Progress(0, RUNS, 0, link), Progress(RUNS, RUNS, 0, link)]
     scheduler: Any = cluster.scheduler
@@ -115,17 +116,17 @@ def test_a_vehicle_in_lanes_and_its_fmu_give_the_same_rows_and_the_lanes_load_ne
     loaded = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout.split()
     assert "numpy" in loaded
     assert not {"distributed", "dask", "fmpy", "matplotlib", "rov_fmu.build"} & {*loaded}
-    lanes = study(plan, tmp_path / "lanes", merge=True)
+    lanes = run_study(plan, tmp_path / "lanes", merge=True)
     _close(lanes, native, 1e-12)
     assert (tmp_path / "lanes" / "study.json").exists()
-    monkeypatch.setattr("rov_fmu.build.build", built)
-    _close(study(plan, tmp_path / "results", scheduler=scheduler), native)
+    monkeypatch.setattr("rov_fmu.build.build_fmu", built)
+    _close(run_study(plan, tmp_path / "results", scheduler=scheduler), native)
 
 
 @pytest.mark.weekly
 def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
     assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
-    _close(study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
+    _close(run_study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
 
 
 @pytest.mark.long
@@ -155,7 +156,7 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
     assert line.endswith("cannot be written: No space left on device\n")
     assert line.count("\n") == 1
     assert 0 < len(Results(folder).runs) < RUNS
-    _close(study(plan, folder, scheduler=scheduler), native)
+    _close(run_study(plan, folder, scheduler=scheduler), native)
 
 
 def test_without_its_packages_the_command_says_what_to_install(

@@ -11,17 +11,18 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import WriteError
-from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import variable, vehicle_model
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.prepared import Prepared, prepare
 from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.lanes import _Runs, simulated
 from rov_fmu.study.run.simulator import Simulator
+from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.often import spread
@@ -139,7 +140,7 @@ def test_parts_are_merged_to_the_bits_of_one_run(
 ) -> None:
     """Also with other numbers of runs and threads at a time."""
     plan, parted = _plan(tmp_path, f'sampler = "{sampler}"\n{PLAN}'), tmp_path / "parted"
-    whole = study(plan, tmp_path / "whole", workers=1)
+    whole = run_study(plan, tmp_path / "whole", workers=1)
     given = ["study", str(plan), "-o", str(parted)]
     monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 5)
     for part in ("1/3", "3/3"):
@@ -151,7 +152,7 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     )
     assert without_progress(capsys.readouterr().err) == line
     assert not (parted / "study.json").exists()
-    assert len(study(plan, parted, part=(2, 3), workers=2).runs) in (13, 14)
+    assert len(run_study(plan, parted, part=(2, 3), workers=2).runs) in (13, 14)
     assert main([*given, "--merge"]) == 0
     _same(Results(parted), whole)
     assert (parted / "study.html").exists()
@@ -172,9 +173,9 @@ def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, folder = _plan(tmp_path), tmp_path / "results"
-    whole = study(plan, tmp_path / "whole")
+    whole = run_study(plan, tmp_path / "whole")
     for number in (1, 2):
-        study(plan, folder, part=(number, 2))
+        run_study(plan, folder, part=(number, 2))
     for text, reason in (
         (PLAN.replace("seed = 5", "seed = 6"), r"1-of-2: holds runs of another plan \(seed changed\): choose another"),
         (
@@ -185,11 +186,11 @@ def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_
         changed = _plan(tmp_path, text)
         for how in ({"merge": True}, {"part": (1, 2)}):
             with pytest.raises(FileError, match=reason):
-                study(changed, folder, **how)
+                run_study(changed, folder, **how)
     _plan(tmp_path)
-    study(plan, folder, part=(1, 3))
+    run_study(plan, folder, part=(1, 3))
     with pytest.raises(FileError, match=r"1-of-2.* has runs that .*1-of-3.* has, too: remove one of them"):
-        study(plan, folder, merge=True)
+        run_study(plan, folder, merge=True)
     shutil.rmtree(folder / "parts" / "1-of-3")
     write, written = Store.write, list[int]()
 
@@ -202,25 +203,25 @@ def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_
     with monkeypatch.context() as patched:
         patched.setattr(Store, "write", full)
         with pytest.raises(WriteError):
-            study(plan, folder, merge=True)
+            run_study(plan, folder, merge=True)
     assert len(Results(folder).runs) == 20
-    _same(study(plan, folder, merge=True), whole)
-    study(plan, folder / "new", part=(1, 2))
-    study(plan, folder / "new", part=(2, 2))
+    _same(run_study(plan, folder, merge=True), whole)
+    run_study(plan, folder / "new", part=(1, 2))
+    run_study(plan, folder / "new", part=(2, 2))
     shutil.copytree(folder / "new" / "parts", folder / "parts")
     first = min((folder / "runs").iterdir())
     first.rename(first.with_name("part-000000003-000000009.parquet"))
     with pytest.raises(
         FileError, match=r"part-000000003-000000009\.parquet: has the runs 0 to 19, and not those of its name"
     ):
-        study(plan, folder, merge=True)
+        run_study(plan, folder, merge=True)
 
 
 def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan, progress = _plan(tmp_path), list[Progress]()
-    whole = study(plan, tmp_path / "whole")
+    whole = run_study(plan, tmp_path / "whole")
     monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 7)
 
     def interrupt(now: Progress) -> None:
@@ -229,10 +230,10 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        study(plan, tmp_path / "results", on_progress=interrupt)
+        run_study(plan, tmp_path / "results", on_progress=interrupt)
     assert [*Results(tmp_path / "results").runs.index] == [*range(21)]
     monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 4)
-    _same(study(plan, tmp_path / "results", on_progress=progress.append), whole)
+    _same(run_study(plan, tmp_path / "results", on_progress=progress.append), whole)
     assert [now.done for now in progress] == [0, 7, 14, 21, 21, 25, 29, 33, 37, 40]
     assert {now.total for now in progress} == {40}
 

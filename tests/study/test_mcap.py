@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 
 import rov_fmu
+from rov_fmu import Results
 from rov_fmu.cli import main
 from rov_fmu.io.messages import InputError
-from rov_fmu.study import Results
 from tests.bridges.test_mcap import messages
 
 PLAN = """vehicle = "bluerov2_heavy"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from lxml import html
 
+from rov_fmu import Results
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.study import Results
 from rov_fmu.study.results.page import study_page
 from rov_fmu.study.results.results import statistics
 from tests.folders import beside

@@ -23,17 +23,17 @@ import pyarrow.parquet as pq
 import pytest
 from distributed import LocalCluster
 
+from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import WriteError
-from rov_fmu.study import Progress, Results, study
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Part, Store, identity, parquet
 from rov_fmu.study.run.child import Child
-from rov_fmu.study.run.run_study import run_study
-from rov_fmu.study.run.work import Spent, Work
+from rov_fmu.study.run.run_study import do_study
+from rov_fmu.study.run.work import Progress, Spent, Work
 from tests.commands import start, without_progress
 from tests.folders import beside
 
@@ -84,7 +84,7 @@ def do(foreign: Foreign, tmp_path: Path, scheduler: str) -> Callable[..., Result
 
     def done(reset: int = 0, on_progress: Any = lambda _: None, **plan: Any) -> Results:
         path = _plan(tmp_path, foreign(reset), **plan)
-        return study(path, tmp_path / "results", scheduler=scheduler, on_progress=on_progress)
+        return run_study(path, tmp_path / "results", scheduler=scheduler, on_progress=on_progress)
 
     return done
 
@@ -103,7 +103,7 @@ def _processes(word: str) -> set[int]:
 def whole(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign, scheduler: str) -> Results:
     """The results of an undisturbed study."""
     folder = tmp_path_factory.mktemp("whole")
-    return study(_plan(folder, foreign()), folder / "results", scheduler=scheduler)
+    return run_study(_plan(folder, foreign()), folder / "results", scheduler=scheduler)
 
 
 def test_the_rows_are_those_of_the_closed_form(whole: Results, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -141,7 +141,7 @@ def test_workers_that_are_processes_give_the_same_rows(foreign: Foreign, tmp_pat
     def count(_: Progress) -> None:
         started.add(len(_processes("spawn_main") - others))
 
-    _same(study(_plan(tmp_path, foreign()), tmp_path / "results", workers=2, on_progress=count), whole)
+    _same(run_study(_plan(tmp_path, foreign()), tmp_path / "results", workers=2, on_progress=count), whole)
     assert started == {2}
 
 
@@ -210,7 +210,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     draft.write_bytes(b"of a process that was killed")
     _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
-    assert run_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent()
+    assert do_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append)[0] == Spent()
     assert not draft.exists()
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
@@ -389,7 +389,7 @@ def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path,
         Results(tmp_path / "nowhere")
     plan = _plan(tmp_path, foreign(), runs=2, more="[set]\nfast = true\ngain = 2")
     plan.write_text(plan.read_text().replace('[keep]\noutputs = ["y"]\nevery = 0.5\n', ""))
-    results = study(plan, tmp_path / "results", scheduler=scheduler)
+    results = run_study(plan, tmp_path / "results", scheduler=scheduler)
     runs = results.runs
     assert runs.end.to_numpy() == pytest.approx((runs.a + 2.0 * runs.b + 3.0 * runs.c + 1.0).to_numpy(), rel=1e-12)
     with pytest.raises(FileError, match=r"no trajectory of 'y' is kept, nor any other: the plan has no \[keep\]"):
@@ -399,7 +399,7 @@ def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path,
     with pytest.raises(FileError, match='Sobol indices need sampler = "saltelli" in the plan'):
         results.sensitivity("end")
     with pytest.raises(WriteError, match="Not a directory"):
-        study(plan, plan / "results", scheduler=scheduler)
+        run_study(plan, plan / "results", scheduler=scheduler)
 
 
 # ---- Interrupted and killed ------------------------------------------------------------------------------------------
@@ -413,7 +413,7 @@ SLOW: dict[str, Any] = {"runs": 600, "more": "[set]\nmode = 5"}
 def slow(tmp_path_factory: pytest.TempPathFactory, foreign: Foreign, scheduler: str) -> Results:
     """The results of an undisturbed study, whose FMU need not wait."""
     folder = tmp_path_factory.mktemp("slow")
-    return study(_plan(folder, foreign(), runs=SLOW["runs"]), folder / "results", scheduler=scheduler)
+    return run_study(_plan(folder, foreign(), runs=SLOW["runs"]), folder / "results", scheduler=scheduler)
 
 
 def _parts(results: Path) -> list[Path]:
@@ -454,7 +454,7 @@ def test_an_interrupted_or_killed_study_goes_on_where_it_was(
     assert 0 < len(Results(results).runs) < SLOW["runs"]
     kept = {path: path.read_bytes() for path in _parts(results)}
     (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
-    _same(study(plan, results, scheduler=scheduler), slow)
+    _same(run_study(plan, results, scheduler=scheduler), slow)
     assert all(path.read_bytes() == content for path, content in kept.items())
     assert not [*results.glob("*/.*")]
 
@@ -483,7 +483,7 @@ def test_a_scheduler_that_is_not_there_is_a_line(
     (worker,) = scheduler.workers
     for address in ("tcp://127.0.0.1:9", worker):
         with pytest.raises(FileError) as refused:
-            study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
+            run_study(_plan(tmp_path, foreign()), tmp_path / "results", scheduler=address)
         assert str(refused.value) == f"--scheduler {address}: no scheduler of Dask answers there"
     assert not (tmp_path / "results").exists()
 
@@ -502,7 +502,7 @@ def test_a_scheduler_without_workers_is_told_and_its_workers_are_waited_for(
                 late.scale(1)
             told.append(now)
 
-        results = study(
+        results = run_study(
             _plan(tmp_path, foreign(), runs=4),
             tmp_path / "results",
             scheduler=late.scheduler_address,
@@ -557,7 +557,7 @@ def test_an_fmu_without_an_instance_and_workers_that_do_not_start_are_lines(
     ):
         monkeypatch.setattr(patched, value, raising=False)
         with pytest.raises(StudyError) as lost:
-            study(_plan(tmp_path, foreign()), tmp_path / "results")
+            run_study(_plan(tmp_path, foreign()), tmp_path / "results")
         assert str(lost.value) == f"{told}; {needs}"
 
 
@@ -575,9 +575,9 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
                 time.sleep(5.0)  # until the client has given up the scheduler
 
         with pytest.raises(StudyError, match=r"the connection to the scheduler is lost\. Finished runs are kept"):
-            study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
+            run_study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
     assert 0 < len(Results(results).runs) < SLOW["runs"]
-    _same(study(plan, results, scheduler=scheduler), slow)
+    _same(run_study(plan, results, scheduler=scheduler), slow)
 
 
 def test_a_study_tells_again_and_again_whether_workers_are_there(

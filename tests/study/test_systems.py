@@ -5,12 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from rov_fmu import run_study
 from rov_fmu.bridges.system.companion import companion
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.ssp import Component, System, ssp_content
 from rov_fmu.cli import main
 from rov_fmu.io.messages import FileError
-from rov_fmu.study import study
 from tests.commands import without_progress
 from tests.often import spread
 
@@ -51,7 +51,7 @@ def test_a_study_of_a_system_has_the_rows_of_the_closed_form(
     assert main(["study", str(folder / "plan.toml"), "-o", str(folder / "results"), "--scheduler", scheduler]) == 0
     # a.z falls by half in the last step, which b hears of after the run; with half the step, half a step before.
     assert "in one run, half the step changes a.V_N by 0.0% of its range" in capsys.readouterr().err
-    results = study(folder / "plan.toml", folder / "results", scheduler=scheduler)
+    results = run_study(folder / "plan.toml", folder / "results", scheduler=scheduler)
     runs = results.runs
     assert (runs.status == "done").all()
     assert runs["a.speed"].between(0.5, 1.5).all()
@@ -87,4 +87,4 @@ def test_a_damaged_system_is_one_line(folder: Path) -> None:
     for damaged in (content[:1000], b"no archive"):
         (folder / "my.ssp").write_bytes(damaged)
         with pytest.raises(FileError, match="is not a system"):
-            study(folder / "plan.toml", folder / "results")
+            run_study(folder / "plan.toml", folder / "results")

@@ -10,7 +10,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
-from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.tank.readers.listing import Listing, list_files
 from tests.commands import ROOT, TESTS
 from tests.tank.readers.motion import DIVE
@@ -66,7 +66,7 @@ def test_a_log_is_recognised_whatever_its_suffix(tmp_path: Path) -> None:
         (tmp_path / suffix).mkdir()
         paths.append(write(tmp_path / suffix, DIVE).rename(own / f"0000001{n}{'.log' * (n % 2)}"))
     assert list_files(own) == Listing(own, sorted(paths))
-    (inspection,) = inspect_logs([paths[0]]).logs
+    (inspection,) = inspect_paths([paths[0]]).logs
     assert len(inspection.commands) == 6
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
-from rov_fmu.study import Results, study
+from rov_fmu import Results, run_study
 from tests.folders import beside
 from tests.study.test_kinds import PLAN
 from verification.interoperability.importers import HERE, IMPORTERS
@@ -17,7 +17,7 @@ from verification.interoperability.importers import HERE, IMPORTERS
 def _done(fmu: Path, folder: Path) -> Results:
     plan = folder / f"{fmu.stem}.toml"
     plan.write_text(f'fmu = "{beside(fmu, folder)}"\n{PLAN}', encoding="utf-8")
-    return study(plan, folder / f"results of {fmu.stem}", workers=1)
+    return run_study(plan, folder / f"results of {fmu.stem}", workers=1)
 
 
 @pytest.mark.interop

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import build_backend
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.commands import BARE, ROOT
 from verification import release
@@ -28,7 +28,7 @@ def valid(inventory: str) -> bool:
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """An FMU that builds quickly."""
     path = tmp_path_factory.mktemp("release") / "bare.fmu"
-    build(load_vehicle(BARE), path, platforms="host")
+    build_fmu(load_vehicle(BARE), path, platforms="host")
     return path
 
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import click
 from rich.console import Console
 
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.c.compile import BuildError, host_platform
 from rov_fmu.c.simulation import usable_cores
 from rov_fmu.io.output import Output, check_targets, write_whole
@@ -100,7 +100,7 @@ def _measure(folder: Path, effort: Effort, picture_file: Path | None) -> Iterato
             yield runs.instances(plain_c, effort.repetitions)
             yield runs.variations(runs.Variations(rov, effort.runs).in_c(plain_c, effort.repetitions))
     with say("studies"):
-        native = build(rov, folder / "native.fmu", platforms=["host"]).path
+        native = build_fmu(rov, folder / "native.fmu", platforms=["host"]).path
         yield runs.studies(native, folder, effort.study_runs)
 
 

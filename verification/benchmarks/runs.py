@@ -11,7 +11,7 @@ import numpy as np
 import psutil
 
 from rov_fmu.fmu.variables import variables
-from rov_fmu.study.run.run_study import run_study
+from rov_fmu.study.run.run_study import do_study
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, digits, duration, error
@@ -119,7 +119,7 @@ def _study(folder: Path, runs: int) -> list[str]:
     plan = folder / "plan.toml"
     plan.write_text(_PLAN.format(runs=runs), encoding="utf-8")
     with tempfile.TemporaryDirectory(dir=folder) as results:
-        spent, _ = run_study(plan, Path(results, "results"), 2, None, lambda _: looks.append(_look()))
+        spent, _ = do_study(plan, Path(results, "results"), 2, None, lambda _: looks.append(_look()))
     processor, clock = (last - first for first, last in zip(looks[0], looks[-1], strict=True))
     return [f"{runs:,} runs", duration(processor / runs), duration(clock), duration(spent.started)]
 

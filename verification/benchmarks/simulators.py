@@ -12,7 +12,7 @@ from mujoco import rollout
 
 from rov_fmu.bridges.gym import RovVectorEnv
 from rov_fmu.bridges.mcap import hull_size
-from rov_fmu.bridges.mujoco import load, mujoco_texts
+from rov_fmu.bridges.mujoco import load_mujoco, mujoco_texts
 from rov_fmu.bridges.mujoco.plugin import step
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import SURGE, YAW
@@ -38,7 +38,7 @@ _FLUID = """<mujoco>
 def section(vehicle: Vehicle, repetitions: int) -> Section:
     """Return the times of a step of 1 ms on one core, the errors after 10 s in a hard turn, and MuJoCo's own fluid."""
     command = vehicle.layout.commands_along(SURGE, 0.3)
-    rov = load(vehicle)
+    rov = load_mujoco(vehicle)
     rov.model.opt.timestep = H
     for name, value in command.items():
         rov.data.actuator(name).ctrl = value
@@ -96,7 +96,7 @@ def _three(vehicle: Vehicle) -> tuple[Callable[[], float], Callable[[], float]]:
         spec.attach(mujoco.MjSpec.from_string(files["vehicle.xml"]), prefix=f"{n}_", frame=frame)
     spec.option.timestep = H
     model = spec.compile()
-    first: Any = load(vehicle)
+    first: Any = load_mujoco(vehicle)
     data, other = mujoco.MjData(model), mujoco.MjData(model)
     rovs = [type(first)(first.library, first.equation, model, data, prefix) for prefix in ("", "1_", "2_")]
     for one in (data, other):
@@ -116,7 +116,7 @@ def _in_c(model: Any) -> float:
 
 def _error(vehicle: Vehicle, command: Mapping[str, float], h: float) -> float:
     """Return how far the position after 10 s under a held command is from that of the FMU, m."""
-    rov = load(vehicle)
+    rov = load_mujoco(vehicle)
     rov.model.opt.timestep = h
     rov.data.qpos[:3] = 0.0
     for name, value in command.items():

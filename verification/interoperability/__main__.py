@@ -16,7 +16,7 @@ from .importers import HERE, KITS, VERSIONS, chosen
 from .install import InstallError, install
 from .manoeuvre import MANOEUVRES
 from .page import PageError, matrix, write_table
-from .run import Outcome, Verdict, build_fmu, run
+from .run import Outcome, Verdict, fmu_for_host, run
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     outcomes = []
     with tempfile.TemporaryDirectory() as folder:
         vehicles = [options.vehicle] if options.vehicle else MANOEUVRES
-        built = cache(partial(build_fmu, folder=Path(folder)))
+        built = cache(partial(fmu_for_host, folder=Path(folder)))
         for vehicle, importer in product(vehicles, importers):
             if not importer.suits(MANOEUVRES[vehicle].rov.layout):
                 continue

@@ -10,7 +10,7 @@ from enum import Enum
 from functools import partial
 from pathlib import Path
 
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.vehicle.vehicle import load_vehicle
 from verification.checkouts import ROOT
 from verification.references.limited import run_limited
@@ -49,9 +49,9 @@ class Outcome:
     log: str = ""
 
 
-def build_fmu(vehicle: str, fmi: int, folder: Path) -> Path:
+def fmu_for_host(vehicle: str, fmi: int, folder: Path) -> Path:
     """Build the FMU of a vehicle, for this machine. Raises BuildError."""
-    return build(load_vehicle(VEHICLES[vehicle]), folder / f"{vehicle}{fmi}.fmu", platforms=["host"], fmi=fmi).path
+    return build_fmu(load_vehicle(VEHICLES[vehicle]), folder / f"{vehicle}{fmi}.fmu", platforms=["host"], fmi=fmi).path
 
 
 def run(importer: Importer, fmu: Path, tools: Path, manoeuvre: Manoeuvre) -> Outcome:

@@ -146,7 +146,7 @@ def mujoco_texts(
     return files
 
 
-def load(vehicle: Vehicle, **coefficients: float) -> "Rov":
+def load_mujoco(vehicle: Vehicle, **coefficients: float) -> "Rov":
     """Return a vehicle in its world in MuJoCo, as `load` of the folder does. Needs the extra `mujoco`.
 
     - `vehicle`: the vehicle, which needs a mass.

@@ -27,7 +27,7 @@ from rov_fmu.bridges.system.connections import (
 from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.c.compile import compiler_identity, host_platform
 from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
@@ -220,7 +220,7 @@ def _built(vehicle: Vehicle) -> bytes:
     def make() -> bytes:
         with temporary_folder("system-") as own:
             path = Path(own, f"{vehicle.identifier}.fmu")
-            return build(vehicle, path, platforms="host", interface="cs").path.read_bytes()
+            return build_fmu(vehicle, path, platforms="host", interface="cs").path.read_bytes()
 
     try:
         return kept(folder, hashlib.sha256(json.dumps(parts).encode()).hexdigest()[:32], make).read_bytes()

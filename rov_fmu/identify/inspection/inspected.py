@@ -110,7 +110,7 @@ class Inspected:
 
 
 @one_parser()
-def inspect_logs(paths: Sequence[Path]) -> Inspected:
+def inspect_paths(paths: Sequence[Path]) -> Inspected:
     """Return what logs contain, or each log in a folder, with a draft of rov.toml, or with what it lacks.
 
     If there is a rov.toml already, thrusters and columns have its names, unless its hardware tables have a mistake.

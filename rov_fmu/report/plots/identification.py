@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rov_fmu.equation.units import in_degrees
-from rov_fmu.identify.result import Answer, AxisResult, Point
+from rov_fmu.identify.result import Answer, AxisResult, MeasuredPoint
 from rov_fmu.report.plots.logs import draw_band
 from rov_fmu.report.plots.svg import LIGHT, add_legend, name_axes
 
@@ -29,7 +29,9 @@ def plot_answers(figure: Figure, result: AxisResult, quantity: Literal["V_ss", "
     add_legend(figure)
 
 
-def plot_forces(figure: Figure, points: Sequence[Point], compared: Sequence[float | None] | None = None) -> None:
+def plot_forces(
+    figure: Figure, points: Sequence[MeasuredPoint], compared: Sequence[float | None] | None = None
+) -> None:
     """Plot the measured forces of a thrust curve over the command, and those of the model."""
     order = sorted(range(len(points)), key=lambda n: points[n].command)
     shown = [points[n] for n in order]
@@ -58,7 +60,7 @@ def _curve(ax: Axes, factor: float, answers: Sequence[Answer], quantity: str, co
             label = None
 
 
-def _points(ax: Axes, factor: float, points: Sequence[Point]) -> None:
+def _points(ax: Axes, factor: float, points: Sequence[MeasuredPoint]) -> None:
     """Draw measured points. Those that do not count are hollow."""
     for counts, face, label in ((True, LIGHT["orange"], "measured"), (False, "none", "measured, not counted")):
         if some := [(100.0 * p.command, factor * p.measured) for p in points if p.counts is counts]:

@@ -117,10 +117,10 @@ def read_model(path: Path) -> Model:
 
 def vehicle_fmu(vehicle: Vehicle) -> Model:
     """Build the FMU of a vehicle for this machine, and read it. Raises BuildError."""
-    from rov_fmu.build import build
+    from rov_fmu.build import build_fmu
 
     with temporary_folder("fmu-") as folder:
-        return read_model(build(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"]).path)
+        return read_model(build_fmu(vehicle, Path(folder, f"{vehicle.identifier}.fmu"), platforms=["host"]).path)
 
 
 def vehicle_model(vehicle: Vehicle) -> Model:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Engine = Literal["lanes", "fmu"]
 
 
-def study(
+def run_study(
     plan: Path | str,
     folder: Path | str,
     *,
@@ -58,7 +58,7 @@ def study(
         sys.exit(1)  # a worker imports a script without that line; its parent prints the message
     from rov_fmu.study.results.results import Results
 
-    _, store = run_study(
+    _, store = do_study(
         Path(plan),
         Path(folder),
         workers,
@@ -71,7 +71,7 @@ def study(
     return Results(store.folder)
 
 
-def run_study(
+def do_study(
     path: Path,
     folder: Path,
     workers: int | None,

@@ -32,7 +32,7 @@ def test_an_fmu_is_built_again_only_for_another_vehicle_or_where_it_is_damaged(
         plan.write_text(PLAN)
         return system.made(load_system_plan(plan), plan).parts["rov"].content
 
-    monkeypatch.setattr(system, "build", build)
+    monkeypatch.setattr(system, "build_fmu", build)
     text = SHIPPED["videoray"].read_text()
     copytree(SHIPPED["videoray"].parent, tmp_path, dirs_exist_ok=True)
     rov = tmp_path / "videoray.toml"

@@ -66,7 +66,7 @@ def _read_here(path: Path, content: bytes, where: str = "", **_: bool) -> Part:
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The current folder, with FMUs, where vehicles are described and not compiled."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(system, "build", undescribed_build)
+    monkeypatch.setattr(system, "build_fmu", undescribed_build)
     # It takes most of the time to start a process that reads an FMU of others: tests of `prove` do.
     monkeypatch.setattr(system, "read_part", _read_here)
     monkeypatch.setattr(ssp, "read_part", _read_here)

@@ -18,7 +18,7 @@ import tomlkit
 from lxml import etree
 
 import rov_fmu
-from rov_fmu.build import build
+from rov_fmu.build import build_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.archive import FOLDER, MANIFEST, META_DATA, archive
 from rov_fmu.fmu.meta_data import meta_data
@@ -340,7 +340,7 @@ def signed_fmu(keys: Path, made_once: Made) -> Path:
     def fill(folder: Path) -> None:
         path = folder / "refit.fmu"
         with without_page():
-            built = build(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
+            built = build_fmu(load_vehicle(_REFIT), path, backend="pythonfmu", sign=keys / "key")
         assert [*built.written] == [path, path.with_name("refit.fmu.sig")]
 
     return made_once("signed", fill) / "refit.fmu"
@@ -439,7 +439,7 @@ def test_a_signed_fmu_is_built_again_without_force(
     monkeypatch.setattr("rov_fmu.build._content", lambda *_, **__: pytest.fail("it is not refused"))
     fmu = Path(shutil.copy(signed_fmu, tmp_path))
     signature = Path(shutil.copy(f"{signed_fmu}.sig", tmp_path))
-    rebuild = partial(build, load_vehicle(_REFIT), fmu, backend="pythonfmu", sign=keys / "key")
+    rebuild = partial(build_fmu, load_vehicle(_REFIT), fmu, backend="pythonfmu", sign=keys / "key")
     with pytest.raises(pytest.fail.Exception):
         rebuild()
     signature.write_text("my work", encoding="ascii")

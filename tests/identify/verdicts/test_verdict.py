@@ -9,19 +9,19 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
-from rov_fmu.identify.result import AxisResult, Effect, Point, Slip, score_of
+from rov_fmu.identify.result import AxisResult, IdentifiedEffect, MeasuredPoint, Slip, score_of
 from rov_fmu.identify.verdict import RULES, WORDS, verdict
 from tests.report import results
 
 DEPTH = results.prediction(HEAVE, "depth", span=10.0)
 WORSE = replace(DEPTH, error=0.8, unchanged=0.7)
-SLOW = Effect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
+SLOW = IdentifiedEffect("lag", "", "time constant of the thrusters", 0.6, (0.5, 0.7), "s", 12.0, 2.6)
 FORCE = results.disturbance("slow force", SURGE, "log.csv", 1.0, "N", 0.06, None, 9.0)
 
 
-def point(off: float) -> Point:
+def point(off: float) -> MeasuredPoint:
     """A row of a table that is predicted without itself with this relative error."""
-    return Point("heave", "V_ss", "m/s", "steady_heave.csv", 0.3, 0.2, 0.2, 0.2 * (1.0 + off), counts=True)
+    return MeasuredPoint("heave", "V_ss", "m/s", "steady_heave.csv", 0.3, 0.2, 0.2, 0.2 * (1.0 + off), counts=True)
 
 
 def scored(score: float) -> list[Any]:

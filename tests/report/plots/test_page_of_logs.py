@@ -9,7 +9,7 @@ from lxml import html
 from matplotlib.figure import Figure
 
 from rov_fmu.cli import main
-from rov_fmu.identify.inspection.inspected import inspect_logs
+from rov_fmu.identify.inspection.inspected import inspect_paths
 from rov_fmu.report.inspection_page import inspection_page
 from rov_fmu.report.plots.logs import plot_log
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -25,7 +25,7 @@ BLUEROV2 = load_vehicle(SHIPPED["bluerov2"])
 @pytest.fixture(scope="module")
 def page(tmp_path_factory: pytest.TempPathFactory) -> str:
     """The page of a dive of six thrusters, which are those of the BlueROV2."""
-    return inspection_page(inspect_logs([LOGS[".tlog"](tmp_path_factory.mktemp("dive"), DIVE)]))
+    return inspection_page(inspect_paths([LOGS[".tlog"](tmp_path_factory.mktemp("dive"), DIVE)]))
 
 
 def test_commands_and_measurements_have_panels_of_one_size_over_one_time(page: str) -> None:

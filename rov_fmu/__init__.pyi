@@ -1,0 +1,74 @@
+"""What type checkers read in place of __init__.py, which imports the public names when they are first used."""
+
+from rov_fmu.bridges.gym import RovEnv as RovEnv
+from rov_fmu.bridges.gym import RovVectorEnv as RovVectorEnv
+from rov_fmu.bridges.jacobian import StepJacobian as StepJacobian
+from rov_fmu.bridges.jacobian import step_jacobian as step_jacobian
+from rov_fmu.bridges.mujoco import load_mujoco as load_mujoco
+from rov_fmu.build import Built as Built
+from rov_fmu.build import build_fmu as build_fmu
+from rov_fmu.c.compile import BuildError as BuildError
+from rov_fmu.c.compile import OptionError as OptionError
+from rov_fmu.equation.alone import steady_velocity as steady_velocity
+from rov_fmu.equation.alone import time_constant as time_constant
+from rov_fmu.equation.layout import Coefficient as Coefficient
+from rov_fmu.equation.layout import Layout as Layout
+from rov_fmu.equation.parts import Curve as Curve
+from rov_fmu.equation.parts import Point as Point
+from rov_fmu.equation.parts import Thruster as Thruster
+from rov_fmu.equation.parts import VehicleAxis as VehicleAxis
+from rov_fmu.identify.findings import by_heading as by_heading
+from rov_fmu.identify.inspection.inspected import Inspected as Inspected
+from rov_fmu.identify.likelihood.kinds import PRIORS as PRIORS
+from rov_fmu.identify.result import Answer as Answer
+from rov_fmu.identify.result import AxisResult as AxisResult
+from rov_fmu.identify.result import Disturbance as Disturbance
+from rov_fmu.identify.result import Identification as Identification
+from rov_fmu.identify.result import IdentifiedCoefficient as IdentifiedCoefficient
+from rov_fmu.identify.result import IdentifiedEffect as IdentifiedEffect
+from rov_fmu.identify.result import Logging as Logging
+from rov_fmu.identify.result import MeasuredPoint as MeasuredPoint
+from rov_fmu.identify.result import NextTest as NextTest
+from rov_fmu.identify.result import Prediction as Prediction
+from rov_fmu.identify.result import SensorNoise as SensorNoise
+from rov_fmu.identify.result import Slip as Slip
+from rov_fmu.identify.result import Verdict as Verdict
+from rov_fmu.identify.tuning import Target as Target
+from rov_fmu.identify.tuning import Tuning as Tuning
+from rov_fmu.identify.tuning import TuningError as TuningError
+from rov_fmu.identify.tuning import tune as tune
+from rov_fmu.interface.identify_command import identify_folder as identify_folder
+from rov_fmu.interface.inspect_command import inspect_logs as inspect_logs
+from rov_fmu.interface.model import VehicleModel as VehicleModel
+from rov_fmu.interface.model import load as load
+from rov_fmu.interface.result import Result as Result
+from rov_fmu.interface.stepper import VehicleStepper as VehicleStepper
+from rov_fmu.io.csv_table import DataFileError as DataFileError
+from rov_fmu.io.csv_table import UnreadableFileError as UnreadableFileError
+from rov_fmu.io.messages import FileError as FileError
+from rov_fmu.io.messages import InputError as InputError
+from rov_fmu.io.messages import ProofError as ProofError
+from rov_fmu.io.messages import RovError as RovError
+from rov_fmu.io.messages import StudyError as StudyError
+from rov_fmu.io.messages import UnknownNameError as UnknownNameError
+from rov_fmu.io.output import WriteError as WriteError
+from rov_fmu.prove.experiments import NoResultsError as NoResultsError
+from rov_fmu.prove.proof import ProofFinding as ProofFinding
+from rov_fmu.prove.proof import prove_fmu as prove_fmu
+from rov_fmu.study.plan.plan import PlanError as PlanError
+from rov_fmu.study.results.results import Results as Results
+from rov_fmu.study.run.run_study import run_study as run_study
+from rov_fmu.tank.findings import Finding as Finding
+from rov_fmu.vehicle.shipped import SHIPPED as SHIPPED
+from rov_fmu.vehicle.shipped import find_vehicle as find_vehicle
+from rov_fmu.vehicle.steady import Steady as Steady
+from rov_fmu.vehicle.uncertainty import Uncertainty as Uncertainty
+from rov_fmu.vehicle.vehicle import Vehicle as Vehicle
+from rov_fmu.vehicle.vehicle import VehicleFileError as VehicleFileError
+from rov_fmu.vehicle.vehicle import load_vehicle as load_vehicle
+from rov_fmu.vehicle.writer import write_tuned as write_tuned
+from rov_fmu.vehicle.writer import write_vehicle as write_vehicle
+
+__version__: str
+HOMES: dict[str, str]
+__all__: list[str]
