@@ -185,7 +185,7 @@ def _predicted(
             compared = objective.run(usual, out.log, table=other, begin=begin, span=span) if other else None
         except DivergedError:
             continue
-        later = inside & (record.time >= record.time[0] + begin)
+        later = inside & record.after(begin)
         for number, m in enumerate(sampled.measured):
             at = later & (record.sensor == number)
             is_left_out = m.sensor.is_velocity and (span < inf) != bool(sampled.lost)

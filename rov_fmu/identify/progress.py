@@ -10,9 +10,9 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.assess import tested_commands
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.objective import OUTLYING, Objective
+from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.records import AHEAD
-from rov_fmu.identify.likelihood.search import SETTLING
+from rov_fmu.identify.likelihood.search import usual
 from rov_fmu.identify.likelihood.solve import Minimum
 from rov_fmu.identify.result import LEAST_TESTED
 from rov_fmu.io.messages import Progress, silent
@@ -94,10 +94,10 @@ def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
     """Return by how much predictions over 10 s are wrong (RMS), in words, with the first quantity of each axis."""
     errors = dict[Axis, dict[Quantity, list[Array]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        off = objective.run(minimum.z, n, begin=SETTLING, span=AHEAD).innovations
-        usual = np.abs(minimum.data[n].normalised) < OUTLYING
+        begin, counts = usual(minimum, n, record)
+        off = objective.run(minimum.z, n, begin=begin, span=AHEAD).innovations
         for number, m in enumerate(sampled.measured):
-            if len(own := off[usual & (record.sensor == number)]):
+            if len(own := off[counts & (record.sensor == number)]):
                 errors.setdefault(m.sensor.axis, {}).setdefault(m.channel.quantity, []).append(own)
     return {axis: _in_words(*next(iter(own.items()))) for axis, own in errors.items()}
 

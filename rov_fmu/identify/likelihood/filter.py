@@ -21,9 +21,9 @@ from rov_fmu.equation.catalogue import HEAVE, REVERSE, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.kinds import Action
 from rov_fmu.io.messages import RovError
+from rov_fmu.tank.arrays import Array, Flags
 from rov_fmu.vehicle.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.intc]
 _Value = TypeVar("_Value")
 Number = float | Array
@@ -99,6 +99,14 @@ class Record:
     """n: the time from which each sample is the mean, s. None: all samples are values of a moment."""
     anew: Indices | None = None
     """m: 0 for a row that goes on with the change of the row before, and shares its delay. None: there is none."""
+
+    def after(self, begin: float) -> Flags:
+        """Return which samples belong to a prediction that starts `begin` (s) after the first one.
+
+        The time is rounded as in `_arrays`. A last sample before the start would have the error of a prediction from
+        the first sample, when the velocities of a vehicle in motion were unknown.
+        """
+        return np.asarray(self.time - self.time[0] >= begin)
 
 
 @dataclass(frozen=True)

@@ -124,8 +124,8 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
     found: dict[Axis, Misfit] = {}
     errors_of = dict[tuple[Axis, bool], list[tuple[float, float]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
-        begin, usual = _usual(best, n, record)
-        masks = [usual & (record.sensor == number) for number in range(len(sampled.measured))]
+        begin, counts = usual(best, n, record)
+        masks = [counts & (record.sensor == number) for number in range(len(sampled.measured))]
         motion = [unchanged(record.time[at], record.value[at], AHEAD) if at.sum() >= _FEWEST else nan for at in masks]
         noise_of = (hypot(m.noise, objective.table.wander(best.z, sampled, m.sensor)) for m in sampled.measured)
         least = [least_error(noise, change) for noise, change in zip(noise_of, motion, strict=True)]
@@ -171,7 +171,7 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         if sampled.is_momentary or sampled.lost:
             continue
-        begin, usual = _usual(best, n, record)
+        begin, counts = usual(best, n, record)
         for span in _LEAST_CHANCE:
             try:
                 run = objective.run(best.z, n, begin=begin, span=span)
@@ -183,7 +183,7 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
             for number, m in enumerate(sampled.measured):
                 own, axis = record.sensor == number, m.sensor.axis
                 noise = hypot(m.noise, table.wander(best.z, sampled, m.sensor))
-                at = usual & own
+                at = counts & own
                 if span == _SOON and at.sum() >= _FEWEST:
                     least = CONSTANTS["least soon"].value * unchanged(record.time[at], record.value[at], _SOON)
                     soon = Misfit(soon=rms(run.innovations[at]) / max(noise, least))
@@ -236,10 +236,10 @@ def _spread(values: Array, weights: Array, most: float) -> float:
     return sqrt((chi2 - free) / (total_weight - weights @ weights / total_weight)) if chi2 > most * free else 0.0
 
 
-def _usual(best: Minimum, n: int, record: Record) -> tuple[float, Flags]:
+def usual(best: Minimum, n: int, record: Record) -> tuple[float, Flags]:
     """Return when the predictions of a log begin, s after its first sample, and which of its samples count."""
     begin = SETTLING + _late(record)
-    return begin, (np.abs(best.data[n].normalised) < OUTLYING) & (record.time >= record.time[0] + begin)
+    return begin, (np.abs(best.data[n].normalised) < OUTLYING) & record.after(begin)
 
 
 def _late(record: Record) -> float:

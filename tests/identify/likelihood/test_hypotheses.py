@@ -30,7 +30,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     twins,
 )
 from rov_fmu.identify.likelihood.kinds import KINDS, TURN
-from rov_fmu.identify.likelihood.objective import Data, Objective
+from rov_fmu.identify.likelihood.objective import Data, Objective, Part
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
@@ -502,26 +502,39 @@ def test_what_the_structure_lacks_changes_speeds_and_times_by_its_size(
             assert np.sqrt(np.diag(covariance)) == pytest.approx([error, error], rel=0.01)
 
 
+def at_truth(folder: Path) -> tuple[Objective, Minimum]:
+    """Return J of dives of a vehicle that ships, and its numbers as a minimum."""
+    objective = Objective.of_known(*begin(load_tests(folder)))
+    z = objective.mean.copy()
+    kinds = np.array([p.kind for p in objective.table.parameters])
+    z[kinds == "lag"] = KINDS["lag"].low
+    z[kinds == "logging offset"] = -KINDS["lag"].low  # without a lag, each row is at the time of its command
+    runs = objective.runs(z)
+    return objective, Minimum(z, 0.0, runs, [Data.of(run, [], len(z)) for run in runs], np.eye(len(z)))
+
+
+def test_a_log_that_begins_in_motion_is_predicted_as_well_as_the_whole_one(tmp_path: Path) -> None:
+    """Its predictions start 5 s after any first sample, and the time of none is rounded to before that."""
+    title, *rows = dive("videoray", Fault(""), np.random.default_rng(3)).splitlines()
+    some = {f"{n:02}.csv": "\n".join([title, *rows[n:]]) + "\n" for n in (0, *range(45, 60))}
+    objective, best = at_truth(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', some))
+    for n, runs in enumerate(best.runs):
+        ratios = structure(objective.of(Part([n], [])), replace(best, runs=[runs], data=[best.data[n]]))
+        assert worst(ratios) < 1.2, n
+
+
 @pytest.mark.parametrize("factor", [1.0, 1.15])
 def test_the_spread_of_the_inertia_from_step_to_step_is_seen(factor: float, tmp_path: Path) -> None:
     """A dive with a larger and one with a smaller inertia, by a vehicle between both. Noise alone has next to none."""
     random = np.random.default_rng(4)
     some = {f"{n}.csv": dive("videoray", Fault("", inertia=factor**power), random) for n, power in enumerate((1, -1))}
-    objective = Objective.of_known(*begin(load_tests(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', some))))
-    z = objective.mean.copy()
-    kinds = np.array([p.kind for p in objective.table.parameters])
-    z[kinds == "lag"] = KINDS["lag"].low
-    z[kinds == "logging offset"] = -KINDS[
-        "lag"
-    ].low  # the vehicle has no lag, and each row is at the time of its command
-    runs = objective.runs(z)
-    best = Minimum(z, 0.0, runs, [Data.of(run, [], len(z)) for run in runs], np.eye(len(z)))
+    objective, best = at_truth(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', some))
     before = structure(objective, best)
     after = with_steps(objective, best, before)
     for axis in (SURGE, YAW):
         assert after[axis].ratio == before[axis].ratio
         assert after[axis].spread == pytest.approx(np.log(factor), rel=0.2, abs=0.02)
-    error = np.diag(unseen_errors(objective, z, {}, {YAW: Misfit(spread=0.2)}))
+    error = np.diag(unseen_errors(objective, best.z, {}, {YAW: Misfit(spread=0.2)}))
     own = [p.of == "yaw" and p.kind == "inertia" for p in objective.table.parameters]
     assert error[own] == pytest.approx(2.0 * 0.01**2 + 0.2**2)
 
