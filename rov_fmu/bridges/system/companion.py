@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from importlib import import_module
 from importlib.util import find_spec
 from itertools import groupby, pairwise
@@ -36,7 +36,9 @@ def slave_of(name: str) -> Any:
 
     It may also have: `terminals`, groups of variables with their name, and the names of the members if they differ;
     `points`, the ports, whose variables end with the name of the port and are in the order of a vehicle's; `places`,
-    the terminals that each one whom it serves has for itself; `columns`, those of its file; and `needs`, a package.
+    the terminals that each one whom it serves has for itself; `behind`, the terminal of each place to whose water it
+    adds; `nodes`, the number of points at which it feels waves; `columns`, those of its file; `limits` of parameters;
+    and `needs`, a package.
     """
     if name == AUTOPILOT:
         return object  # it has no class in Python
@@ -53,19 +55,21 @@ Rows = list[tuple[float, list[list[float]]]]
 """The rows of a table by their times."""
 
 
-def companion(name: str, rows: Rows = [], places: Sequence[str] = (), levels: int = 0) -> bytes:  # noqa: B006
-    """Return the FMU of a companion.
+def companion(name: str, **shape: Any) -> bytes:
+    """Return the FMU of a companion, of a shape.
 
     - `rows`: those of its table, if it takes one.
     - `places`: whom it serves beside the first one, each with terminals of its own.
     - `levels`: with how many levels it passes on or gets a profile of the water; 0 for the usual number.
+    - `lines`: the number of points at which it moves each tether, by the tethers' names.
+    - `waves`: True for a tether that a seaway moves.
     """
     slave = slave_of(name)
     sources = {
         f"{slave.__name__}_slave.py": _FILES[name].read_text(encoding="utf-8").replace(_common.__name__, _COMMON),
         f"{_COMMON}.py": Path(_common.__file__).read_text(encoding="utf-8"),
     }
-    if shape := {key: one for key, one in {"rows": rows, "places": [*places], "levels": levels}.items() if one}:
+    if shape := {key: one for key, one in shape.items() if one}:
         sources["shape.json"] = json.dumps(shape)
     with temporary_folder("companion-") as folder:
         Path(folder, "shape.json").write_text(sources.get("shape.json", "{}"), encoding="utf-8")
@@ -95,7 +99,10 @@ def _description(made: Any, sources: Mapping[str, str]) -> bytes:
         SubElement(defined, "BaseUnit", {base: str(exponent) for base, exponent in exponents.items()})
     for variable in root.iter("ScalarVariable"):
         for kind in variable.iter("Real"):
-            kind.set("unit", made.variables[variable.attrib["name"]][2])
+            name = variable.attrib["name"]
+            kind.set("unit", made.variables[name][2])
+            for key, limit in zip(("min", "max"), getattr(made, "limits", {}).get(name, ()), strict=False):
+                kind.set(key, f"{limit:.16g}")
     for output in root.iter("Unknown"):
         output.set("dependencies", "")
     content = json.dumps([tostring(root, "unicode"), *sources.items()])

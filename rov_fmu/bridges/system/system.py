@@ -43,6 +43,9 @@ from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, rea
 
 _MOST_TOLD = 8
 """The most inputs of a component or a terminal that are told by their names."""
+Served = dict[str, dict[str, str]]
+"""The ends of the names of the places that a companion has, by whom it serves, for each companion."""
+_Line = tuple[str, str, float]
 _MOST_BYTES = 1_000_000_000
 """The most bytes of all FMUs, which are in memory."""
 
@@ -86,7 +89,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
 
 
 def _parts(
-    plan: SystemPlan, path: Path, served: Mapping[str, Sequence[str]], on_part: Callable[[str], object]
+    plan: SystemPlan, path: Path, served: Served, on_part: Callable[[str], object]
 ) -> tuple[dict[str, Part], dict[str, Vehicle]]:
     """Return the FMUs of a plan, and the vehicles whose FMUs are only described, by the first component of each.
 
@@ -97,7 +100,10 @@ def _parts(
     levels = max(map(levels_of, tables.values()), default=0)
     ready: dict[str, Part] = {}
     for name, table in plan.component.items():
-        kind = f"{table.model_dump_json(include={*SOURCES, 'file', 'point', 'port', 'held'})}{served.get(name)}"
+        others = served.get(name, {})
+        is_in_waves = bool(_nodes(plan, name)) and any(f"{name}.waves" in line[:2] for line in plan.connect)
+        own = table.model_dump_json(include={*SOURCES, "file", "point", "port", "held"})
+        kind = f"{own}{others}{is_in_waves}"
         try:
             if kind in ready:
                 part = ready[kind]
@@ -109,7 +115,14 @@ def _parts(
                 part = _autopilot(name, plan, path)
             else:
                 on_part(name)
-                shape = {"rows": tables.get(name, []), "places": served.get(name, [])[1:], "levels": levels}
+                lines = {other: nodes for other in others if (nodes := _nodes(plan, other))}
+                shape = {
+                    "rows": tables.get(name),
+                    "places": [other for other, suffix in others.items() if suffix and other not in lines],
+                    "levels": levels,
+                    "lines": lines,
+                    "waves": is_in_waves,
+                }
                 part = _part(table, path, **shape).with_ports(table.port)
         except FileError as error:
             where = f"{path}: component.{name}.fmu: " if table.fmu else ""
@@ -154,25 +167,46 @@ def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
     return found
 
 
-def _served(plan: SystemPlan) -> tuple[dict[str, list[str]], list[tuple[str, str, float]]]:
-    """Return whom each companion serves at places of their own, and the connections between these places.
+def _served(plan: SystemPlan) -> tuple[Served, list[list[_Line]]]:
+    """Return whom each companion serves at places of their own, and for each line of the plan those between places.
 
-    The first one has the terminals of the companion, and the others those that end with their names.
+    The first vehicle has the terminals of the companion, and the others those that end with their names; so has each
+    tether, which feels waves at many points. What is behind the water of a companion serves all whom that one serves.
     """
-    served: dict[str, list[str]] = {}
-    lines = []
-    for first, second, factor in plan.connect:
-        ends = [first, second]
-        for n, end in enumerate(ends):
-            component, _, name = end.partition(".")
-            table = plan.component.get(component)
-            if table and table.companion and name in dict(getattr(slave_of(table.companion), "places", ())):
-                other = (second, first)[n].partition(".")[0]
-                others = served.setdefault(component, [])
-                others += [other] * (other not in others)
-                ends[n] += f"_{other}" * (other != others[0])
-        lines.append((ends[0], ends[1], factor))
+    served: Served = {}
+
+    def named(end: str, other: str) -> str:
+        """Return the name of an end for whom it serves."""
+        component, _, name = end.partition(".")
+        slave, nodes = _slave(plan, component), _nodes(plan, other)
+        if name == getattr(slave, "behind", None):
+            return f"{end}{served.get(component, {}).get(other, '')}"
+        if name not in dict(getattr(slave, "places", ())) or (nodes and name != "waves"):
+            return end
+        others = served.setdefault(component, {})
+        return f"{end}{others.setdefault(other, f'_{other}' if nodes or '' in others.values() else '')}"
+
+    slaves = {component: _slave(plan, component) for component in plan.component}
+    seas = {f"{component}.{one.behind}": component for component, one in slaves.items() if hasattr(one, "behind")}
+    lines: list[list[_Line]] = [[] for _ in plan.connect]
+    order = sorted(enumerate(plan.connect), key=lambda one: not seas.keys().isdisjoint(one[1]))  # seas last
+    for n, (first, second, factor) in order:
+        others = served.get(seas.get(first) or seas.get(second, ""), {})
+        for other in [name for name in others if not _nodes(plan, name)] or [""]:
+            ends = (named(first, other or second.partition(".")[0]), named(second, other or first.partition(".")[0]))
+            lines[n].append((*ends, factor))
     return served, lines
+
+
+def _slave(plan: SystemPlan, component: str) -> Any:
+    """Return the class of a component that is a companion, or None."""
+    table = plan.component.get(component)
+    return slave_of(table.companion) if table and table.companion else None
+
+
+def _nodes(plan: SystemPlan, component: str) -> int:
+    """Return the number of points at which a component feels waves; 0 for all but tethers."""
+    return getattr(_slave(plan, component), "nodes", 0)
 
 
 def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
@@ -251,13 +285,13 @@ def _set_values(
 
 
 def _connect(
-    plan: SystemPlan, lines: Sequence[tuple[str, str, float]], parts: Mapping[str, Part], connections: list[Connection]
+    plan: SystemPlan, lines: Sequence[Sequence[_Line]], parts: Mapping[str, Part], connections: list[Connection]
 ) -> Iterator[str]:
     """Fill in the connections of some lines, and yield a line of the plan for each that does not fit."""
     taken: dict[tuple[str, str], int] = {}
-    for n, (given, line) in enumerate(zip(plan.connect, lines, strict=True), 1):
+    for n, (given, some) in enumerate(zip(plan.connect, lines, strict=True), 1):
         try:
-            found = connected(*line, parts)
+            found = [one for line in some for one in connected(*line, parts)]
             for one in found:
                 if one.end in taken:
                     before = taken[one.end]
@@ -290,7 +324,7 @@ def _pass_on(
 
 
 def _depths(
-    served: Mapping[str, Sequence[str]],
+    served: Served,
     parts: Mapping[str, Part],
     values: Mapping[str, Mapping[str, Value]],
     connections: Sequence[Connection],
@@ -298,8 +332,7 @@ def _depths(
     """Yield the connections that tell a companion where the vehicles are that it serves, if nothing else tells it."""
     ends = {one.end for one in connections}
     for component, others in served.items():
-        for other in others:
-            suffix = f"_{other}" * (other != others[0])
+        for other, suffix in others.items():
             for member, name in parts[component].terminals[f"pose{suffix}"].items():
                 if (
                     (component, name) not in ends
@@ -312,10 +345,14 @@ def _depths(
 def _seabeds(
     parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
 ) -> Iterator[str]:
-    """Give the water around a tether the seabed that only the tether was told, and yield a line where they differ."""
+    """Give what moves a tether the seabed that only the tether was told, and yield a line where they differ."""
     for one in connections:
         (water, _), (tether, name) = one.start, one.end
-        if name == "depth_1" and "seabed" in parts[water].variables and (depth := values[tether].get("seabed")):
+        if (
+            name in ("depth_1", "V_N_p0")
+            and "seabed" in parts[water].variables
+            and (depth := values[tether].get("seabed"))
+        ):
             other = values[water].setdefault("seabed", depth)
             if other != depth:
                 reason = f"component.{water}.start.seabed is {other}: there is one seabed, which one of them is told"

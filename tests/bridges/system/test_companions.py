@@ -74,7 +74,7 @@ def water_of(folder: Path, text: str, *places: str) -> Any:
     """Return a current with a file, as its FMU has it."""
     (folder / "current.csv").write_text(text, encoding="utf-8")
     rows = rows_of(folder / "current.csv", Current.columns)
-    with zipfile.ZipFile(BytesIO(companion("current", rows, places, levels_of_rows(rows)))) as fmu:
+    with zipfile.ZipFile(BytesIO(companion("current", rows=rows, places=places, levels=levels_of_rows(rows)))) as fmu:
         fmu.extract("resources/shape.json", folder)
     return Current(instance_name="water", resources=folder / "resources")
 
@@ -203,7 +203,7 @@ def test_what_the_seabed_and_the_numbers_forbid_is_told() -> None:
     made: Any = slave_of("tether")(instance_name="tether")
     made.mass = 0.0
     assert not made.do_step(0.0, 0.1)
-    assert made.log_queue[0].msg == "MoorDyn: mass must be more than 0"
+    assert made.log_queue[0].msg == "MoorDyn: mass must be from 0.0001 to 10000: 0"
 
 
 @pytest.mark.parametrize("h", [0.02, 0.1])

@@ -17,10 +17,12 @@ from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
 from rov_fmu.cli import main
 from rov_fmu.fmu.terminals import port_of
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle, read_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, read_vehicle
+from rov_fmu.vehicle.writer import vehicle_text
 from tests.bridges.system.fmus import described, foreign, undescribed_build
 from tests.commands import ROOT, without_progress
 from tests.often import spread
+from tests.vehicles import in_waves
 
 PLAN = """
 step = 0.1
@@ -155,6 +157,11 @@ WRONG = {
     "a loop of one": (LAST, '["a.y", "a.u"],', "connect: a.y -> a.u -> a.y is a loop without delay"),
     "a start value of nothing": ("length = 20.0", "lenght = 20.0", "tether.start.lenght = 20.0: the FMU has no"),
     "a calculated start": ("length = 20.0", "tension_top = 2.0", "cannot be set, because the FMU computes it"),
+    "a start that cannot be": (
+        "length = 20.0",
+        "mass = 0.0",
+        "tether.start.mass = 0.0: must be within 0.0001 ... 10000",
+    ),
     "a start that is text": ("length = 20.0", 'length = "20"', "must be a number"),
     "a start out of bounds": ('fmu = "foreign.fmu"', 'fmu = "foreign.fmu"\nstart = { k = 11 }', "must be within 0"),
     "a file that is no FMU": ("foreign.fmu", "broken.fmu", "broken.fmu: is not an FMU, or is damaged"),
@@ -274,6 +281,59 @@ def test_a_field_and_ports_of_the_plan_are_handed_on() -> None:
     assert sources["cage", "z"] == (("deep", "V_N"), ("cage", "z"), 10.0), "a member is 0.1 of this variable"
     told = [*system.unconnected(plan, found)]
     assert "one: the velocity of top is the change of its place, because it is not connected" in told
+
+
+SEA = """
+step = 0.1
+stop_time = 1.0
+connect = [
+  ["water.current", "sea.steady"], ["sea.waves", "line.waves"], ["water.profile", "line.profile"],
+  ["sea.current", "a.current"], ["sea.waves", "a.waves"], ["b.current", "sea.current"], ["b.point_bow", "line.bottom"],
+]
+[component.a]
+vehicle = "rov.toml"
+[component.b]
+vehicle = "rov.toml"
+point = { bow = [0.2, 0.0, -0.1] }
+start = { z = 4.0 }
+[component.line]
+companion = "tether"
+start = { seabed = 25.0 }
+[component.sea]
+companion = "seaway"
+[component.water]
+companion = "current"
+"""
+
+
+@pytest.mark.usefixtures("folder")
+def test_a_sea_serves_vehicles_with_their_own_currents_and_every_node_of_a_tether(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    Path("rov.toml").write_text(vehicle_text(in_waves(load_vehicle(VIDEORAY))))
+    Path("plan.toml").write_text(SEA)
+    plan = load_system_plan(Path("plan.toml"))
+    found = system.made(plan, Path("plan.toml"))
+    sources = {one.end: one.start for one in found.connections}
+    assert sources["b", "V_N"] == ("sea", "V_N_b")
+    assert sources["sea", "U_N"] == ("water", "V_N"), "the current of each place is asked at the vehicle's own depth"
+    assert sources["water", "z"] == ("a", "z")
+    assert sources["sea", "U_N_b"] == ("water", "V_N_b")
+    assert sources["water", "z_b"] == ("b", "z")
+    assert found.values["water"] == {"z_b": 4.0, "seabed": 25.0}
+    assert found.values["sea"] == {"z_b": 4.0, "seabed": 25.0, "step": 0.1}
+    for n in (0, 20):
+        assert sources["line", f"A_D_p{n}"] == ("sea", f"A_D_line_{n}")
+        assert sources["sea", f"x_line_{n}"] == ("line", f"x_p{n}")
+    assert not {name for name in found.parts["sea"].variables if name.startswith("U_N_line")}
+    assert not [line for line in system.unconnected(plan, found) if line.startswith(("sea", "water"))]
+    lines = told(
+        SEA.replace("seabed = 25.0", "seabed = 25.0, mass = -1").replace('seaway"', 'seaway"\nstart.H_s = -1'), capsys
+    )
+    assert [line.partition("component.")[2] for line in lines] == [
+        "line.start.mass = -1: must be within 0.0001 ... 10000 kg/m",
+        "sea.start.H_s = -1: must be within 0 ... 100 m",
+    ]
 
 
 @pytest.mark.usefixtures("folder")

@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from rov_fmu.bridges.system.companions.seaway import Seaway
+from rov_fmu.bridges.system.companion import slave_of
+from rov_fmu.bridges.system.companions.seaway import VARIABLES, Seaway
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -152,6 +153,100 @@ def test_a_floating_vehicle_rides_a_long_wave() -> None:
     assert np.abs(path[[*late], 2] + surface - np.mean(path[[*late], 2] + surface)).max() < 0.02 * np.ptp(surface)
 
 
+TAUT = {"length": 19.9, "mass": 0.5, "diameter": 0.03, "EA": 1e7, "z_top": 3.0, "y_bottom": 12.0, "z_bottom": 19.0}
+"""A line of 20 m that hangs obliquely and is so taut that waves do not move it."""
+SHORT = {
+    "length": 1.1,
+    "mass": 1025.0 * pi / 4.0 * 0.03**2,
+    "diameter": 0.03,
+    "z_top": 2.0,
+    "y_bottom": 0.6,
+    "z_bottom": 2.8,
+}
+"""A neutral line of 1.1 m between ends that are 1 m apart."""
+
+
+def line_in(
+    made: Any, folder: Path, h: float, seconds: float, ends: dict[str, float], *, carried: bool = False
+) -> Array:
+    """Return time, force of both ends, and the position of the middle of a tether in a sea, a row for each step.
+
+    Both exchange their outputs once per step. `carried`: the ends move with the particles of water there.
+    """
+    pytest.importorskip("moordyn")
+    (folder / "shape.json").write_text('{"waves": true, "lines": {"line": 21}}')
+    line: Any = slave_of("tether")(instance_name="line", resources=folder)
+    water_of_line: Any = Seaway(instance_name="sea", resources=folder)
+    vars(water_of_line).update({name: getattr(made, name) for name in VARIABLES} | {"step": h})
+    water_of_line.exit_initialization_mode()
+    vars(line).update(ends)
+    rows = []
+    for n in range(round(seconds / h)):
+        for end in ("top", "bottom") if carried else ():
+            place = [getattr(line, f"{x}_{end}") for x in "xyz"]
+            middle = place + 0.5 * h * water(made, n * h, *place)[:3]
+            V = water(made, (n + 0.5) * h, *middle)[:3]  # the middle of a step, of second order
+            vars(line).update({f"vg_{d}_{end}": v for d, v in zip("NED", V, strict=True)})
+        given = {f"{name}_p{k}": getattr(water_of_line, f"{name}_line_{k}") for k in range(21) for name in OUTPUTS[:6]}
+        told = {f"{x}_line_{k}": getattr(line, f"{x}_p{k}") for k in range(21) for x in "xyz"}
+        vars(line).update(given)
+        vars(water_of_line).update(told)
+        assert line.do_step(n * h, h)
+        assert water_of_line.do_step(n * h, h)
+        for end in ("top", "bottom"):
+            for x, d in zip("xyz", "NED", strict=True):
+                moved = getattr(line, f"{x}_{end}") + h * getattr(line, f"vg_{d}_{end}")
+                setattr(line, f"{x}_{end}", moved)
+        force = [getattr(line, f"F_{d}_top") + getattr(line, f"F_{d}_bottom") for d in "NED"]
+        rows.append([(n + 1) * h, *force, *(getattr(line, f"{x}_p10") for x in "xyz")])
+    line.terminate()
+    return np.array(rows)
+
+
+@pytest.mark.parametrize("direction", [0.0, 1.0])
+def test_a_tether_feels_the_load_of_morison(direction: float, tmp_path: Path) -> None:
+    """Along the line the force of Froude and Krylov and friction, across it that and the added mass, and drag."""
+    made = sea(components=1, H_s=0.6, T_p=5.0, direction=direction)
+    found = line_in(made, tmp_path, 0.02, 10.0, TAUT)
+    late = found[found[:, 0] > 4.99]
+    ends = np.array([[0.0, 0.0, 3.0], [0.0, 12.0, 19.0]])
+    along = (ends[1] - ends[0]) / 20.0
+    area, load = pi / 4.0 * 0.03**2, []
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    for t in late[::10, 0]:
+        total = np.zeros(3)
+        for node, weight in zip(nodes, weights, strict=True):
+            V, A = np.split(water(made, t, *(ends[0] + 10.0 * (1.0 + node) * along))[:6], 2)
+            V_q, A_q = (one @ along * along for one in (V, A))
+            V_p, A_p = V - V_q, A - A_q
+            drag = 1.2 * 0.03 * np.linalg.norm(V_p) * V_p + 0.02 * pi * 0.03 * np.linalg.norm(V_q) * V_q
+            total += 10.0 * weight * (1025.0 * area * (A_q + 2.0 * A_p) + 0.5 * 1025.0 * drag)
+        load.append(total)
+    expected = np.array(load)
+    weight = (0.5 - 1025.0 * area) * G * 19.9
+    of_line = late[::10, 1:4] - [0.0, 0.0, weight]
+    most = np.abs(expected).max()
+    assert most > 2.0
+    assert np.abs(of_line - expected).max() < 0.03 * most
+
+
+def test_a_neutral_tether_moves_with_the_water(tmp_path: Path) -> None:
+    """With its ends carried by the water, it needs hardly a force, and its middle swings as the water there does.
+
+    It drifts slower than the water, whose convective acceleration is of second order and left out.
+    """
+    made = sea(components=1, H_s=0.2, T_p=5.0)
+    held, carried = (line_in(made, tmp_path, 0.02, 10.0, SHORT, carried=carried) for carried in (False, True))
+    assert np.abs(carried[250:, 1:4]).max() < 0.2 * np.abs(held[250:, 1:4]).max()
+    late = carried[250:]
+    t, omega = late[:, 0], 2.0 * pi / 5.0
+    basis = np.stack([np.cos(omega * t), np.sin(omega * t), np.ones_like(t), t], axis=1)
+    speed = np.gradient(late[:, 4:], t, axis=0)
+    there = np.array([water(made, row[0], *row[4:])[:3] for row in late])
+    of_line, of_water = (np.linalg.lstsq(basis, one, rcond=None)[0][:2] for one in (speed, there))
+    assert np.abs(of_line - of_water).max() < 0.03 * np.abs(of_water).max()
+
+
 @pytest.mark.parametrize(("name", "value"), [("T_p", 0.0), ("H_s", -1.0), ("seabed", float("nan"))])
 def test_a_sea_that_cannot_be_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name} must be from"):
@@ -170,6 +265,24 @@ def test_a_vehicle_that_the_current_passes_is_refused_in_a_sea(
     )
     assert main(["system", "sea.toml", "-o", "sea.ssp"]) == 2
     assert 'sea.current moves rov, whose vehicle file has current = "passes"' in capsys.readouterr().err
+
+
+def test_a_tether_is_moved_by_the_sea_of_a_plan(tmp_path: Path) -> None:
+    """FMPy runs both FMUs, and the tether gets what the classes above exchange."""
+    pytest.importorskip("moordyn")
+    values = ", ".join(f"{name} = {value}" for name, value in TAUT.items())
+    plan = (
+        'step = 0.1\nstop_time = 3\nconnect = [["line.waves", "sea.waves"]]\n'
+        f'[component.line]\ncompanion = "tether"\nstart = {{ {values} }}\n[component.sea]\ncompanion = "seaway"\n'
+        "start = { components = 1, H_s = 0.6, T_p = 5 }\n"
+    )
+    (tmp_path / "line.toml").write_text(plan)
+    assert main(["system", str(tmp_path / "line.toml"), "-o", str(tmp_path / "line.ssp"), "--run"]) == 0
+    motion = np.genfromtxt(tmp_path / "line.csv", delimiter=",", names=True, deletechars="")
+    expected = line_in(sea(components=1, H_s=0.6, T_p=5.0), tmp_path, 0.1, 3.0, TAUT)
+    of_line = motion["line.F_N_top"] + motion["line.F_N_bottom"]
+    np.testing.assert_allclose(of_line[1:], expected[:, 1], rtol=1e-9, atol=1e-9)
+    assert np.ptp(of_line) > 2.0
 
 
 @pytest.mark.long

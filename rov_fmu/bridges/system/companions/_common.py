@@ -11,7 +11,9 @@ Variables = dict[str, tuple[str, float | bool, str, str]]
 """Causality, start value, unit and description by name."""
 LEVELS = 16
 """The levels of a profile of the water; a file may have more rows."""
-WATER = (("V_N", "northward"), ("V_E", "eastward"), ("V_D", "downward"))
+DIRECTIONS = ("northward", "eastward", "downward")
+VELOCITY, ACCELERATION = ("V_N", "V_E", "V_D"), ("A_N", "A_E", "A_D")
+WATER = tuple(zip(VELOCITY, DIRECTIONS, strict=True))
 
 
 def shape_of(arguments: dict[str, Any]) -> dict[str, Any]:
@@ -29,6 +31,13 @@ def register(slave: Any, variables: Variables, parameters: str = "tunable") -> N
         kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
         how = Fmi2Variability[parameters if causality == "parameter" else changes]
         slave.register_variable(kind(name, description=text, causality=Fmi2Causality[causality], variability=how))
+
+
+def check(slave: Any) -> None:
+    """Raise ValueError if a parameter is outside of the limits that its description has as min and max."""
+    for name, (low, high) in slave.limits.items():
+        if not low <= getattr(slave, name) <= high:
+            raise ValueError(f"{name} must be from {low:g} to {high:g}: {getattr(slave, name):g}")
 
 
 def profile(levels: int, causality: str) -> Variables:

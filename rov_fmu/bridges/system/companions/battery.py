@@ -6,11 +6,12 @@ a resistance. By Peukert's law, a current I empties it in the time H (C / (H I))
 """
 
 from math import sqrt
+from typing import ClassVar
 
 from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.bridges.system.companions._common import Variables, register
+from rov_fmu.bridges.system.companions._common import Variables, check, register
 
 THRUSTS = ("F_l", "F_r", "F_t")
 
@@ -44,6 +45,16 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
     description = "A battery: from electric power or thrusts to the voltage"
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
     terminals = (("electric", ("electric_power",)), ("battery", ("voltage",)))
+    limits: ClassVar = {
+        "E_full": (0.01, 1e5),
+        "E_empty": (0.01, 1e5),
+        "capacity": (1e-6, 1e6),
+        "peukert": (1.0, 2.0),
+        "rated_time": (1e-3, 1e4),
+        "resistance": (0.0, 1e4),
+        "hotel_load": (0.0, 1e6),
+        "k_P": (0.0, 1e6),
+    }
 
     electric_power: float
     drawn: float
@@ -61,7 +72,8 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
         register(self, VARIABLES)
 
     def exit_initialization_mode(self) -> None:
-        """Begin full."""
+        """Begin full. Raises ValueError for a battery that cannot be."""
+        check(self)
         self.voltage = self.E_full
 
     def do_step(self, current_time: float, step_size: float) -> bool:  # noqa: ARG002

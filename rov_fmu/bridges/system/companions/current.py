@@ -10,10 +10,11 @@ between which the velocity is on straight lines. They are the rows of the file, 
 
 from bisect import bisect_right
 from math import cos, sin
+from typing import ClassVar
 
 from pythonfmu import DefaultExperiment, Fmi2Slave
 
-from rov_fmu.bridges.system.companions._common import LEVELS, WATER, Variables, at, profile, register, shape_of
+from rov_fmu.bridges.system.companions._common import LEVELS, WATER, Variables, at, check, profile, register, shape_of
 
 # name: causality, start, unit, description
 VARIABLES: Variables = {
@@ -45,6 +46,8 @@ class Current(Fmi2Slave):  # type: ignore[misc]
     places = (("pose", ("z",)), ("current", ("V_N", "V_E", "V_D")))
     """The terminals that each vehicle has for itself; those of all but the first end with its name."""
 
+    limits: ClassVar = {"speed": (-100.0, 100.0), "exponent": (0.0, 100.0), "rise": (0.0, 1e6), "seabed": (0.01, 1e6)}
+
     speed: float
     direction: float
     exponent: float
@@ -67,7 +70,8 @@ class Current(Fmi2Slave):  # type: ignore[misc]
         register(self, variables)
 
     def exit_initialization_mode(self) -> None:
-        """Begin with the water at the start."""
+        """Begin with the water at the start. Raises ValueError for a current that cannot be."""
+        check(self)
         self._set(0.0)
 
     def do_step(self, current_time: float, step_size: float) -> bool:

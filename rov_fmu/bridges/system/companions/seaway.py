@@ -2,7 +2,8 @@
 
 Each vehicle has a place in the water, where it gets the velocity and the acceleration of the water and the elevation of
 the surface. It holds them over the next step, so they are those of the middle of that step, where the vehicle then is
-if it moves on as in the last step. The waves add to the current that is connected.
+if it moves on as in the last step. The waves add to the current that is connected. A tether gets velocity and
+acceleration at each of its points, of the waves alone, for it has a current by its profile.
 
 A wave a cos(phase) of the surface has the phase omega t - k (x cos theta + y sin theta) + epsilon, and omega^2 =
 g k tanh(k d) in water of the depth d (Airy's theory; DNV-RP-C205, 3.2.2). The frequencies are drawn within equal parts
@@ -12,17 +13,24 @@ mean level, the water moves as there.
 
 from math import cos, exp, pi, sin, sqrt, tanh
 from random import Random
+from typing import ClassVar
 
 from pythonfmu import DefaultExperiment, Fmi2Slave
 
-from rov_fmu.bridges.system.companions._common import Variables, register, shape_of
+from rov_fmu.bridges.system.companions._common import (
+    ACCELERATION,
+    DIRECTIONS,
+    VELOCITY,
+    Variables,
+    check,
+    register,
+    shape_of,
+)
 
 G = 9.80665
 RANGE = (0.5, 4.0)  # of the frequencies over that of the peak: 99.7 % of the energy for gamma = 3.3
 MOST = 1000  # components
-WORDS = ("northward", "eastward", "downward")
 PLACE, STEADY = ("x", "y", "z"), ("U_N", "U_E", "U_D")
-VELOCITY, ACCELERATION = ("V_N", "V_E", "V_D"), ("A_N", "A_E", "A_D")
 
 # name: causality, start, unit, description
 VARIABLES: Variables = {
@@ -38,19 +46,24 @@ VARIABLES: Variables = {
 }
 
 
-def place(suffix: str) -> Variables:
-    """Return the variables of a place in the water."""
+def point(suffix: str, *, steady: bool) -> Variables:
+    """Return the variables of a point in the water; `steady`: with the current there."""
     groups = (
-        (PLACE, "input", "m", "Position of the vehicle"),
-        (STEADY, "input", "m/s", "Current to which the waves add"),
+        (PLACE, "input", "m", "Position of the vehicle" if steady else "Position of the point"),
+        *([(STEADY, "input", "m/s", "Current to which the waves add")] * steady),
         (VELOCITY, "output", "m/s", "Velocity of the water there"),
         (ACCELERATION, "output", "m/s2", "Acceleration of the water there"),
     )
-    found: Variables = {
+    return {
         f"{name}{suffix}": (causality, 0.0, unit, f"{what}, {to}")
         for names, causality, unit, what in groups
-        for name, to in zip(names, WORDS, strict=True)
+        for name, to in zip(names, DIRECTIONS, strict=True)
     }
+
+
+def place(suffix: str) -> Variables:
+    """Return the variables of a vehicle's place in the water."""
+    found = point(suffix, steady=True)
     return found | {f"elevation{suffix}": ("output", 0.0, "m", "Elevation of the surface there, positive upward")}
 
 
@@ -62,6 +75,17 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
     places = (("pose", PLACE), ("current", VELOCITY), ("waves", (*ACCELERATION, "elevation")))
     """The terminals that each vehicle has for itself; those of all but the first end with its name."""
+    behind = "steady"
+    """The terminal of each place that takes the water to which the waves add."""
+    limits: ClassVar = {
+        "H_s": (0.0, 100.0),
+        "T_p": (0.01, 1e3),
+        "gamma": (1.0, 20.0),
+        "spreading": (0.0, 1e3),
+        "components": (1.0, MOST),
+        "seabed": (0.01, 1e6),
+        "step": (0.0, 1e3),
+    }
 
     H_s: float
     T_p: float
@@ -77,7 +101,9 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
         super().__init__(**arguments)
         self.before: dict[str, list[float]] = {}
         self.waves: list[tuple[float, ...]] = []
-        self.suffixes = ["", *(f"_{name}" for name in shape_of(arguments).get("places", ()))]
+        shape = shape_of(arguments)
+        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
+        self.lines = {name: [f"_{name}_{n}" for n in range(count)] for name, count in shape.get("lines", {}).items()}
         variables = place("") | VARIABLES
         self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = []
         for suffix in self.suffixes:
@@ -85,22 +111,17 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
             for port, names in self.places:
                 self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
             self.terminals.append((f"steady{suffix}", [f"{name}{suffix}" for name in STEADY], VELOCITY))
+        for line, suffixes in self.lines.items():
+            for port, some in (("pose", PLACE), ("waves", (*VELOCITY, *ACCELERATION))):
+                own = [f"{name}{suffix}" for suffix in suffixes for name in some]
+                members = tuple(f"{name}_p{n}" for n in range(len(suffixes)) for name in some)
+                self.terminals.append((f"{port}_{line}", own, members))
+            variables |= {name: one for suffix in suffixes for name, one in point(suffix, steady=False).items()}
         register(self, variables, "fixed")
 
     def exit_initialization_mode(self) -> None:
         """Draw the waves, and begin with the middle of the first step. Raises ValueError for a sea that cannot be."""
-        least = {
-            "H_s": 0.0,
-            "T_p": 0.01,
-            "gamma": 1.0,
-            "spreading": 0.0,
-            "components": 1.0,
-            "seabed": 0.01,
-            "step": 0.0,
-        }
-        for name, low in least.items():
-            if not low <= getattr(self, name) < 1e6:
-                raise ValueError(f"{name} must be from {low:g} to 1e6: {getattr(self, name):g}")
+        check(self)
         self.waves = self._drawn()
         for suffix in self.suffixes:
             self._put(suffix, 0.5 * self.step, self._place(suffix))
@@ -113,6 +134,11 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
             ahead = [x + 1.5 * (x - was) for x, was in zip(now, before, strict=True)]
             self._put(suffix, current_time + 1.5 * step_size, ahead)
             self.before[suffix] = now
+        for suffixes in self.lines.values():
+            points = [self._place(suffix) for suffix in suffixes]
+            if any(map(any, points)):  # a tether has told its points after its first step
+                for suffix, now in zip(suffixes, points, strict=True):
+                    self._put(suffix, current_time + 1.5 * step_size, now)
         return True
 
     def _place(self, suffix: str) -> list[float]:
@@ -159,7 +185,7 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
         return k
 
     def _put(self, suffix: str, t: float, at: list[float]) -> None:
-        """Set the outputs of a place: sums over the components."""
+        """Set the outputs of a place or a point: sums over the components."""
         x, y, z = at
         V, A, elevation = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 0.0
         depth = min(max(z, 0.0), self.seabed)
@@ -174,6 +200,6 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
                 A[n] += omega**2 * share * rate
             elevation += c
         for n, (velocity, acceleration, steady) in enumerate(zip(VELOCITY, ACCELERATION, STEADY, strict=True)):
-            setattr(self, f"{velocity}{suffix}", getattr(self, f"{steady}{suffix}") + V[n])
+            setattr(self, f"{velocity}{suffix}", getattr(self, f"{steady}{suffix}", 0.0) + V[n])
             setattr(self, f"{acceleration}{suffix}", A[n])
-        setattr(self, f"elevation{suffix}", elevation)
+        setattr(self, f"elevation{suffix}", elevation)  # of a point of a tether it is no output

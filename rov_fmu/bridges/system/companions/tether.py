@@ -4,20 +4,36 @@ Each end is a port: place and velocity over ground go in, and the force that the
 that is not connected stays where it starts. The tether hangs at rest when the first step begins, and pulls from the
 second step on. Places are north, east and down from the surface; in MoorDyn x is north, y west, z up.
 
+The water flows with the profile of a current, and with the waves that a seaway tells at each node, for the middle of
+the step. MoorDyn takes the force of Froude and Krylov along and across the line, and of the added mass across it.
+
 The seabed pushes with GROUND for each metre of depth and diameter, and damps as much as brings a node to rest soonest:
 MoorDyn's own damping is so large that a node would need some 100 times smaller substeps.
 """
 
+from collections.abc import Sequence
 from math import ceil, hypot, pi, sqrt
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import ClassVar
 
 from pythonfmu import DefaultExperiment, Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
-from rov_fmu.bridges.system.companions._common import Variables, at, profile, register, shape_of
+from rov_fmu.bridges.system.companions._common import (
+    ACCELERATION,
+    DIRECTIONS,
+    VELOCITY,
+    Variables,
+    at,
+    check,
+    profile,
+    register,
+    shape_of,
+)
 
 SEGMENTS, SHOWN = 20, 11  # of the line, the points of its shape
+NODES = SEGMENTS + 1
 SUBSTEP = 0.2  # of the time in which a wave of tension passes a segment: twice as much can be unstable
 GROUND = 1e5  # stiffness of the seabed, Pa/m
 DEPTH = 100.0  # of the seabed, where nothing tells it, m
@@ -47,6 +63,18 @@ VARIABLES |= {
     for n in range(SHOWN)
     for _, x, to in AXES
 }
+WAVES: Variables = {
+    f"{name}_p{n}": ("input", 0.0, unit, f"{what} of the water in waves at node {n} from the upper end, {to}")
+    for n in range(NODES)
+    for names, unit, what in ((VELOCITY, "m/s", "Velocity"), (ACCELERATION, "m/s2", "Acceleration"))
+    for name, to in zip(names, DIRECTIONS, strict=True)
+}
+PLACES: Variables = {
+    f"{x}_p{n}": ("output", 0.0, "m", f"Position of node {n} from the upper end, {to}")
+    for n in range(NODES)
+    for _, x, to in AXES
+}
+"""What a tether has in a plan where its terminal `waves` is connected."""
 
 
 FILE = """tether
@@ -83,14 +111,32 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
     default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
     needs = "moordyn"
     points = tuple(ENDS)
+    nodes = NODES
+    """The number of its points at which it feels waves."""
+    limits: ClassVar = {
+        "length": (0.01, 1e6),
+        "diameter": (1e-4, 10.0),
+        "mass": (1e-4, 1e4),
+        "EA": (1.0, 1e12),
+        "C_d": (0.0, 100.0),
+        "C_d_along": (0.0, 100.0),
+        "rho": (0.0, 1e4),
+        "seabed": (0.0, 1e6),
+    }
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
         self.system: object = None
         self.history: list[list[float]] = []
-        self.levels = profile(shape_of(arguments).get("levels", 0), "input")
-        self.terminals = (("profile", [*self.levels]),)
-        register(self, VARIABLES | self.levels, "fixed")
+        shape = shape_of(arguments)
+        self.levels = profile(shape.get("levels", 0), "input")
+        self.terminals = [("profile", [*self.levels])]
+        variables = VARIABLES | self.levels
+        if shape.get("waves"):
+            self.terminals += [("pose", [*PLACES]), ("waves", [*WAVES])]
+            variables |= PLACES | WAVES
+        self.told = range(NODES if shape.get("waves") else 0)
+        register(self, variables, "fixed")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Hold the velocities of the ends for a step. A step that MoorDyn cannot do is refused."""
@@ -102,20 +148,25 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
             if self.system is None:
                 self._begin(places, levels, h)
             own, moordyn = self.__dict__, self.moordyn
-            nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)
-            water = [current(levels, -z) for _, _, z in nodes]
-            moordyn.ExternalWaveKinSet(self.system, water, [[0.0, 0.0, 0.0]] * len(nodes), t)
+            nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)  # those of the line, then of the ends
+            water, acceleration = [current(levels, -z) for _, _, z in nodes], [[0.0, 0.0, 0.0] for _ in nodes]
+            for n in self.told:
+                waves = self._of_water(VELOCITY, n)
+                water[n] = [steady + wave for steady, wave in zip(water[n], waves, strict=True)]
+                acceleration[n] = self._of_water(ACCELERATION, n)
+            moordyn.ExternalWaveKinSet(self.system, water, acceleration, t)
             forces = moordyn.Step(self.system, places, self._velocities(places, h), t, h)
-        except (ImportError, RuntimeError) as error:
+        except (ImportError, RuntimeError, ValueError) as error:
             self.log(f"MoorDyn: {error}", Fmi2Status.error)
             return False
         for n, end in enumerate(ENDS):
             x, y, z = forces[3 * n : 3 * n + 3]
             own |= {f"F_N_{end}": x, f"F_E_{end}": -y, f"F_D_{end}": -z, f"tension_{end}": hypot(x, y, z)}
         line = moordyn.GetLine(self.system, 1)
-        for n in range(SHOWN):
-            x, y, z = moordyn.GetLineNodePos(line, n * SEGMENTS // (SHOWN - 1))
-            own |= {f"x_{n}": x, f"y_{n}": -y, f"z_{n}": -z}
+        for numbers, apart, mark in ((range(SHOWN), SEGMENTS // (SHOWN - 1), ""), (self.told, 1, "p")):
+            for n in numbers:
+                x, y, z = moordyn.GetLineNodePos(line, n * apart)
+                own |= {f"x_{mark}{n}": x, f"y_{mark}{n}": -y, f"z_{mark}{n}": -z}
         return True
 
     def terminate(self) -> None:
@@ -128,9 +179,8 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
         import moordyn
 
         self.moordyn = moordyn
+        check(self)
         own = self.__dict__
-        if wrong := [name for name in ("length", "diameter", "mass", "EA") if not own[name] > 0.0]:
-            raise RuntimeError(f"{wrong[0]} must be more than 0")
         ground = own["seabed"] or levels[-1][0] or DEPTH
         for n, end in enumerate(ENDS.values()):
             if -ends[3 * n + 2] > ground:
@@ -175,6 +225,11 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
                 for k in range(3 * n, 3 * n + 3):
                     found[k] = sum(factor * past[k] for factor, past in zip(factors, self.history, strict=True)) / h
         return found
+
+    def _of_water(self, names: Sequence[str], n: int) -> list[float]:
+        """Return a vector of the water in waves at a node in the frame of MoorDyn."""
+        north, east, down = (getattr(self, f"{name}_p{n}") for name in names)
+        return [north, -east, -down]
 
     def _of_ends(self, axes: str, name: str) -> list[float]:
         """Return a vector of both ends in the frame of MoorDyn."""
