@@ -187,7 +187,7 @@ WRONG = {
 def test_what_does_not_fit_is_one_line(
     case: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delattr(system, "build")  # nothing is compiled for a plan that does not fit
+    monkeypatch.delattr(system, "build_fmu")  # nothing is compiled for a plan that does not fit
     old, new, message = WRONG[case]
     assert old in PLAN
     # Of the two foreign FMUs, one is replaced, and is connected to the vehicle.
