@@ -1,5 +1,4 @@
-"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, system, study, identify, inspect, tune, schema,
-tables.
+"""The command rov-fmu: list, build, simulate, fly, sitl, export, prove, system, study, identify, inspect, tune, schema.
 
 Each command is a short function that imports its modules only when it is called. Therefore `--help` and completion are
 fast.
@@ -154,6 +153,13 @@ _force_option = partial(
 _set_option = partial(click.option, "--set", "settings", multiple=True, type=_setting, metavar="NAME=VALUE")
 
 
+_GONE = {
+    ("sdf",): "rov-fmu export --to sdf",
+    ("tables",): "python -m verification.tables in a checkout",
+    ("identify", "--inspect"): "rov-fmu inspect",
+    ("identify", "--draft"): "rov-fmu inspect --draft",
+}
+"""The words of commands of earlier versions, and what does the same now."""
 _SECTIONS = ("Your vehicle", "At work", "For others")
 
 
@@ -183,6 +189,13 @@ class _Commands(click.Group):
         for title, own in zip(_SECTIONS, rows, strict=True):
             with formatter.section(title):
                 formatter.write_dl(own)
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> Any:
+        """Return the command that the arguments name. Raises UsageError with what a command that is gone is now."""
+        for words, now in _GONE.items():
+            if args[0] == words[0] and {*words} <= {*args}:
+                raise click.UsageError(f"{' '.join(words)} is gone: use {now}")
+        return super().resolve_command(ctx, args)
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002
         """Return the names of the commands in the order of the sections."""
@@ -390,10 +403,10 @@ def _simulate(vehicle: Path, wanted: tuple[str, ...], **options: Any) -> None:
     Inputs that are not set have their usual values, and states start at 0. Without -o and --plot the values at the end
     are printed.
     """
-    from rov_fmu.interface.simulate_command import Options, find_speeds, simulate_vehicle
+    from rov_fmu.interface.simulate_command import find_speeds, simulate_vehicle
 
     if not wanted:
-        simulate_vehicle(vehicle, Options(**options))
+        simulate_vehicle(vehicle, **options)
         return
     if others := [name for name, value in options.items() if value not in (None, False) and name != "settings"]:
         option = {"commands": "input"}.get(others[0], others[0])
@@ -519,20 +532,34 @@ def _fly(
     show_default=True,
     help="UDP port to listen on; 0 takes a free one.",
 )
-def _sitl(vehicle: Path, servos: tuple[str, ...], settings: tuple[str, ...], **options: Any) -> None:
+def _sitl(vehicle: Path, **options: Any) -> None:
     """Simulate a vehicle for ArduPilot's simulator, which runs ArduSub with --model JSON.
 
     ArduSub is started in another terminal. With --duration, or at Ctrl-C, the log is written.
     """
-    from rov_fmu.interface.sitl_command import Options, serve
+    from rov_fmu.interface.sitl_command import serve
 
-    serve(vehicle, Options(servos=servos, settings=settings, **options))
+    serve(vehicle, **options)
 
 
 # ---- export ----------------------------------------------------------------------------------------------------------
 
-_added_mass = partial(click.option, "--added-mass", type=_Choice(["link", "plugin"]))
-_world = partial(click.option, "--world", "in_world", is_flag=True)
+
+class _OptionOf(click.Option):
+    """An option that one format of `--to` has: its help says so, and all others refuse it."""
+
+    def __init__(self, names: Sequence[str], *, only: str, help: str, **more: Any) -> None:
+        super().__init__(names, help=f"{help} ({only}).", callback=self._check, **more)
+        self._only = only
+
+    def _check(self, context: click.Context, _: click.Parameter, given: Any) -> Any:
+        to = context.params.get("to")
+        if given not in (None, False) and to != self._only:
+            raise click.UsageError(f"--to {to}: leave out {self.opts[0]}, because only {self._only} has it")
+        return given
+
+
+_option_of = partial(click.option, cls=_OptionOf)
 
 
 @_commands.command("export", section="For others", example="rov-fmu export bluerov2 --to mujoco")
@@ -540,6 +567,7 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
 @click.option(
     "--to",
     required=True,
+    is_eager=True,
     type=_Choice(
         ["mujoco", "allocation", "autopilot", "gains", "ardusub-gains", "sdf", "urdf"],
         {"gazebo": "sdf", "ros": "urdf", "mjcf": "mujoco", "ardusub": "ardusub-gains"},
@@ -552,25 +580,34 @@ _world = partial(click.option, "--world", "in_world", is_flag=True)
     help="File (sdf, urdf) or folder (others) to write. The default is the identifier with the name of the format, "
     "such as <identifier>_mujoco or <identifier>.sdf.",
 )
-@click.option(
+@_option_of(
     "--draws",
+    only="mujoco",
     type=_number("a whole number from 1 to 1e6", 1, 10**6, int),
     metavar="N",
-    help="Also draw N sets of coefficients from what the logs know, with their correlations (mujoco).",
+    help="Also draw N sets of coefficients from what the logs know, with their correlations",
 )
-@click.option(
+@_option_of(
     "--seed",
+    only="mujoco",
     type=_number("a whole number from 0", 0, 2**63, int),
     metavar="N",
-    help="Seed of the draws. The default is 0.",
+    help="Seed of the draws, 0 by default",
 )
-@_file_option(
+@_option_of(
     "--gains",
+    only="ardusub-gains",
+    type=_FILE,
     metavar="FILE.param",
-    help="Fly the gains in this file of parameters in place of the vehicle's own (ardusub-gains).",
+    help="Fly the gains in this file of parameters in place of the vehicle's own",
 )
-@_world(help="Add a world with water, which Gazebo can run (sdf).")
-@_added_mass(help="Added mass in the link (engine DART, the default), or in the Hydrodynamics plugin (sdf).")
+@_option_of("--world", "in_world", only="sdf", is_flag=True, help="Add a world with water, which Gazebo can run")
+@_option_of(
+    "--added-mass",
+    only="sdf",
+    type=_Choice(["link", "plugin"]),
+    help="Added mass in the link (engine DART, the default), or in the Hydrodynamics plugin",
+)
 @_force_option(
     help="Replace files that rov-fmu did not write, or that have changed since. Draw also where the verdict of an axis "
     "is neither good nor usable."
@@ -580,17 +617,10 @@ def _export(vehicle: Path, to: str, output: Path | None, **options: Any) -> None
 
     The default is the VideoRay Pro 4.
     """
-    _write_export(vehicle, to, output, **options)
-
-
-def _write_export(
-    vehicle: Path, to: str, output: Path | None, in_world: bool, added_mass: str | None, **options: Any
-) -> None:
-    """Write a vehicle for another simulator, and print what is different there."""
-    from rov_fmu.interface.export_command import Options, export
+    from rov_fmu.interface.export_command import export
     from rov_fmu.report.console import console, paragraph, print_end, print_table
 
-    exported = export(vehicle, to, output, Options(in_world=in_world, added_mass=added_mass, **options))
+    exported = export(vehicle, to, output, **options)
     if exported.table:
         print_table(exported.table)
     if exported.notes:
@@ -600,18 +630,6 @@ def _write_export(
     for warning in exported.warnings:
         _warn(warning)
     print_end(exported.written, exported.following)
-
-
-@_commands.command("sdf", section="For others", example="rov-fmu sdf bluerov2")
-@_vehicle_or_videoray()
-@_output_option(metavar="FILE.sdf|.urdf", help="File to write. The default is <identifier>.sdf.")
-@_world(help="Add a world with water, which Gazebo can run (sdf).")
-@_added_mass(help="Added mass in the link, or in the Hydrodynamics plugin.")
-@_force_option()
-def _sdf(vehicle: Path, output: Path | None, **options: Any) -> None:
-    """Do the same as `rov-fmu export --to sdf`, or with a name that ends with .urdf, `--to urdf`."""
-    is_urdf = output is not None and output.suffix.lower() == ".urdf"
-    _write_export(vehicle, "urdf" if is_urdf else "sdf", output, **options)
 
 
 # ---- prove -----------------------------------------------------------------------------------------------------------
@@ -762,8 +780,6 @@ _tests_argument = partial(click.argument, "tests", nargs=-1, required=True, type
     shell_complete=_complete_vehicle,
 )
 @_force_option()
-@click.option("--inspect", "inspects", is_flag=True, help="The same as `rov-fmu inspect`.")
-@click.option("--draft", "drafts", is_flag=True, help="The same as `rov-fmu inspect --draft`.")
 def _identify(
     tests: tuple[Path, ...],
     output: Path | None,
@@ -771,8 +787,6 @@ def _identify(
     mcap: Path | None,
     base: Path | None,
     force: bool,
-    inspects: bool,
-    drafts: bool,
 ) -> None:
     """Identify a vehicle from TESTS: a folder of tank tests or dive logs with its rov.toml, or one log or several.
 
@@ -784,12 +798,6 @@ def _identify(
     from rov_fmu.report.console_results import print_identification
     from rov_fmu.report.progress import parts
 
-    if inspects or drafts:
-        if output or mcap or base:
-            option = "--draft" if drafts else "--inspect"
-            raise click.UsageError(f"identify: {option} identifies nothing: leave -o, --mcap, --base out")
-        _inspect_logs(tests, report, drafts=drafts, force=force)
-        return
     with parts() as shown:
         identification, files = identify_tests(
             tests, output, report, mcap, base=base, force=force, begin=shown.begin, on_answer=shown.tell
@@ -819,10 +827,6 @@ def _identify(
 @_force_option()
 def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, force: bool) -> None:
     """List what LOGs contain, or all logs in a folder, and what no fit can learn from them. Nothing is identified."""
-    _inspect_logs(tests, report, drafts=drafts, force=force)
-
-
-def _inspect_logs(tests: Sequence[Path], report: Path | None, *, drafts: bool, force: bool) -> None:
     from rov_fmu.interface.inspect_command import inspect_tests, next_steps
     from rov_fmu.report.console import print_end
     from rov_fmu.report.console_log import print_inspected
@@ -888,7 +892,7 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     print_end(files, following)
 
 
-# ---- schema, tables --------------------------------------------------------------------------------------------------
+# ---- schema ----------------------------------------------------------------------------------------------------------
 
 
 @_commands.command("schema", section="For others", example="rov-fmu schema")
@@ -897,15 +901,3 @@ def _schema() -> None:
     from rov_fmu.vehicle.json_schema import json_schema_text
 
     click.echo(json_schema_text(), nl=False)
-
-
-@_commands.command("tables", section="For others", example="rov-fmu tables")
-@_vehicle_or_videoray()
-def _tables(vehicle: Path) -> None:
-    """Print Tables 6-8 of the paper with the printed, computed and measured values."""
-    from rov_fmu.report.console import print_tables
-    from rov_fmu.report.published import load_tables
-    from rov_fmu.vehicle.vehicle import load_vehicle
-
-    loaded = load_vehicle(vehicle)
-    print_tables(loaded, load_tables(loaded))

@@ -71,7 +71,6 @@ WRITING = {
     ("simulate", "plot"): Command("run.svg", f"simulate {_BARE} --plot {{f}}/run.svg"),
     ("fly", "output"): Command("fly.html", f"fly {_BARE} -o {{f}}/fly.html"),
     ("sitl", "log"): Command("log.csv", "sitl bluerov2 --port 0 --duration 0.01 --log {f}/log.csv"),
-    ("sdf", "output"): Command("rov.sdf", f"sdf {_BARE} -o {{f}}/rov.sdf"),
     ("export", "output"): Command("rov.sdf", f"export {_BARE} --to sdf -o {{f}}/rov.sdf"),
     ("export", "folder"): Command("allocation.yaml", "export bluerov2 --to allocation -o {f}"),
     ("prove", "report"): Command("proof.html", "prove {fmu} --report {f}/proof.html"),
@@ -95,7 +94,6 @@ READING = {
     ("fly", "recording"): "fly videoray --recording points.csv",
     ("fly", "identified"): "fly videoray --recording points.csv --identified logs.mcap",
     ("sitl", "vehicle"): "sitl videoray.toml",
-    ("sdf", "vehicle"): "sdf videoray.toml",
     ("export", "vehicle"): "export --to sdf videoray.toml",
     ("export", "gains"): "export videoray --to ardusub-gains --gains points.csv",
     ("prove", "fmu"): "prove videoray.fmu",
@@ -107,7 +105,6 @@ READING = {
     ("inspect", "tests"): "inspect tests/steady_surge.csv",
     ("tune", "vehicle"): "tune videoray.toml --axis heave --command 0.3 --v-ss 0.2",
     ("tune", "points"): "tune videoray.toml --axis heave --points points.csv",
-    ("tables", "vehicle"): "tables videoray.toml",
 }
 """What each argument and option reads that names a file: the last word, in a folder with these files."""
 COMMANDS = {key: command for key, command in WRITING.items() if key[0] not in ("prove", "study") and key[1] != "folder"}

@@ -28,38 +28,32 @@ _MOST_RESULTS = 1_000_000
 _TABLE_SUFFIXES, _PLOT_SUFFIXES = (".csv", ".parquet", ".mcap"), (".png", ".svg", ".pdf")
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of the command."""
-
-    settings: Sequence[str]
-    """What --set has."""
-    commands: Path | None
-    """The file of --input."""
-    stop: float | None
-    """The time at the end, s."""
-    step: float | None
-    """The time between two results, s."""
-    output: Path | None
-    plot: Path | None
-    """The picture; an empty path for one that a browser shows."""
-    force: bool
-
-
-def simulate_vehicle(path: Path, options: Options) -> None:
+def simulate_vehicle(
+    path: Path,
+    *,
+    settings: Sequence[str],
+    commands: Path | None,
+    stop: float | None,
+    step: float | None,
+    output: Path | None,
+    plot: Path | None,
+    force: bool,
+) -> None:
     """Simulate the vehicle of a file, and write or print what is asked for.
+
+    - `settings`, `commands`: what --set has, and the file of --input.
+    - `stop`, `step`: the time at the end, and that between two results, s.
+    - `plot`: the picture; an empty path for one that a browser shows.
 
     Raises FileError, InputError, BuildError, WriteError.
     """
-    output, plot, opens = options.output, options.plot, options.plot == Path()
-    vehicle = load(path)
-    inputs = [path, *vehicle.files, *([options.commands] if options.commands else [])]
-    check_outputs(output, None if opens else plot, inputs, force=options.force)
-    result = run(vehicle, options)
+    opens, vehicle = plot == Path(), load(path)
+    check_outputs(output, None if opens else plot, [path, *vehicle.files, *filter(None, [commands])], force=force)
+    result = run(vehicle, settings, commands, stop, step, records_inputs=is_mcap(output))
     if vehicle.layout.has_only_water and "z" in result and (above := result["z"] < -AFLOAT).any():
         print_message(f"rov-fmu: {LEFT_WATER.format(f'{result.time[above.argmax()]:g}')}")
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
-    written = write_results(vehicle, result, output, picture, title(vehicle, options), force=options.force)
+    written = write_results(vehicle, result, output, picture, title(vehicle, settings, commands), force=force)
     if opens and picture:
         from rov_fmu.interface.fly_command import open_in_browser  # imported here because pages are slow
 
@@ -68,7 +62,7 @@ def simulate_vehicle(path: Path, options: Options) -> None:
         following = "" if opens else "open the plot" if plot else "add --plot to see the curves"
         print_end({path: old for path, old in written.items() if path in (output, plot)}, following)
     else:
-        print_final(vehicle, result, has_no_input=not options.commands and not _moves(options.settings, vehicle.layout))
+        print_final(vehicle, result, has_no_input=not commands and not _moves(settings, vehicle.layout))
 
 
 def find_speeds(path: Path, wanted: Sequence[str], settings: Sequence[str]) -> None:
@@ -131,12 +125,19 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
     check_targets([(output, ""), (plot, "")], inputs, force=force)
 
 
-def run(vehicle: VehicleModel, options: Options) -> Result:
-    """Simulate a vehicle as the options say, and record the inputs, too, if a file for Foxglove is to be written.
+def run(
+    vehicle: VehicleModel,
+    settings: Sequence[str],
+    commands: Path | None,
+    stop: float | None,
+    step: float | None,
+    *,
+    records_inputs: bool,
+) -> Result:
+    """Simulate a vehicle as the options say, and record the inputs, too, if that is asked for.
 
     Raises InputError, FileError, BuildError.
     """
-    commands, stop, step = options.commands, options.stop, options.step
     inputs: dict[str, Any] = {}
     if commands:
         from rov_fmu.interface.command_files import read_inputs  # imported here because readers of logs are slow
@@ -148,7 +149,7 @@ def run(vehicle: VehicleModel, options: Options) -> Result:
             raise FileError(
                 f"{commands}: the last time is {stop:g} s, and must be at least {_SHORTEST:g}, without --stop"
             )
-    given = read_settings(options.settings, vehicle.layout)
+    given = read_settings(settings, vehicle.layout)
     for name in given.inputs:
         if name in inputs:
             raise InputError(f"--set {name}: {commands} has this input, too")
@@ -159,7 +160,7 @@ def run(vehicle: VehicleModel, options: Options) -> Result:
     if stop / step > _MOST_RESULTS:
         raise InputError(f"--step {step:g}: gives more than {_MOST_RESULTS} results up to {stop:g} s")
     layout = vehicle.layout
-    record = [*layout.inputs, *layout.state, *layout.calculated] if is_mcap(options.output) else None
+    record = [*layout.inputs, *layout.state, *layout.calculated] if records_inputs else None
     changed = vehicle.with_(**given.coefficients)
     return changed.simulate(result_times(stop, step), inputs | given.inputs, start=given.start, record=record)
 
@@ -222,10 +223,10 @@ def _moves(settings: Sequence[str], layout: Layout) -> bool:
     return any(setting.partition("=")[0].strip() not in layout.coefficients for setting in settings)
 
 
-def title(vehicle: VehicleModel, options: Options) -> str:
+def title(vehicle: VehicleModel, settings: Sequence[str], commands: Path | None) -> str:
     """Return the title of a plot: the vehicle, and what the options set."""
-    commands = [f"commands of {shell_words(options.commands.name)}"] if options.commands else []
-    given = [*commands, *map(one_line, options.settings)]
+    given = [f"commands of {shell_words(commands.name)}"] if commands else []
+    given += map(one_line, settings)
     return f"{vehicle.name}: {', '.join(given) or 'no commands'}"
 
 

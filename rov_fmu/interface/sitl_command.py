@@ -2,10 +2,10 @@
 
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from math import inf
 from pathlib import Path
 from socket import AF_INET, SOCK_DGRAM, socket
+from typing import Any
 
 import numpy as np
 
@@ -33,37 +33,18 @@ _MOST_CHANNELS = 16
 """ArduPilot sends 32 channels only if it is told to, so a servo is one of the first 16."""
 
 
-@dataclass(frozen=True)
-class Options:
-    """The options of the command."""
+def serve(path: Path, *, host: str, port: int, duration: float | None, **flight: Any) -> None:
+    """Answer an autopilot until the duration (s) is over or the command is interrupted, and then write the log.
 
-    frame: str | None
-    servos: Sequence[str]
-    """Texts such as `3=t`, or `3=-t` for a reversed thruster."""
-    settings: Sequence[str]
-    """Texts such as `V_N=0.3`."""
-    bottom: float
-    log: Path | None
-    force: bool
-    log_rate: float
-    duration: float | None
-    host: str
-    port: int
-
-
-def serve(path: Path, options: Options) -> None:
-    """Answer an autopilot until the duration is over or the command is interrupted, and then write the log.
-
-    Raises FileError, InputError about an option, WriteError about the log, and BuildError.
+    `flight` has the other options, which `_setup` describes. Raises FileError, InputError about an option, WriteError
+    about the log, and BuildError.
     """
-    setup, frame = _setup(path, options)
+    setup, frame = _setup(path, **flight)
     with socket(AF_INET, SOCK_DGRAM) as server:
         try:
-            server.bind((options.host, options.port))
+            server.bind((host, port))
         except OSError as error:
-            raise InputError(
-                f"--host {options.host}, --port {options.port}: cannot listen there: {error.strerror}"
-            ) from error
+            raise InputError(f"--host {host}, --port {port}: cannot listen there: {error.strerror}") from error
         connection = Connection(setup, lambda words: print_message(f"rov-fmu: {words}"))
         address, port = server.getsockname()
         for line in _listed(setup.servos, setup.vehicle.layout):
@@ -83,43 +64,59 @@ def serve(path: Path, options: Options) -> None:
             paragraph(console(), _summary(connection))
             if connection.logs:
                 inspect = shell_words("rov-fmu", "inspect", next(iter(connection.logs)))
-                print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(options.log) else inspect)
-            elif options.log:
+                print_end(connection.logs, "open it in Foxglove or PlotJuggler" if is_mcap(setup.log) else inspect)
+            elif setup.log:
                 paragraph(console(), "No log was written, because no row was complete.")
 
         with cleaned_up(end):
-            connection.serve(server, options.duration or inf)
+            connection.serve(server, duration or inf)
 
 
-def _setup(path: Path, options: Options) -> tuple[Setup, str]:
-    """Return the setup of a flight, and the frame of its servos, if any. Raises FileError, InputError, WriteError."""
-    if options.log and options.log.suffix.lower() not in (".csv", ".mcap"):
-        raise InputError(f"--log {options.log}: the name must end with .csv or .mcap")
-    if options.frame is not None and options.frame not in FRAMES:
-        hint = did_you_mean(options.frame, FRAMES)
-        raise InputError(f"--frame {shown(options.frame)}: must be one of {', '.join(FRAMES)}{hint}")
+def _setup(
+    path: Path,
+    *,
+    frame: str | None,
+    servos: Sequence[str],
+    settings: Sequence[str],
+    bottom: float,
+    log: Path | None,
+    log_rate: float,
+    force: bool,
+) -> tuple[Setup, str]:
+    """Return the setup of a flight, and the frame of its servos, if any.
+
+    - `servos`, `settings`: texts such as `3=t`, or `3=-t` for a reversed thruster, and `V_N=0.3`.
+    - `bottom`: its depth, m.
+    - `log_rate`: the rows of the log per second.
+
+    Raises FileError, InputError, WriteError.
+    """
+    if log and log.suffix.lower() not in (".csv", ".mcap"):
+        raise InputError(f"--log {log}: the name must end with .csv or .mcap")
+    if frame is not None and frame not in FRAMES:
+        hint = did_you_mean(frame, FRAMES)
+        raise InputError(f"--frame {shown(frame)}: must be one of {', '.join(FRAMES)}{hint}")
     vehicle = load(path)
     if not vehicle.layout.commands:
         raise InputError(f"{path}: this vehicle has no thrusters, so there is nothing that ArduSub could drive")
-    if options.log:
-        check_targets([(options.log, "")], [path, *vehicle.files], force=True)
-        if os.path.lexists(options.log) and not options.force:
-            raise InputError(f"--log {options.log}: the file exists; choose another name, or replace it with --force")
-    given = read_settings(options.settings, vehicle.layout)
+    if log:
+        check_targets([(log, "")], [path, *vehicle.files], force=True)
+        if os.path.lexists(log) and not force:
+            raise InputError(f"--log {log}: the file exists; choose another name, or replace it with --force")
+    given = read_settings(settings, vehicle.layout)
     vehicle = vehicle.with_(**given.coefficients)
     inputs = with_axes(vehicle.layout, {name: np.array(value) for name, value in given.inputs.items()})
     checked_values("inputs", inputs, vehicle.layout.inputs, many=False)
     checked_start(given.start, vehicle.layout, many=False)
-    chosen = vehicle.layout, options.frame, _table(options.servos, vehicle.layout)
-    servos = servos_of(*chosen)
+    chosen = vehicle.layout, frame, _table(servos, vehicle.layout)
+    driven = servos_of(*chosen)
     for name in inputs:
-        if name in servos:
-            raise InputError(f"--set {name}: servo {servos[name][0]} drives this input")
+        if name in driven:
+            raise InputError(f"--set {name}: servo {driven[name][0]} drives this input")
     start = {name: float(value) for name, value in inputs.items()} | given.start
-    frame = chosen_frame(*chosen)
-    own = "" if options.servos else frame
-    setup = Setup(vehicle, servos, start, options.bottom, options.log, 1.0 / options.log_rate, options.force, own)
-    return setup, frame
+    fitting = chosen_frame(*chosen)
+    own = "" if servos else fitting
+    return Setup(vehicle, driven, start, bottom, log, 1.0 / log_rate, force, own), fitting
 
 
 def _table(texts: Sequence[str], layout: Layout) -> dict[int, str]:

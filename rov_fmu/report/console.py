@@ -1,4 +1,4 @@
-"""The console that the commands print on, its tables, and the printout of the paper's tables and of a proof."""
+"""The console that the commands print on, its tables, and the printout of a proof."""
 
 import os
 import re
@@ -18,8 +18,6 @@ from rich.table import Column, Table
 from rich.text import Text
 
 from rov_fmu.io.messages import listed, one_line, wrapped
-from rov_fmu.report.published import Cell, ResponseTable
-from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
     from rov_fmu.prove.check import MetaData
@@ -130,25 +128,6 @@ def _width(found: Table, out: Console) -> int:
     return out.measure(found, options=out.options.update(max_width=10_000)).maximum
 
 
-def print_tables(vehicle: Vehicle, tables: Iterable[ResponseTable]) -> None:
-    """Print Tables 6-8 of the paper beside the values computed for the vehicle."""
-    out = console()
-    paragraph(out, f"{vehicle.name}. {vehicle.source}")
-    for t in tables:
-        out.print()
-        print_table(_side_by_side(vehicle, t), out)
-    out.print()
-    for line in (
-        (
-            "non-linear: every alpha and beta is 1. scaled: alpha and beta of the vehicle file. model: "
-            "computed in closed form."
-        ),
-        ("dev.: deviation of the model from the printed value; in the last column, of the scaled model from the test."),
-        ("*: the printed value differs from the rounded value of the model. -: not printed, or not measured."),
-    ):
-        paragraph(out, line)
-
-
 def print_proof(findings: "Sequence[ProofFinding]") -> None:
     """Print how many results are as expected, then the largest deviation of each experiment and each failed result."""
     out = console()
@@ -190,35 +169,6 @@ def print_claims(proof: "Proof") -> None:
 
 def _deviation(f: "ProofFinding") -> tuple[str, str]:
     return text(f.deviation, ".1e"), text(f.tolerance, ".1e")
-
-
-def _side_by_side(vehicle: Vehicle, t: ResponseTable) -> Table:
-    """Return a published table with the printed, computed and measured values side by side."""
-    values = ", ".join(f"{name} = {vehicle[name]:g}" for name in map(t.axis.coefficient, ("alpha", "beta")))
-    compared = [f"{model}\nprinted|\nmodel|\ndev." for model in ("non-linear", "scaled")]
-    headers = "|".join([*compared, "\ntest|\ndev."]).split("|")
-    title = f"Table {t.number}. {t.axis.name.capitalize()}, {values}; V_ss in {t.axis.unit}, Tau in s"
-    result = table(title, "\ncommand", headers)
-    for quantity in ("V_ss", "Tau"):
-        result.add_section()
-        result.add_row(quantity)
-        for row in t.rows:
-            scaled: Cell = getattr(row.scaled, quantity)
-            result.add_row(
-                f"{row.command} %",
-                *_model(getattr(row.non_linear, quantity)),
-                *_model(scaled),
-                text(scaled.measured),
-                text(scaled.from_measured, DEVIATION),
-            )
-    return result
-
-
-def _model(cell: Cell) -> Iterator[str]:
-    """Yield the printed value, the computed value and their deviation."""
-    yield text(cell.printed)
-    yield f"{cell.computed:.4f}"
-    yield text(cell.from_printed, DEVIATION) + (" " if cell.rounds_to_printed else "*")
 
 
 def table(title: str, first: str, numbers: Iterable[str], texts: Iterable[str] = ()) -> Table:

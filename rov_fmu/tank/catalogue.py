@@ -1,7 +1,7 @@
 """The catalogue of channels: the quantities that logs contain, and how every format names them.
 
 One table serves CSV files, ArduSub, PX4, bags and .mat files, the tables [columns] and [topics] of rov.toml,
-`--inspect`, and, as JSON, the page that flies. QUANTITIES says what can be measured, with names, units and bounds.
+`inspect`, and, as JSON, the page that flies. QUANTITIES says what can be measured, with names, units and bounds.
 MESSAGES says which fields of which messages measure it, and OUTPUTS which fields contain the commands of thrusters. The
 first rule that matches is preferred.
 """

@@ -1,7 +1,7 @@
 """A log: what was commanded and what was measured in one dive or one test, each with its own times.
 
 Nothing in a log is resampled or copied onto the times of something else. Every format is read into this type, and
-identification, `--inspect`, the flight page and `simulate` use it.
+identification, `inspect`, the flight page and `simulate` use it.
 """
 
 from collections.abc import Collection, Mapping, Sequence

@@ -99,7 +99,8 @@ class FileHead(Head):
     """Names, source, and folders beside the file."""
 
     data: Annotated[Path, _folder([*chain(*TABLES.values())]), _STRING] | None = None
-    """A folder with the published tables that `rov-fmu tables` prints, in the form of `models/videoray/tables`."""
+    """A folder with the published tables that `python -m verification.tables` prints, in the form of
+    `models/videoray/tables`."""
     pictures: Annotated[Path, _folder(PICTURES), _STRING] | None = None
     """A folder with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, for a light background. The
     icon and the thrusters are always drawn from their geometry."""

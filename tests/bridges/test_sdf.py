@@ -432,7 +432,7 @@ def test_the_command_writes_the_file_and_lists_the_notes(
         ([], "bluerov2.sdf", model, f"What is different in Gazebo:\n{notes}Wrote bluerov2.sdf. Next: include it in a "),
         (["--world", "--added-mass", "plugin", "-o", "my rov.sdf"], "my rov.sdf", explicit, "gz sim -r 'my rov.sdf'\n"),
     ):
-        assert main(["sdf", "bluerov2", *options]) == 0
+        assert main(["export", "bluerov2", "--to", "sdf", *options]) == 0
         assert Path(file).read_bytes() == sealed(wanted.text, "export").encode()
         out, err = capsys.readouterr()
         assert words in out

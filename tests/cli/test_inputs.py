@@ -21,10 +21,8 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="permissions are POSI
 # A file of the folder that `copied` makes, {f}, and a command that reads it.
 READING: dict[str, tuple[str, str]] = {
     "the vehicle of a build": ("videoray.toml", "build {f}/videoray.toml"),
-    "the vehicle of the tables": ("videoray.toml", "tables {f}/videoray.toml"),
     "the vehicle to tune": ("videoray.toml", "tune {f}/videoray.toml --axis=heave --command=0.3 --v-ss=0.2"),
     "the points": ("points.csv", "tune {f}/videoray.toml --axis=heave --points {f}/points.csv"),
-    "a published table": ("tables/table6_heave_response.csv", "tables {f}/videoray.toml"),
     "a table of a build": ("tables/table3_heave_steady.csv", "build {f}/videoray.toml"),
     "a drawing": ("pictures/from_above.svg", "build {f}/videoray.toml"),
     "a drawing of the FMU in Python": (
@@ -161,7 +159,7 @@ def test_what_is_no_file_is_one_line_that_names_it(
     _check(capsys.readouterr().err, Path(name).name)
 
 
-SOME = ["the vehicle of the tables", "the points", "rov.toml", "a tank test"]
+SOME = ["the vehicle to tune", "the points", "rov.toml", "a tank test"]
 """The quick cases; the weekly tests try all."""
 
 
@@ -180,7 +178,7 @@ def test_what_may_not_be_read_is_one_line_that_names_it(
     (tmp_path / "temporary").mkdir()
     commands, locked = [], []
     files = [(READING[case][0], 0, case) for case in cases]
-    folders = [("tests", mode, "rov.toml") for mode in modes] + [("tables", 0o000, "a published table")]
+    folders = [("tests", mode, "rov.toml") for mode in modes] + [("tables", 0o000, "a table of a build")]
     for n, (name, mode, case) in enumerate([*files, *folders]):
         folder = Path(shutil.copytree(copied, tmp_path / str(n)))
         locked.append(folder / name)

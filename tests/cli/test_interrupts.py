@@ -205,6 +205,6 @@ def test_a_signal_after_the_end_of_a_command_keeps_its_exit_code() -> None:
 def test_ctrl_c_while_modules_are_imported_is_one_line(tmp_path: Path) -> None:
     begun = tmp_path / "begun"
     (tmp_path / "click.py").write_text(f"import pathlib, time\npathlib.Path({str(begun)!r}).touch()\ntime.sleep(600)\n")
-    with Command(["-m", "rov_fmu", "tables"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as tables:
-        tables.wait_until(begun.exists)
-        assert tables.press_ctrl_c() == LINE
+    with Command(["-m", "rov_fmu", "list"], tmp_path, environment={"PYTHONPATH": str(tmp_path)}) as command:
+        command.wait_until(begun.exists)
+        assert command.press_ctrl_c() == LINE

@@ -103,10 +103,9 @@ TYPED: dict[str, tuple[str, str]] = {
         "build --platform host --backend pythonfmu",
         "--platform: the PythonFMU flavour is the same for all platforms",
     ),
-    "a draft that is written elsewhere": (
-        "identify . --draft -o mine.toml",
-        "identify: --draft identifies nothing: leave -o, --mcap, --base out",
-    ),
+    "a draft of before": ("identify . --draft", "identify --draft is gone: use rov-fmu inspect --draft"),
+    "a model of before": ("sdf bluerov2", "sdf is gone: use rov-fmu export --to sdf"),
+    "the tables of before": ("tables", "tables is gone: use python -m verification.tables in a checkout"),
     "a vehicle that is no FMU yet": (
         "prove videoray",
         "videoray: must be an FMU. `rov-fmu build videoray` builds one from the vehicle with this name",

@@ -70,7 +70,6 @@ _NEEDED: list[tuple[list[str], set[str]]] = [
     (["--help"], set()),
     (["build", "--help"], set()),
     (["--version"], set()),
-    (["tables"], {"pydantic", "rich"}),
     (_TUNE, {"numpy", "pydantic", "rich", "scipy"}),
 ]
 """The arguments of commands that run one after the other, and the slow packages that are imported at most."""
@@ -156,7 +155,7 @@ def test_list_has_vehicles_and_companions_and_says_what_the_files_of_a_folder_ar
 COMMANDS = [
     *("list", "identify", "inspect", "tune"),
     *("simulate", "fly", "sitl", "system", "study"),
-    *("build", "export", "sdf", "prove", "schema", "tables"),
+    *("build", "export", "prove", "schema"),
 ]
 
 

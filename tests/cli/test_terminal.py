@@ -104,7 +104,7 @@ OFTEN = ["identify tests --report found.html -o found.toml --force", "build mist
 COMMANDS = [
     "build mistake.toml",
     "",
-    "tables",
+    "list",
     f"{_TUNE} -o tuned.toml",
     "build videorey",
     "build bare.toml --platform host --osp",
@@ -116,7 +116,7 @@ COMMANDS = [
     "identify nowhere",
     "identify tests --report found.html -o found.toml --force",
     "fly bare.toml -o page.html",
-    "sdf bluerov2_heavy --world",
+    "export bluerov2_heavy --to sdf --world",
     "sitl bluerov2 --duration 0.01 --port 70000",
     "prove videoray.fmu",
     "prove videoray.fmu --tolerance 1e-300",

@@ -91,7 +91,7 @@ def test_the_installed_command_does_everything_outside_the_checkout(
     for command, expected in (
         ("rov-fmu build --platform host", "videoray.fmu"),
         ("fmpy simulate videoray.fmu --start-values u_l 0.3 u_r 0.3", ""),
-        ("rov-fmu tables videoray", "Table 8."),
+        ("rov-fmu simulate videoray --find surge=0.5", "thrust"),
         ("rov-fmu identify tests -o tests/found.toml --report tests/found.html", ""),
     ):
         assert expected in made.run(*command.split(), where=here)

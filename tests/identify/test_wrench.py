@@ -157,7 +157,7 @@ def test_a_draft_of_a_wrench_needs_one_edit(write_log: Callable[[Path, Dive], No
     """Forces and velocities may have their symbols alone, or be topics as text."""
     d = dive(1)
     write_log(tmp_path, d)
-    assert main(["identify", str(tmp_path), "--draft"]) == 0
+    assert main(["inspect", str(tmp_path), "--draft"]) == 0
     path = tmp_path / "rov.toml"
     draft = path.read_text(encoding="utf-8")
     lines = [line for line in draft.splitlines() if '"?"' in line and not line.startswith("#")]

@@ -30,13 +30,13 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--to", "urdf", "--world"], "--to urdf: leave out --world, because only a model for Gazebo (sdf) has one"),
-        (["--to", "mujoco", "--added-mass", "link"], "--to mujoco: leave out --added-mass, because only a model for"),
-        (["--to", "sdf", "--draws", "3"], "--to sdf: leave out --draws, because only mujoco has a table of draws"),
+        (["--to", "urdf", "--world"], "--to urdf: leave out --world, because only sdf has it"),
+        (["--to", "mujoco", "--added-mass", "link"], "--to mujoco: leave out --added-mass, because only sdf has it"),
+        (["--to", "sdf", "--draws", "3"], "--to sdf: leave out --draws, because only mujoco has it"),
         (["--to", "mujoco", "--seed", "3"], "--to mujoco: leave out --seed, or give --draws as well"),
         (
             ["--to", "mujoco", "--gains", "a_file"],
-            "--to mujoco: leave out --gains, because only ardusub-gains flies them",
+            "--to mujoco: leave out --gains, because only ardusub-gains has it",
         ),
         (["--to", "ardusub-gains", "--gains", "none"], "none: there is no such file"),
         (["--to", "ardusub-gains", "--gains", "a_file"], "a_file: has none of the gains, such as ATC_RAT_YAW_P"),

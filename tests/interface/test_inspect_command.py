@@ -271,20 +271,16 @@ def test_headers_with_control_characters(tmp_path: Path, inspect: Inspect) -> No
 
 
 def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path: Path, capsys: Capsys) -> None:
-    """The option of `identify` is the same command."""
     folder = tmp_path / "A ROV (2)"
     folder.mkdir()
     one_file(folder)
     draft = folder / "rov.toml"
-    printed = []
-    for command in (["inspect"], ["identify", "--inspect"]):
-        assert main([*command, str(folder)]) == 0
-        printed.append(capsys.readouterr().out)
-        assert not draft.exists()
-    assert printed[0] == printed[1]
-    assert "thruster 1" in printed[0]
-    assert printed[0].endswith(f"Next: rov-fmu identify '{folder}'\n")
-    lines = printed[0].partition("--draft writes them:\n")[2].splitlines()
+    assert main(["inspect", str(folder)]) == 0
+    printed = capsys.readouterr().out
+    assert not draft.exists()
+    assert "thruster 1" in printed
+    assert printed.endswith(f"Next: rov-fmu identify '{folder}'\n")
+    lines = printed.partition("--draft writes them:\n")[2].splitlines()
     assert main(["inspect", str(folder), "--draft"]) == 0
     text = draft.read_text(encoding="utf-8")
     assert [line.removeprefix("  ") for line in lines[: len(text.splitlines())]] == text.splitlines()
@@ -293,7 +289,7 @@ def test_the_lines_to_paste_are_printed_and_nothing_is_written_unasked(tmp_path:
     assert (document["base"], document["against"]) == ("bluerov2", "bluerov2")
     assert "dives" not in document, "its log is one file"
     capsys.readouterr()
-    assert main(["identify", str(folder), "--draft"]) == 0
+    assert main(["inspect", str(folder), "--draft"]) == 0
     assert "Wrote" not in capsys.readouterr().out, "it lacks nothing"
     assert draft.read_text(encoding="utf-8") == text
     assert {path.name for path in folder.iterdir()} == {"rov.toml", "log_a.csv"}
@@ -375,7 +371,7 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
 ) -> None:
     log = one_file(tmp_path)
     (tmp_path / name).write_bytes(UNREADABLE[name])
-    assert main(["identify", str(tmp_path), "--draft"]) == 0
+    assert main(["inspect", str(tmp_path), "--draft"]) == 0
     (warning,) = capsys.readouterr().err.splitlines()
     assert warning.startswith(f"rov-fmu: warning: {name}: left out as unreadable: ")
     weigh(tmp_path)
@@ -383,7 +379,7 @@ def test_a_file_that_cannot_be_read_is_a_warning_unless_nothing_is_left(
     assert tests.logged == ["heave"]
     assert f"{name}: left out as unreadable" in by_heading(tests.folder.findings)["Warnings"][0]
     log.unlink()
-    for arguments in ([str(tmp_path)], [str(tmp_path), "--inspect"]):
-        assert main(["identify", *arguments]) == 2
+    for command in ("identify", "inspect"):
+        assert main([command, str(tmp_path)]) == 2
         (error,) = [line for line in capsys.readouterr().err.splitlines() if str(tmp_path / name) in line]
         assert error.startswith(f"rov-fmu: {tmp_path / name}")

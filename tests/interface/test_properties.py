@@ -18,7 +18,7 @@ from tests.conftest import without_page
 
 ALONE = {("build", "osp"), ("simulate", "plot"), ("fly", "output"), ("sitl", "log"), ("prove", "report")}
 ALONE |= {("study", "output"), ("study", "run"), ("identify", "report"), ("identify", "mcap"), ("inspect", "report")}
-ALONE |= {("sdf", "output"), ("export", "folder"), ("system", "output")}
+ALONE |= {("export", "folder"), ("system", "output")}
 """What only commands write, or what the tests of studies and bridges compare."""
 
 

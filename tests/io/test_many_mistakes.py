@@ -20,7 +20,7 @@ SECONDS_PER_MISTAKE = 4e-4
 
 def _vehicle(folder: Path) -> tuple[Path, list[str]]:
     path = Path(shutil.copy(BARE, folder / "vehicle.toml"))
-    return path, ["tables", str(path)]
+    return path, ["export", str(path), "--to", "urdf"]
 
 
 def _rov(folder: Path) -> tuple[Path, list[str]]:

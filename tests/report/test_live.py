@@ -249,7 +249,7 @@ def test_an_exported_flight_can_be_flown_again_and_inspected(page: Any, tmp_path
     page.evaluate("live.pause(false); live.speed = 50")
     until(page, "live.paused && live.flight.replay && live.hasEnded()")
     assert max(deviations(page)) < 1e-12
-    assert main(["identify", "--inspect", str(file)]) == 0
+    assert main(["inspect", str(file)]) == 0
 
 
 def test_a_link_contains_vehicle_commands_and_tuning(page: Any, address: Callable[[str], str], fly: Fly) -> None:

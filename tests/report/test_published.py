@@ -1,4 +1,4 @@
-"""The files with Tables 3-8 of the paper, and the command that shows them; tests/paper has what the FMU gives."""
+"""The files with Tables 3-8 of the paper; tests/paper has what the FMU gives."""
 
 import shutil
 from collections.abc import Callable, Mapping
@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.cli import main
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.report.published import Cell, ResponseTable, load_tables
 from rov_fmu.vehicle.shipped import VIDEORAY
-from rov_fmu.vehicle.vehicle import Vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import ALONE
 from tests.paper.test_paper import NON_LINEAR, ROWS, SCALED, closed_form
 from tests.vehicles import with_axes
@@ -71,17 +70,14 @@ def test_the_vehicle_file_tells_how_far_steady_velocities_are_off(vehicle: Vehic
     assert said.replace("%", " %") in vehicle.limits
 
 
-# ---- rov-fmu tables -------------------------------------------------------------------------------------
+# ---- Mistakes -------------------------------------------------------------------------------------
 
 
-def test_vehicle_without_tables(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_vehicle_without_tables(tmp_path: Path) -> None:
     path = tmp_path / "bare.toml"
     path.write_text(ALONE, encoding="utf-8")
-    assert main(["tables", str(path)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert "vehicle.data" in err
+    with pytest.raises(DataFileError, match=r"vehicle\.data"):
+        load_tables(load_vehicle(path))
     with pytest.raises(DataFileError, match="Tables 6-8 are of surge, heave and yaw, it has no heave"):
         load_tables(replace(with_axes("ur"), data=DATA))
 
@@ -106,7 +102,7 @@ def tables_with(tmp_path: Path, name: str, change: Callable[[str], bytes]) -> tu
 
 
 @pytest.mark.parametrize("case", BAD_TABLES)
-def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_bad_table_is_one_clear_line(case: str, tmp_path: Path) -> None:
     name, old, new, named = BAD_TABLES[case]
 
     def change(text: str) -> bytes:
@@ -114,8 +110,7 @@ def test_bad_table_is_one_clear_line(case: str, tmp_path: Path, capsys: pytest.C
         return text.replace(old, new, 1).encode()
 
     vehicle_file, table = tables_with(tmp_path, name, change)
-    assert main(["tables", str(vehicle_file)]) == 2
-    out, err = capsys.readouterr()
-    assert out == ""
-    assert len(err.splitlines()) == 1
-    assert all(word in err for word in (str(table), *named.split(" … ")))
+    with pytest.raises(DataFileError) as error:
+        load_tables(load_vehicle(vehicle_file))
+    assert "\n" not in str(error.value)
+    assert all(word in str(error.value) for word in (str(table), *named.split(" … ")))

@@ -41,8 +41,8 @@ def _told(folder: Path) -> dict[str, list[str]]:
 def test_without_any_test_the_reasons_are_the_mistakes(name: str, reason: str, tmp_path: Path, capsys: Capsys) -> None:
     """All kinds of such files, with their reasons, are in tests/frozen."""
     shutil.copy(LOGS_OF_OTHERS / name, tmp_path)
-    for command in (["--inspect"], ["-o", str(tmp_path / "out.toml")]):
-        assert main(["identify", str(tmp_path), *command]) == 2
+    for command in (["inspect"], ["identify", "-o", str(tmp_path / "out.toml")]):
+        assert main([*command, str(tmp_path)]) == 2
         first, line = capsys.readouterr().err.splitlines()
         assert first.startswith(f"rov-fmu: {tmp_path}: there is no log and no table in this folder. These formats are ")
         assert line.startswith(f"rov-fmu: {tmp_path / name}: {reason}")
@@ -111,12 +111,12 @@ def test_only_files_are_opened(name: str, make: Callable[[Path], None], folder: 
     make(folder / name)
     assert list_files(folder).others == {"a device, a pipe or a link that leads nowhere is not opened": [folder / name]}
     assert f"{name}: left out as unreadable: a device, a pipe " in _told(folder)["Warnings"][0]
-    assert main(["identify", "--inspect", str(folder / name)]) == 2
+    assert main(["inspect", str(folder / name)]) == 2
 
 
 def test_a_folder_without_anything_says_that_it_has_no_log(tmp_path: Path, capsys: Capsys) -> None:
-    for command in ([], ["--inspect"], ["--draft"], ["-o", str(tmp_path.with_suffix(".toml"))]):
-        assert main(["identify", str(tmp_path), *command]) == 2
+    for command in (["identify"], ["inspect"], ["inspect", "--draft"]):
+        assert main([*command, str(tmp_path)]) == 2
         (line,) = capsys.readouterr().err.splitlines()
         assert line.startswith(f"rov-fmu: {tmp_path}: there is no log and no table in this folder. These formats are ")
         assert all(word in line for word in ("CSV", "DataFlash", "telemetry", "ULog", "ROS 2", "MCAP", ".mat"))
