@@ -155,6 +155,8 @@ typedef struct {
     real whole[2][N_X][ROW]; /* a transition, and then a product of two */
     real moved[FORCE + BLOCK][ROW];
     recent last;
+    real linear[NOISE - FORCE][N_STATES]; /* how forces and velocities of the water change the rates */
+    bool knows[NOISE - FORCE];            /* which of these are known */
 } matrices;
 
 typedef struct {
@@ -664,6 +666,19 @@ static void step_mean(const filter *f, real x[N_X], const real held[N_HELD], dou
 
 /* ---- The covariance ----------------------------------------------------------------------------------------------- */
 
+/* Return true for a position on which no rate depends. */
+static bool changes_nothing(const filter *f, int state)
+{
+#ifdef HAS_SURFACE
+    (void)f;
+    (void)state;
+    return false;
+#else
+    const int *const position = f->where->position, variable = state + FIRST_STATE;
+    return state < LAGGED && (variable == position[0] || variable == position[1] || variable == position[2]);
+#endif
+}
+
 /* Compute the derivatives of the rates of the vehicle's states with respect to the listed states. */
 static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], sparse *A)
 {
@@ -675,26 +690,36 @@ static void slopes(const filter *f, const real x[N_X], const real held[N_HELD], 
     rates(f, x, &q, base);
     for (int c = 0; c < f->count && f->listed[c] < NOISE; c++) {
         const int j = f->listed[c];
-        real change = 1e-3;
-        if (j >= LAGGED && j < FORCE) {
+        if ((j >= LAGGED && j < FORCE) || changes_nothing(f, j)) {
             continue; /* no rate depends on what is measured */
         }
-        if (j < LAGGED) {
-            change = 1e-6 * (1.0 + fabs(x[j]));
-        }
-        y[j] = x[j] + change;
-        if (j == GAIN) {
-            scale_thrust(y, held, &q);
-        }
-        rates(f, y, &q, moved);
-        y[j] = x[j];
-        if (j == GAIN) {
-            scale_thrust(y, held, &q);
+        const bool is_linear = j >= FORCE && j != GAIN; /* a force or a velocity of the water: the same in all of a run */
+        real *const by = is_linear ? f->m->linear[j - FORCE] : moved;
+        if (!is_linear || !f->m->knows[j - FORCE]) {
+            real change = is_linear ? 1.0 : 1e-3;
+            if (j < LAGGED) {
+                change = 1e-6 * (1.0 + fabs(x[j]));
+            }
+            y[j] = x[j] + change;
+            if (j == GAIN) {
+                scale_thrust(y, held, &q);
+            }
+            rates(f, y, &q, moved);
+            y[j] = x[j];
+            if (j == GAIN) {
+                scale_thrust(y, held, &q);
+            }
+            for (int i = 0; i < N_STATES; i++) {
+                by[i] = (moved[i] - base[i]) / change;
+            }
+            if (is_linear) {
+                f->m->knows[j - FORCE] = true;
+            }
         }
         for (int i = 0; i < N_STATES; i++) {
-            if (ANY(moved[i] != base[i])) {
+            if (ANY(by[i] != 0.0)) {
                 A->column[i][A->count[i]] = c;
-                A->entry[i][A->count[i]++] = (moved[i] - base[i]) / change;
+                A->entry[i][A->count[i]++] = by[i];
             }
         }
     }
@@ -1212,6 +1237,7 @@ EXPORT void run_filter(const places *where, const record *log, const parameter_s
     f->m = (matrices *)(memory + 1);
     f->thrust = (model_held *)(f->m + 1);
     memset(&f->m->last, 0, sizeof f->m->last);
+    memset(f->m->knows, 0, sizeof f->m->knows);
     f->m->last.cosine = 1.0;
     begin_run(f, sets);
     const bool has_covariance = how->repeats != 2, predicts = how->begin >= 0.0;
