@@ -318,9 +318,14 @@ class KnownColumns:
             raise ValueError(f"must be {' or '.join(repr(f'{key} [{unit}]') for unit in _units(self._columns[key]))}")
         if others:
             return None
-        titles = {key: _title(key, column) for key, column in self._columns.items()}
+        titles = self.titles
         known = ", ".join(titles.values())
         raise ValueError(f"there is no such column, but {known}{did_you_mean(name, (), also=titles)}")
+
+    @property
+    def titles(self) -> dict[str, str]:
+        """A header of each column."""
+        return {key: _title(key, column) for key, column in self._columns.items()}
 
     def has(self, title: str, *, in_any_unit: bool = False) -> bool:
         """Return True if a file may have a column with this header; or with its name, in a unit that is not known."""

@@ -146,8 +146,8 @@ class LogColumn(Column):
 def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -> dict[str, LogColumn]:
     """Return the columns that a log of the axis, or of several, may have.
 
-    In a log of one axis, the name of a quantity need not tell the axis. The name of a thruster alone is enough for the
-    column of its command.
+    In a log of one axis, the name of a quantity need not tell the axis: its depth is also its `position`. The name of a
+    thruster alone is enough for the column of its command.
     """
     command = logged_command(keys)
     columns = {"time": LogColumn.of(TIME)}
@@ -168,6 +168,8 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
         if axis and quantity.axis == axis:
             short = "velocity" if quantity.is_velocity else axis.position
         also = (name,) if short != name else ()
+        if axis and quantity.axis == axis and not quantity.is_velocity:
+            also = (*also, "position")
         # `read_log` checks the bounds after the marks of no measurement are left out.
         column = LogColumn(quantity.units, True, True, also=(*quantity.also, *also), name=name, quantity=quantity)
         columns.setdefault(short, column)  # the distance along the axis comes first
@@ -202,14 +204,17 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
     known = columns_of_log(layout or Layout((), (), ()), None, tables.logs)
     of_csv = {**known, COMMAND: logged_command(tables.logs), **_OF_TABLES}
     of_topics = {name: column for name, column in known.items() if column.name}
-    entries, mistakes = {}, []
+    entries, mistakes = dict[str, LogColumn](), list[str]()
     for table, allowed, targets in (("columns", of_csv, tables.columns), ("topics", of_topics, tables.topics)):
         columns = KnownColumns(allowed)
         for source, title in targets.items():
             try:
                 found = columns.find(title, others=layout is None)
             except ValueError as error:
-                mistakes.append(key_line(f"{table}.{source}", str(error), title))
+                reason, choices = str(error), f", but {', '.join(columns.titles.values())}"
+                if any(choices in mistake for mistake in mistakes):  # once is enough
+                    reason = reason.replace(choices, "")
+                mistakes.append(key_line(f"{table}.{source}", reason, title))
                 continue
             if found and table == "topics":
                 is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None

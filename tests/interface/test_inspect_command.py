@@ -11,6 +11,7 @@ import pytest
 import tomlkit
 
 from rov_fmu.cli import main
+from rov_fmu.equation.catalogue import HEAVE, YAW
 from rov_fmu.identify.beginning import load_tests
 from rov_fmu.identify.findings import by_heading
 from rov_fmu.identify.inspection.inspected import inspect_paths
@@ -19,7 +20,9 @@ from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import VECTORED
 from tests.often import spread
-from tests.tank.logs import commanded, measured
+from tests.tank.inspection.test_outputs import TIME as DIVE_TIME
+from tests.tank.inspection.test_outputs import dive, held
+from tests.tank.logs import commanded, measured, used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
 from tests.tank.readers.writers import LOGS, Ros, parameter, servos, table, write_tlog
@@ -127,6 +130,46 @@ def test_the_draft_for_a_vehicle_of_ones_own_lacks_only_its_hardware(
     text = text.replace("[axes.yaw]", "")  # its column may stay
     (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
     assert [*load_tests(tmp_path).layout.by_name] == ["heave"]
+
+
+def test_a_draft_has_the_axes_that_no_log_measures_with_the_reason(tmp_path: Path, inspect: Inspect) -> None:
+    """Two thrusters turn the vehicle and push it ahead, as far as anybody knows; two push down."""
+    effects = {YAW: [3.0, -3.0, 0.0, 0.0], HEAVE: [0.0, 0.0, 0.6, 0.6]}
+    rng = np.random.default_rng(1)
+    log = dive(effects, "abcd", held(rng, 4), 1, ["depth", "heading"])
+    rows = (commanded(log, name, DIVE_TIME) for name in "abcd")
+    titles = "time [s],thruster_a,thruster_b,thruster_c,thruster_d,depth [m],heading [rad]"
+    table(tmp_path / "dive.csv", titles, DIVE_TIME, *rows, *(one.values for one in log.channels))
+    _, text = inspect()
+    assert parsed(text)["axes"].keys() == {"surge", "heave", "yaw"}
+    (line,) = (line for line in text.splitlines() if line.startswith("[axes.surge]"))
+    assert "no log measures it" in line
+    assert "a guess will do: 0.02 m2 times m_rov" in text
+
+
+@pytest.mark.parametrize(
+    ("titles", "unit"),
+    [
+        ("time [s],command [%],position [m]", 1.0),
+        ("time,command,distance", 1.0),
+        ("ms,command,position", 1000.0),
+        ("time [ms],command [%],distance [cm]", 1000.0),
+    ],
+)
+def test_a_log_of_one_axis_is_read_by_the_words_of_the_guide(
+    titles: str, unit: float, tmp_path: Path, inspect: Inspect
+) -> None:
+    """At 250 Hz, a time in ms has steps that a time in seconds might have."""
+    at = np.arange(0.0, 60.0, 0.004)
+    cm = 100.0 if "[cm]" in titles else 1.0
+    table(tmp_path / "log_surge_1.csv", titles, unit * at, 50.0 * np.sign(np.sin(at)), cm * 0.3 * at)
+    _, text = inspect()
+    path = tmp_path / "rov.toml"
+    path.write_text(text.replace('base = "?"', 'base = "videoray"'), encoding="utf-8")
+    (log,) = load_tests(tmp_path).folder.logs
+    assert measured(log, "surge distance")[-1] == pytest.approx(0.3 * at[-1], abs=1e-3)
+    assert used(log, "surge distance").time[-1] == pytest.approx(at[-1], abs=1e-3)
+    assert np.abs(commanded(log, "command")).max() == pytest.approx(0.5)
 
 
 @pytest.mark.parametrize(

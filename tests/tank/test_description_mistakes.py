@@ -247,6 +247,7 @@ def check_refused(folder: Path, starts: Sequence[str]) -> None:
         load_tests(folder)
     for line, start in zip(str(caught.value).splitlines(), starts, strict=True):
         assert line.startswith(f"{folder}{start}")
+    assert str(caught.value).count("there is no such column, but") <= 1, "the list of columns is told once"
 
 
 def test_all_problems_of_a_folder_in_one_go(tmp_path: Path) -> None:
@@ -301,6 +302,11 @@ FILES = {"pool.csv": "Time (s),thr_pwm,Depth (m)\n0,1500,0.5\n", "thrust_t200.cs
             "/rov.toml: columns.Tiefe = 'depth [fathom]': must be 'depth [m]' or",
         ),
         ("u_v [us]", "u_w [us]", "columns.thr_pwm = 'u_w [us]': there is no such column, but time [s], u_v [%], "),
+        (
+            "u_v [us]",
+            '?"\nTemp = "?',
+            "columns.thr_pwm = '?': there is no such column, but time [s], | /rov.toml: columns.Temp = '?': there is",
+        ),
         (
             "[columns]",
             '[topics]\n"/f.x" = "time [s]"\n[columns]',

@@ -18,7 +18,7 @@ from rov_fmu.tank.catalogue import NOT_MEASURED, words_of
 from rov_fmu.tank.description import DRAFTED
 from rov_fmu.tank.inspection.headers import TableHeaders, fitting, likely_thrusters
 from rov_fmu.tank.inspection.inspection import Inspection
-from rov_fmu.tank.inspection.outputs import NOTHING_MOVED, RADIUS, Moved
+from rov_fmu.tank.inspection.outputs import GUESSED, NOTHING_MOVED, RADIUS, Moved
 from rov_fmu.tank.readers.ardusub_frames import config_of, fitting_frames
 from rov_fmu.tank.readers.parsers import format_of
 from rov_fmu.vehicle.description import why_no_identifier
@@ -112,8 +112,10 @@ def draft(
         guesses=guess.moved.thrusters,
         inertia=guess.inertia,
         vector=_vector,
-        axes=AXES.values(),
         undriven=guess.moved.undriven,
+        usual=GUESSED,
+        pushed=guess.moved.pushed,
+        radius=RADIUS,
         signals={row.name for one in inspections for row in one.channels},
         body=[*BODY, *ARM],
         vehicle=vehicle,

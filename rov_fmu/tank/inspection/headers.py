@@ -32,7 +32,7 @@ from rov_fmu.tank.catalogue import (
     unit_names,
     words_in,
 )
-from rov_fmu.tank.columns import columns_of, columns_of_log, has_column
+from rov_fmu.tank.columns import COMMAND, columns_of, columns_of_log, has_column
 from rov_fmu.tank.commands import PULSE_RANGE
 from rov_fmu.tank.folder import axis_in_name, kind_of_table, parts_of_name
 from rov_fmu.tank.readers.listing import list_files
@@ -73,6 +73,8 @@ _LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle":
 _EXTERNAL = {axis.external.casefold(): axis for axis in AXES.values()}
 _VELOCITIES = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
 _RATES = {True: "yaw velocity", False: "surge velocity"}
+_LONG_STEP, _STEP, _LONG_LOG = 5.0, 1.5, 2e4
+"""Times in seconds have no longer steps than the first number; nor than the second one in a log of five hours."""
 _EPOCHS = ((1e17, "ns"), (1e14, "us"), (1e11, "ms"))
 """The least time since 1970 that is in a unit."""
 
@@ -165,7 +167,21 @@ def guessed(
         for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):
             columns[title] = f"u_{name} [{_unit_of_command(title, numbers[title])}]"
     others = {title: name for title, name in meant.items() if title not in commanding and not is_column(title)}
+    if axis:
+        columns |= _of_axis(axis, [title for title, name in others.items() if not name], numbers)
     return layout, columns | _measured(others, numbers, is_up=_is_up(meant, numbers))
+
+
+def _of_axis(axis: Axis, titles: Iterable[str], numbers: Mapping[str, Array]) -> dict[str, str]:
+    """Return what headers seem to mean in a log of one axis whose words alone say it: its command and its position."""
+    found: dict[str, str] = {}
+    for title in (title for title in titles if len(numbers[title])):
+        words = _words(title)
+        if words == COMMAND:
+            found[title] = f"{COMMAND} [{_unit_of_command(title, numbers[title])}]"
+        elif words in ("distance", "position") and name_and_unit(title, QUANTITIES[axis.position].units)[1] == "":
+            found[title] = f"{axis.position} [{_unit(title, axis.position, numbers[title])}]"
+    return found
 
 
 def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts: Iterable[Layout]) -> list[str]:
@@ -372,8 +388,10 @@ def _unit(title: str, name: str, numbers: Array) -> str:
     units, most = QUANTITIES[name].units if name in QUANTITIES else TIMES, float(np.abs(numbers).max(initial=0.0))
     given = name_and_unit(title, units)[1]
     if name == "time":
-        usual = float(np.ptp(numbers)) / max(len(numbers) - 1, 1) if len(numbers) else 0.0
-        likely = next((unit for least, unit in _EPOCHS if most > least), "ms" if usual > 5.0 and most < 1e9 else "s")
+        long = float(np.ptp(numbers)) if len(numbers) else 0.0
+        usual = long / max(len(numbers) - 1, 1)
+        is_ms = (usual > _LONG_STEP or (usual > _STEP and long > _LONG_LOG)) and most < 1e9
+        likely = next((unit for least, unit in _EPOCHS if most > least), "ms" if is_ms else "s")
     else:
         largest = _LIKELY.get(name, inf)
         likely = next((unit for unit, per in units.items() if most <= largest * per), [*units][-1])

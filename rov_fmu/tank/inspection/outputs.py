@@ -56,16 +56,21 @@ class Moved:
         found = ((name, self._thruster(name, effects)) for name, effects in self.by_output.items())
         return {name: thruster for name, thruster in found if thruster}
 
+    @cached_property
+    def pushed(self) -> frozenset[Axis]:
+        """The axes along which thrusters push alone, as they are known or guessed."""
+        if self.driven is not None or not self.thrusters:
+            return self.driven or frozenset()
+        layout = Layout(tuple(VehicleAxis(axis) for axis in GUESSED), (), tuple(self.thrusters.values()))
+        return frozenset(GUESSED) - dict(undriven_axes(layout)).keys()
+
     @property
     def undriven(self) -> list[Axis]:
-        """The axes that the logs show, and along which no output pushes alone."""
-        if self.driven is not None:
-            return [axis for axis in GUESSED if axis not in self.driven]
-        if len(self.thrusters) < len(self.by_output):
+        """The axes along which no output pushes alone; none where the outputs do not tell."""
+        if self.driven is None and len(self.thrusters) < max(len(self.by_output), 1):
             return []
-        layout = Layout(tuple(VehicleAxis(axis) for axis in GUESSED), (), tuple(self.thrusters.values()))
-        driven = {axis for effects in self.by_output.values() for axis in effects}
-        return [axis for axis in self.shown if axis not in driven or axis in dict(undriven_axes(layout))]
+        driven = {axis for effects in self.by_output.values() for axis in effects} if self.driven is None else GUESSED
+        return [axis for axis in GUESSED if axis not in self.pushed or (axis in self.shown and axis not in driven)]
 
     def _thruster(self, name: str, effects: Mapping[Axis, float]) -> Thruster | None:
         """Return a thruster with the direction of its push, and beside the centre of mass if it turns the vehicle."""

@@ -48,7 +48,8 @@ def test_four_thrusters_without_a_velocity_sensor(shown: list[str]) -> None:
     thrusters = found.thrusters
     assert [thrusters[name].direction.value for name in "abcd"] == [(1, 0, 0), (1, 0, 0), (0, 0, 1), (0, 0, -1)]
     assert [np.sign(thrusters[name].effect(YAW)) for name in "abcd"] == [1.0, -1.0, 0.0, 0.0]
-    assert not found.undriven
+    assert found.pushed == {SURGE, HEAVE, YAW}
+    assert found.undriven == [SWAY]
     assert all(one.direction.source.startswith("A guess: ") for one in thrusters.values())
 
 
@@ -64,7 +65,7 @@ def test_directions_of_vectored_thrusters_follow_from_velocities() -> None:
         thruster = found.thrusters[name]
         assert np.sign(thruster.direction.value).tolist() == [*signs[:2, n], 0.0]
         assert np.sign(thruster.effect(YAW)) == signs[2, n]
-    assert not found.undriven
+    assert found.undriven == [HEAVE]
 
 
 def test_what_moves_nothing_is_not_guessed_and_equal_commands_share() -> None:
