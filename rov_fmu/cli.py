@@ -878,7 +878,7 @@ def _inspect(tests: tuple[Path, ...], report: Path | None, *, drafts: bool, forc
 @_force_option()
 def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
     """Find alpha and beta of an axis that give a wanted response."""
-    from rov_fmu.identify.findings import sentences
+    from rov_fmu.identify.findings import result_sentences
     from rov_fmu.identify.tuning import implausible
     from rov_fmu.interface.tune_command import tune_vehicle
     from rov_fmu.report.console import print_end, shell_words
@@ -886,7 +886,7 @@ def _tune(vehicle: Path, axis: str, output: Path | None, **wanted: Any) -> None:
 
     tuning, files = tune_vehicle(vehicle, AXES[axis], output=output, **wanted)
     print_tuning(tuning)
-    for message in sentences(implausible(tuning)):
+    for message in result_sentences(implausible(tuning)):
         _warn(message)
     following = shell_words("rov-fmu", "build", output) if output else "add -o TUNED.toml to write the tuned vehicle"
     print_end(files, following)

@@ -23,7 +23,7 @@ _SHARED = CONSTANTS["shared"].value
 """A time is not told from another one whose knowledge would take away this share of its variance."""
 
 
-def effects_of(fit: Fit) -> Iterator[IdentifiedEffect]:
+def optional_effects(fit: Fit) -> Iterator[IdentifiedEffect]:
     """Yield all optional effects with their evidence, beside those that are kept.
 
     That of a hypothesis about the structure, which is no effect of unusual size, is that with which it won.
@@ -118,7 +118,7 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
         yield Logging(sampled.log.file, sampled.interval, offset + delay, (low + delay, high + delay), width)
 
 
-def times_of(fit: Fit) -> tuple[str, ...]:
+def command_times(fit: Fit) -> tuple[str, ...]:
     """Return, in words, a time from a command to what a sensor shows, and the others that the logs do not tell from it.
 
     The interval of the first one then contains both its absence and its usual size. To know one of the others would

@@ -204,7 +204,7 @@ _ORDER = [*dict.fromkeys((*_FIRST, *SENTENCES))]
 """The kinds in the order in which they are told, the warnings first."""
 
 
-def sentences(some: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
+def result_sentences(some: Iterable[Finding], kind: str = "") -> tuple[str, ...]:
     """Return the sentences of findings, if given only of those of a kind; similar findings share one sentence."""
     return sentences_by((one for one in some if kind in ("", one.kind)), SENTENCES)
 
@@ -214,7 +214,7 @@ def by_heading(findings: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
     groups: dict[Heading, list[Finding]] = {name: [] for name in _FORMS}
     for finding in findings:
         groups[SEVERITY[finding.kind]].append(finding)
-    return {name: sentences(some) for name, some in groups.items()}
+    return {name: result_sentences(some) for name, some in groups.items()}
 
 
 def told(identification: Identification) -> Identification:
@@ -283,7 +283,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
     return tuple(sorted(findings, key=lambda one: _ORDER.index(one.kind)))
 
 
-def name_of(p: Prediction) -> str:
+def prediction_name(p: Prediction) -> str:
     """Return the name of what is predicted: `heave depth, 10 s ahead`."""
     quantity = p.quantity if p.axis.name in p.quantity else f"{p.axis.name} {p.quantity}"
     return f"{quantity}, {p.span:g} s ahead" if isfinite(p.span) else quantity
@@ -298,7 +298,7 @@ def error_in_words(p: Prediction) -> str:
     """Return the error of a prediction beside that of a prediction of no change, and the share in the band."""
     error, unchanged = _errors(p)
     return (
-        f"{name_of(p)}: off by {error} (RMS) in {p.file}, and a prediction of no change by {unchanged}; "
+        f"{prediction_name(p)}: off by {error} (RMS) in {p.file}, and a prediction of no change by {unchanged}; "
         f"{p.coverage:.0%} of the samples are inside the 95% band"
     )
 

@@ -16,7 +16,7 @@ from rov_fmu.identify.beginning import table_rows
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import NO_SHAPES
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.objective import Objective, Part, TableRow, cost, modelled
+from rov_fmu.identify.likelihood.objective import DataPart, Objective, TableRow, cost, modelled
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.posterior import Posterior, variances_of
 from rov_fmu.identify.likelihood.records import unchanged
@@ -54,7 +54,7 @@ class HeldOut:
     """The data of the fit in words, such as `the other 2 logs` or `the first half`."""
     axes: tuple[Axis, ...]
     """The axes of which these data know enough."""
-    part: Part
+    part: DataPart
     fit: Posterior
     """With all effects."""
 
@@ -66,7 +66,7 @@ class Knowledge:
         self.objective, self.best = objective, best
         self._all = Posterior.of(objective.table, best.z, best.information)
 
-    def share(self, logarithms: Callable[[Array], Array], part: Part) -> Array:
+    def share(self, logarithms: Callable[[Array], Array], part: DataPart) -> Array:
         """Return ln(s_prior / s_part) / ln(s_prior / s_all), with the standard deviations s of each of m logarithms.
 
         The function returns m x n logarithms for p x n coordinates. The share is 0 where all data tell nothing.
@@ -79,7 +79,7 @@ class Knowledge:
             nats = [np.nan_to_num(np.log(np.diag(prior) / np.diag(C))) for C in (some, every)]
         return np.asarray(nats[0] / np.maximum(nats[1], 1e-9))
 
-    def informs(self, axis: Axis, part: Part) -> bool:
+    def informs(self, axis: Axis, part: DataPart) -> bool:
         """Return True if a part of the data tells half of what all tell of the speed, time and way at half command."""
         return float(np.mean(self.share(logarithms(self.objective.table, axis, _CENTRAL), part))) >= INFORMED
 
@@ -91,16 +91,16 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
     other logs and the other half. Where that does not know enough either, nothing is held out.
     """
     logs, rows = objective.whole.logs, objective.whole.rows
-    known, found = Knowledge(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], Part]]()
+    known, found = Knowledge(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], DataPart]]()
     for n in logs:
         others = [m for m in logs if m != n]
         words = "the other log" if len(others) == 1 else f"the other {len(others)} logs"
         rest, middle = list({m.sensor.axis for m in objective.logs[n].measured}), len(objective.records[n].time) // 2
         halves = slice(middle), slice(middle, None)
         with_others = f" and {words}" if others else ""
-        parts = [(slice(None), words if others else "the tables", Part(others, rows))]
+        parts = [(slice(None), words if others else "the tables", DataPart(others, rows))]
         parts += [
-            (out, f"the {name} half{with_others}", Part(logs, rows, {n: used}))
+            (out, f"the {name} half{with_others}", DataPart(logs, rows, {n: used}))
             for out, used, name in zip(halves[::-1], halves, ("first", "second"), strict=True)
         ]
         for out, by, part in parts:
@@ -261,7 +261,9 @@ def held_out_rows(objective: Objective, best: Minimum) -> Values:
     rows, known = objective.rows, Knowledge(objective, best)
     found: dict[tuple[str, str, float], float] = {}
     groups = grouped(((row.quantity == "force", row.subject.name, abs(row.command)), n) for n, row in enumerate(rows))
-    parts = [Part(objective.whole.logs, [n for n in objective.whole.rows if n not in out]) for out in groups.values()]
+    parts = [
+        DataPart(objective.whole.logs, [n for n in objective.whole.rows if n not in out]) for out in groups.values()
+    ]
     for members, part, without in zip(groups.values(), parts, refits(objective, best, parts), strict=True):
         some = [rows[n] for n in members]
 

@@ -27,7 +27,7 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief
 from rov_fmu.io.numbers import with_interval
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.description import DRAFTED, ROV_FILE
 from rov_fmu.vehicle.checks import check_surface
 from rov_fmu.vehicle.description import LEAST_RANGE, UNIT_OF_RANGE, Provenance
@@ -400,7 +400,7 @@ def tested_ranges(identification: Identification) -> Iterator[Range]:
         yield from (Range(name, *some[name]) for name in UNIT_OF_RANGE if name in some)
 
 
-def _variable(quantity: Quantity) -> str:
+def _variable(quantity: MeasuredQuantity) -> str:
     """Return the variable of the FMU that a sensor measures, if its range tells where the vehicle was identified."""
     if quantity.axis is None:
         return ""

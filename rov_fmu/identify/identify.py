@@ -12,7 +12,7 @@ from rov_fmu.equation.catalogue import AXES, Axis
 from rov_fmu.equation.parts import Part
 from rov_fmu.identify import assess
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of, structures_of, times_of
+from rov_fmu.identify.effects import command_times, loggers_of, optional_effects, sensors_of, structures_of
 from rov_fmu.identify.findings import UNLOGGED, beyond_thrusters, is_commanded, is_unlogged, may_rock, told
 from rov_fmu.identify.given import Tests, thrusters_along_no_other
 from rov_fmu.identify.held_out import held_out, held_out_rows, points_of, predictions
@@ -21,7 +21,7 @@ from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit, fit_all
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.next_test import next_test
-from rov_fmu.identify.progress import OnAnswer, Work
+from rov_fmu.identify.progress import OnAnswer, ProgressReport
 from rov_fmu.identify.result import (
     ALARM,
     Answer,
@@ -78,7 +78,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         wrong = found if left <= ALARM else ()
         return bool(wrong)
 
-    work = Work(on_progress, on_answer)
+    work = ProgressReport(on_progress, on_answer)
     fit = fit_all(known, logs, rows, work, is_mistaken)
     show = work.steps("predicting what was left out")
     show(0)
@@ -103,7 +103,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         axes=(),
         curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
         forces=tuple(p for p in points if p.quantity == "force"),
-        effects=tuple(effects_of(fit)),
+        effects=tuple(optional_effects(fit)),
         disturbances=slow,
         logging=tuple(loggers_of(fit)),
         sensors=tuple(sensors_of(fit)),
@@ -113,7 +113,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         slips=wrong,
         structures=tuple(structures_of(fit)),
         alike=fit.alike,
-        times=times_of(fit),
+        times=command_times(fit),
     )
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)
     for n, axis in enumerate(known.fitted):

@@ -17,7 +17,7 @@ from rov_fmu.identify.likelihood.solve import Minimum
 from rov_fmu.identify.result import LEAST_TESTED
 from rov_fmu.io.messages import Progress, silent
 from rov_fmu.tank.arrays import Array, rms
-from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.catalogue import MeasuredQuantity
 
 OnAnswer = Callable[[str, str], None]
 """A function that is called with the name of an axis, and with what is known about it so far."""
@@ -39,7 +39,7 @@ _USUAL = 0.5
 """The command of which the speed is told, or the strongest tested one if that is weaker."""
 
 
-class Work:
+class ProgressReport:
     """What an identification tells of its work."""
 
     def __init__(self, on_progress: Progress = silent, on_answer: OnAnswer | None = None) -> None:
@@ -92,7 +92,7 @@ def so_far(objective: Objective, minimum: Minimum) -> Iterator[tuple[Axis, str]]
 
 def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
     """Return by how much predictions over 10 s are wrong (RMS), in words, with the first quantity of each axis."""
-    errors = dict[Axis, dict[Quantity, list[Array]]]()
+    errors = dict[Axis, dict[MeasuredQuantity, list[Array]]]()
     for n, (sampled, record) in enumerate(zip(objective.logs, objective.records, strict=True)):
         begin, counts = usual(minimum, n, record)
         off = objective.run(minimum.z, n, begin=begin, span=AHEAD).innovations
@@ -102,7 +102,7 @@ def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
     return {axis: _in_words(*next(iter(own.items()))) for axis, own in errors.items()}
 
 
-def _in_words(quantity: Quantity, errors: Sequence[Array]) -> str:
+def _in_words(quantity: MeasuredQuantity, errors: Sequence[Array]) -> str:
     """Return the errors of a quantity, such as `depth to 2 cm`."""
     error, unit = rms(np.concatenate(errors)), quantity.unit
     factor, unit = (100.0, "cm") if unit == "m" and error < 1.0 else in_degrees(unit)

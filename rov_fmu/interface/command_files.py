@@ -12,7 +12,7 @@ from rov_fmu.io.messages import FileError, only, shown
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.description import RovFile
 from rov_fmu.tank.folder import description_beside, one_log
-from rov_fmu.tank.inspection.headers import header_parts, layout_of
+from rov_fmu.tank.inspection.headers import assumed_layout, header_parts
 from rov_fmu.tank.readers.parsers import guarded, header_of, one_parser, open_table
 
 
@@ -50,7 +50,7 @@ def _of_log(path: Path, layout: Layout, rov_file: RovFile) -> dict[str, Array]:
         raise FileError(
             f"{path}: has the commands of thrusters, but those of this vehicle are {', '.join(layout.commands)}"
         )
-    driven = layout_of(name.removeprefix("u_") for name in layout.commands)  # a thruster for each command
+    driven = assumed_layout(name.removeprefix("u_") for name in layout.commands)  # a thruster for each command
     log = one_log(path, driven, rov_file, is_part=True)
     if not log.commands:
         raise FileError(f"{path}: no commands of {', '.join(layout.commands)} were found")

@@ -12,10 +12,10 @@ from rov_fmu.identify.findings import (
     driven_aside,
     effect_or_range,
     extrapolated,
-    name_of,
     next_tests,
+    prediction_name,
     repairs,
-    sentences,
+    result_sentences,
     size_in_words,
     tested_in_words,
     with_error,
@@ -34,7 +34,7 @@ def print_identification(identification: Identification) -> None:
     to get there and to stop, and how well motion is predicted that the fit had not seen.
     """
     out, vehicle = console(), identification.vehicle
-    for words in sentences(identification.findings, "assumed vehicle"):
+    for words in result_sentences(identification.findings, "assumed vehicle"):
         paragraph(out, f"Assumed: {words}.")
     paragraph(out, f"{vehicle.name}. {vehicle.source}")
     for words in repairs(identification):
@@ -76,7 +76,9 @@ def _errors(axes: Sequence[AxisResult]) -> Table:
     shown = table("", "Unseen data, RMS", ("error", "no change", "noise"))
     for result in axes:
         if p := result.main:
-            shown.add_row(name_of(p), *(size_in_words(size, p.unit) for size in (p.error, p.unchanged, p.noise)))
+            shown.add_row(
+                prediction_name(p), *(size_in_words(size, p.unit) for size in (p.error, p.unchanged, p.noise))
+            )
         for quantity in () if result.main else ("V_ss", "Tau"):
             if points := [p for p in result.points if p.quantity == quantity and p.counts]:
                 error = text(relative_error(points, "held_out"), ".1%")
@@ -91,14 +93,14 @@ def _conclusions(identification: Identification) -> Iterator[str]:
         words = (f"{e.name} ({f'{e.of} {effect_or_range(e)}'.strip()})" for e in kept)
         yield f"What else acts: {', '.join(words)}."
     for kind in ("rests", "assumed thrust"):
-        yield from (f"{sentence}." for sentence in sentences(identification.findings, kind))
+        yield from (f"{sentence}." for sentence in result_sentences(identification.findings, kind))
     groups = by_heading(identification.findings)
     yield "Warnings:" if groups["Warnings"] else "No warnings."
     yield from (f"- {warning}" for warning in groups["Warnings"])
-    others = sentences(identification.findings, "other files")
+    others = result_sentences(identification.findings, "other files")
     yield from others
     for kind in ("rests", "assumed thrust", "assumed vehicle"):
-        others += sentences(identification.findings, kind)
+        others += result_sentences(identification.findings, kind)
     if rest := sum(len(groups[name]) for name in ("Doubts", "Facts")) - len(others):
         yield f"--report shows {rest} more doubts and facts." if rest > 1 else "--report shows one more doubt or fact."
     yield from (f"To measure next: {test}" for test in next_tests(identification))

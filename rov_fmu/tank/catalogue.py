@@ -36,7 +36,7 @@ LEAST_PRESSURE = 0.01
 
 
 @dataclass(frozen=True)
-class Quantity:
+class MeasuredQuantity:
     """A quantity that a sensor measures."""
 
     name: str
@@ -61,21 +61,23 @@ class Quantity:
         return next(iter(self.units))
 
 
-def _quantities() -> Iterator[Quantity]:
+def _quantities() -> Iterator[MeasuredQuantity]:
     symbols = {HEAVE: ("z",), ROLL: ("phi", "roll"), PITCH: ("theta", "pitch"), YAW: ("psi",)}
     for axis in AXES.values():
         lengths = ANGLES if axis.is_rotation else LENGTHS
         short = axis.position != "distance"
         also = (*([f"{axis.name} {axis.position}"] if axis in (HEAVE, YAW) else []), *symbols.get(axis, ()))
         name = axis.position if short else f"{axis.name} distance"
-        yield Quantity(name, lengths, axis, also=also, wraps=axis in (ROLL, YAW))
+        yield MeasuredQuantity(name, lengths, axis, also=also, wraps=axis in (ROLL, YAW))
         word, others = ("rate", _TURNS) if axis.is_rotation else ("speed", _SPEEDS)
         rates = {f"{unit}/s": per for unit, per in lengths.items()} | others
         also = axis.velocity, f"{axis.name} {word}"
-        yield Quantity(f"{axis.name} velocity", rates, axis, True, also, minimum=-1e3, maximum=1e3)
-    yield Quantity("distance", LENGTHS)
-    yield Quantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
-    yield Quantity("voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0)
+        yield MeasuredQuantity(f"{axis.name} velocity", rates, axis, True, also, minimum=-1e3, maximum=1e3)
+    yield MeasuredQuantity("distance", LENGTHS)
+    yield MeasuredQuantity("pressure", PRESSURES, minimum=0.0, maximum=1e9)
+    yield MeasuredQuantity(
+        "voltage", VOLTAGES, also=("battery", "battery voltage"), minimum=0.0, maximum=1e4, least=1.0
+    )
 
 
 QUANTITIES = {quantity.name: quantity for quantity in _quantities()}
@@ -124,7 +126,7 @@ class Message:
 
 
 @dataclass(frozen=True)
-class Output:
+class ThrusterOutput:
     """Fields of a kind of message that contain the commands of thrusters, one field or one topic for each thruster."""
 
     kind: str
@@ -228,7 +230,7 @@ MESSAGES = (*_MAVLINK, *_DATAFLASH, *_PX4, *_ROS, *_OF_BLUEYE)
 
 
 @dataclass(frozen=True)
-class Validity:
+class ValidityField:
     """A field of a kind of message that tells whether other fields of the same message are measurements."""
 
     kind: str
@@ -253,45 +255,45 @@ class Validity:
 VALIDITIES = (
     # "set element 0 of the associated covariance matrix to -1" (sensor_msgs/Imu), which others do, too
     *(
-        Validity(_IMU, f"{part}_covariance[0]", rf"{part}\..", least=0.0)
+        ValidityField(_IMU, f"{part}_covariance[0]", rf"{part}\..", least=0.0)
         for part in ("orientation", "angular_velocity")
     ),
     *(
-        Validity(f"{_ODOMETRY}|{alone}", f"{prefix}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
+        ValidityField(f"{_ODOMETRY}|{alone}", f"{prefix}covariance[0]", rf"(.*\.)?{part}\..", least=0.0)
         for whole, part, _, _, alone, *_ in _PARTS
         for prefix in (f"{whole}.", "")
     ),
     *(
-        Validity(
+        ValidityField(
             f"{_ODOMETRY}|{alone}", f"{prefix}covariance[{first + 7 * n}]", rf"(.*\.)?{part}\.{letter}", below=huge
         )
         for whole, part, _, _, alone, letters, first, huge in _PARTS
         for prefix in (f"{whole}.", "")
         for n, letter in enumerate(letters)
     ),
-    Validity(_DVLS[1], "velocity_mode", r"velocity\..", least=1.0, below=2.0),  # others are through the water
-    Validity(_DVLS[1], "num_good_beams", r"velocity\..", least=3.0, may_lack=True),
-    Validity(r"sensor_msgs/.*BatteryState", "present", "voltage", least=1.0, may_lack=True),
-    Validity("BARO", "Health", "Alt|Press", least=1.0),
-    Validity("BARO", "H", "Alt|Press", least=1.0),
-    Validity("vehicle_local_position", "xy_valid", "[xy]", least=1.0),
-    Validity("vehicle_local_position", "z_valid", "z", least=1.0),
-    Validity("vehicle_local_position", "v_xy_valid", "v[xy]", least=1.0),
-    Validity("vehicle_local_position", "v_z_valid", "vz", least=1.0),
-    Validity("battery_status", "connected", "voltage_v", least=1.0, may_lack=True),
-    Validity(_ESTIMATE, "position_estimate.is_valid", r"position_estimate\..*", least=1.0),
+    ValidityField(_DVLS[1], "velocity_mode", r"velocity\..", least=1.0, below=2.0),  # others are through the water
+    ValidityField(_DVLS[1], "num_good_beams", r"velocity\..", least=3.0, may_lack=True),
+    ValidityField(r"sensor_msgs/.*BatteryState", "present", "voltage", least=1.0, may_lack=True),
+    ValidityField("BARO", "Health", "Alt|Press", least=1.0),
+    ValidityField("BARO", "H", "Alt|Press", least=1.0),
+    ValidityField("vehicle_local_position", "xy_valid", "[xy]", least=1.0),
+    ValidityField("vehicle_local_position", "z_valid", "z", least=1.0),
+    ValidityField("vehicle_local_position", "v_xy_valid", "v[xy]", least=1.0),
+    ValidityField("vehicle_local_position", "v_z_valid", "vz", least=1.0),
+    ValidityField("battery_status", "connected", "voltage_v", least=1.0, may_lack=True),
+    ValidityField(_ESTIMATE, "position_estimate.is_valid", r"position_estimate\..*", least=1.0),
 )
 """The marks of validity inside messages, beside flags that their names tell."""
 
 _ACTUATORS = r"(?i)thruster|motor|actuator|propeller|pwm|command|cmd"
 OUTPUTS = (
-    Output("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us", spread=True),
-    Output("RCO[U23]", r"C(\d+)", "us", spread=True),
-    Output("actuator_motors", r"control\[(\d+)\]", "1"),
-    Output("actuator_outputs", r"output\[(\d+)\]"),
-    Output(r"mavros_msgs/.*RCOut", r"channels\[(\d+)\]", "us"),
-    Output(r"std_msgs/.*(Float|Int)\d+(Stamped)?", "data", topic=r"(?i)(?:thruster|motor|propeller)s?\D*(\d+)"),
-    Output(r"std_msgs/.*MultiArray(Stamped)?", r"data\[(\d+)\]", topic=_ACTUATORS),
+    ThrusterOutput("SERVO_OUTPUT_RAW", r"servo(\d+)_raw", "us", spread=True),
+    ThrusterOutput("RCO[U23]", r"C(\d+)", "us", spread=True),
+    ThrusterOutput("actuator_motors", r"control\[(\d+)\]", "1"),
+    ThrusterOutput("actuator_outputs", r"output\[(\d+)\]"),
+    ThrusterOutput(r"mavros_msgs/.*RCOut", r"channels\[(\d+)\]", "us"),
+    ThrusterOutput(r"std_msgs/.*(Float|Int)\d+(Stamped)?", "data", topic=r"(?i)(?:thruster|motor|propeller)s?\D*(\d+)"),
+    ThrusterOutput(r"std_msgs/.*MultiArray(Stamped)?", r"data\[(\d+)\]", topic=_ACTUATORS),
 )
 """The outputs to thrusters. What an autopilot says that it sends is preferred to topics that only their names tell."""
 
@@ -350,7 +352,7 @@ def as_json(axis: Axis) -> list[dict[str, Any]]:
 
 
 @cache
-def is_known(kind: str) -> bool:
+def is_known_kind(kind: str) -> bool:
     """Return True if messages of this type may be recognised."""
     kinds = [message.kind for message in (*MESSAGES, *WRENCHES)] + [output.kind for output in OUTPUTS]
     return any(re.fullmatch(pattern, kind) for pattern in kinds)

@@ -36,8 +36,8 @@ from rov_fmu.tank.catalogue import (
     RATES,
     VECTORS,
     VELOCITY,
+    MeasuredQuantity,
     Message,
-    Quantity,
     words_of,
 )
 from rov_fmu.tank.clocks import ascending, first_in_each
@@ -334,7 +334,7 @@ def _of_position(position: Array) -> dict[str, Array]:
 
 
 def of_scalar(
-    quantity: Quantity,
+    quantity: MeasuredQuantity,
     source: Source,
     time: Array,
     values: Array,

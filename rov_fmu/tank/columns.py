@@ -30,7 +30,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import FORCE, QUANTITIES, TIMES, TORQUE, Quantity
+from rov_fmu.tank.catalogue import FORCE, QUANTITIES, TIMES, TORQUE, MeasuredQuantity
 from rov_fmu.tank.commands import NO_KEYS, LogKeys
 from rov_fmu.tank.description import RovTables
 
@@ -128,7 +128,7 @@ class LogColumn(Column):
 
     name: str = ""
     """The name of the quantity, the input or the thruster; `command` for that of an axis."""
-    quantity: Quantity | None = None
+    quantity: MeasuredQuantity | None = None
     """None for a command."""
     commands: str = ""
     """What the command is of. A log has commands of one kind. Empty for another column."""
@@ -183,7 +183,7 @@ _OF_TABLES = {name: column for kind in TABLES for name, column in columns_of(kin
 
 
 @dataclass(frozen=True)
-class Names:
+class ColumnNames:
     """The tables [columns], [topics], [valid] and [logs] of rov.toml."""
 
     columns: Mapping[str, str] = field(default_factory=lambda: WELL_KNOWN)
@@ -196,7 +196,7 @@ class Names:
     """What the logs do not tell."""
 
 
-def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]]:
+def names_of(layout: Layout | None, tables: RovTables) -> tuple[ColumnNames, list[str]]:
     """Return the names of rov.toml, and a line for every value that is no column of a log, or of a table in a CSV file.
 
     Without a layout, a value that is not known may be the command of a thruster.
@@ -219,7 +219,7 @@ def names_of(layout: Layout | None, tables: RovTables) -> tuple[Names, list[str]
             if found and table == "topics":
                 is_pulse = found.unit in PULSES and not found.numbers and tables.logs.neutral is None
                 entries[source] = replace(known[found.name], convert=found.convert, is_pulse=is_pulse)
-    return Names({**WELL_KNOWN, **tables.columns}, entries, tables.valid, tables.logs), mistakes
+    return ColumnNames({**WELL_KNOWN, **tables.columns}, entries, tables.valid, tables.logs), mistakes
 
 
 def is_of_inputs(layout: Layout, names: Iterable[str]) -> bool:

@@ -30,7 +30,7 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed, shown
 from rov_fmu.io.toml_file import AS_TUPLE, Finite, Strict
 from rov_fmu.tank.arrays import Array, spread
-from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, Output, words_of
+from rov_fmu.tank.catalogue import FORCE, MESSAGES, NOT_COMMANDED, OUTPUTS, POSITION, WRENCHES, ThrusterOutput, words_of
 from rov_fmu.tank.channels import Topic, frames_of
 from rov_fmu.tank.clocks import ascending, held
 from rov_fmu.tank.findings import Finding, about
@@ -88,7 +88,7 @@ _Sent = TypeVar("_Sent")
 
 
 @dataclass(frozen=True, eq=False)
-class Parameters:
+class AutopilotParameters:
     """The parameters of an autopilot, with the times at which they were told."""
 
     told: Mapping[str, tuple[Array, ...]] = field(default_factory=dict)
@@ -97,7 +97,7 @@ class Parameters:
     """The names of those whose values were asked for."""
 
     @classmethod
-    def of_pairs(cls, told: Mapping[str, Sequence[tuple[float, float]]], delay: float = 0.0) -> "Parameters":
+    def of_pairs(cls, told: Mapping[str, Sequence[tuple[float, float]]], delay: float = 0.0) -> "AutopilotParameters":
         """Return parameters that were told at times that are late by a delay, s, with these values."""
         columns = {name: np.array(pairs, float).T for name, pairs in told.items()}
         return cls({name: ascending(time - delay, values) for name, (time, values) in columns.items()})
@@ -133,7 +133,7 @@ class Parameters:
 class _Outputs:
     """The outputs of one sender: a time series for each number."""
 
-    rule: Output
+    rule: ThrusterOutput
     source: Source
     """The source, or the first one where each thruster has its own."""
     series: Mapping[int, Series]
@@ -155,7 +155,7 @@ class _Outputs:
 
 
 @dataclass(frozen=True)
-class Function:
+class OutputFunction:
     """What an output drives."""
 
     output: int
@@ -190,7 +190,7 @@ class Commanded:
 
 
 def commands_of(
-    path: Path, topics: Sequence[Topic], thrusters: Sequence[str], parameters: Parameters, keys: LogKeys
+    path: Path, topics: Sequence[Topic], thrusters: Sequence[str], parameters: AutopilotParameters, keys: LogKeys
 ) -> Commanded:
     """Return the commands of the thrusters, which are numbered from 1 if they have no names. Raises DataFileError."""
     candidates = [*_candidates(topics)]
@@ -332,7 +332,7 @@ def _best(candidates: Sequence[_Outputs], thrusters: int, modules: Mapping[str, 
     return max(same, key=lambda o: (o.source.part == wanted, len(o.used) == thrusters, _activity(o.series)))
 
 
-def _motor_modules(parameters: Parameters) -> dict[str, int]:
+def _motor_modules(parameters: AutopilotParameters) -> dict[str, int]:
     """Return the modules of PX4's outputs that drive motors, by the functions of the outputs, with their instances.
 
     The first instance is of the MAIN outputs, if any of these has a function, and the next one of the AUX outputs.
@@ -366,7 +366,7 @@ def _joined(outputs: Sequence[_Outputs], modules: Mapping[str, int]) -> Iterator
     yield _Outputs(found[0].rule, replace(found[0].source, part=_instances(modules)), series, topics)
 
 
-def _functions(parameters: Parameters, modules: Mapping[str, int]) -> dict[int, Function]:
+def _functions(parameters: AutopilotParameters, modules: Mapping[str, int]) -> dict[int, OutputFunction]:
     """Return what the outputs drive, by the number of the output, as far as the parameters tell it.
 
     `modules` are those of PX4 that drive motors, whose outputs are numbered together.
@@ -377,11 +377,11 @@ def _functions(parameters: Parameters, modules: Mapping[str, int]) -> dict[int, 
         motor = motors.index(int(function)) + 1 if function in motors else 0
         if motor or not match[1]:  # an output of PX4 that drives no motor may be another one of the same number
             number = int(match[2]) + _PER_MODULE * ([*modules].index(match[1]) if motor and match[1] else 0)
-            found[number] = Function(number, motor, f"{match[0]} {function:g}")
+            found[number] = OutputFunction(number, motor, f"{match[0]} {function:g}")
     return found
 
 
-def _motors(outputs: _Outputs, thrusters: int, functions: Mapping[int, Function]) -> list[int]:
+def _motors(outputs: _Outputs, thrusters: int, functions: Mapping[int, OutputFunction]) -> list[int]:
     """Return the number of the output of each motor, in the order of the motors; 0 for a motor without an output."""
     assigned = {of.motor: of.output for of in functions.values() if of.motor}
     count = thrusters or max(assigned, default=0) or max(outputs.used, default=0)
@@ -389,7 +389,9 @@ def _motors(outputs: _Outputs, thrusters: int, functions: Mapping[int, Function]
     return [assigned.get(motor, 0 if motor in others else motor) for motor in range(1, count + 1)]
 
 
-def _without_thruster(outputs: _Outputs, numbers: Sequence[int], functions: Mapping[int, Function]) -> dict[str, int]:
+def _without_thruster(
+    outputs: _Outputs, numbers: Sequence[int], functions: Mapping[int, OutputFunction]
+) -> dict[str, int]:
     """Return the motors that no thruster is, by words about their outputs.
 
     The outputs change, and a parameter says that they drive motors. If none tells what an output drives, it changes
@@ -398,7 +400,7 @@ def _without_thruster(outputs: _Outputs, numbers: Sequence[int], functions: Mapp
     counts = {n: _changes_of(values) for n, (_, values) in outputs.series.items()}
     changing = [counts[n] for n in numbers if counts.get(n)]
     usual = float(np.median(changing)) if changing else np.inf
-    driven = [functions.get(n) or Function(n, n if count >= _OFTEN * usual else 0) for n, count in counts.items()]
+    driven = [functions.get(n) or OutputFunction(n, n if count >= _OFTEN * usual else 0) for n, count in counts.items()]
     return {of.words: of.motor for of in driven if counts[of.output] and of.motor > len(numbers)}
 
 
@@ -417,7 +419,7 @@ def _fractions(
     path: Path,
     outputs: _Outputs,
     numbers: Mapping[str, int],
-    parameters: Parameters,
+    parameters: AutopilotParameters,
     keys: LogKeys,
     *,
     are_pulses: bool,
@@ -462,7 +464,7 @@ def _fractions(
     return series, [*findings, *_changes(path, parameters, begin)]
 
 
-def _changes(path: Path, parameters: Parameters, begin: float) -> Iterator[Finding]:
+def _changes(path: Path, parameters: AutopilotParameters, begin: float) -> Iterator[Finding]:
     """Yield a finding for each time at which parameters that are used change, after the first command."""
     changed: dict[str, list[str]] = {}
     for name in sorted(parameters.used):
@@ -487,7 +489,7 @@ def _are_pulses(path: Path, outputs: _Outputs) -> bool:
 
 
 def _range(
-    number: int, time: Array, parameters: Parameters, keys: LogKeys, rest: float | None
+    number: int, time: Array, parameters: AutopilotParameters, keys: LogKeys, rest: float | None
 ) -> tuple[Array, Array, Array]:
     """Return the pulses of full thrust astern, of no thrust, and of full thrust ahead of an output, at some times.
 

@@ -346,7 +346,7 @@ NO_ROV_FILE = RovFile(None, (), RovTables(), explains_files=True)
 """What there is without a rov.toml."""
 
 
-def read_description(path: Path, base: Path | None = None, draft: Draft | None = None) -> RovFile:
+def read_rov_file(path: Path, base: Path | None = None, draft: Draft | None = None) -> RovFile:
     """Read rov.toml, or a draft in its place. `base` replaces the one that it names. Raises VehicleFileError where
     there is no such file, or where it is not TOML."""
     data = parse_toml(path, draft.text.encode(), VehicleFileError) if draft else read_toml(path, VehicleFileError)

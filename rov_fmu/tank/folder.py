@@ -29,7 +29,7 @@ from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.io.toml_file import join_names, key_line
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.columns import COMMAND, TABLES, TIME, Names, columns_of, has_column, names_of
+from rov_fmu.tank.columns import COMMAND, TABLES, TIME, ColumnNames, columns_of, has_column, names_of
 from rov_fmu.tank.description import (
     NO_ROV_FILE,
     ROV_FILE,
@@ -37,11 +37,11 @@ from rov_fmu.tank.description import (
     Draft,
     Requests,
     RovFile,
-    read_description,
+    read_rov_file,
 )
 from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.log import Commands, Log
-from rov_fmu.tank.quality import checked, uninterrupted
+from rov_fmu.tank.quality import checked_log, uninterrupted
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.listing import NOT_OPENED, Listing, has_usual_suffix, is_bag, list_files
 from rov_fmu.tank.readers.parsers import header_of, one_parser
@@ -69,7 +69,7 @@ class Folder:
 
     path: Path
     rov_file: RovFile
-    names: Names = field(default_factory=Names)
+    names: ColumnNames = field(default_factory=ColumnNames)
     """The tables of rov.toml that explain logs."""
     files: dict[tuple[str, str], list[str]] = field(default_factory=dict)
     """The names of files by kind of test and by curve or axis, including files that cannot be read."""
@@ -160,7 +160,7 @@ class Folder:
             self.mistakes += self.unreadable
         left_out = self.rov_file.tables.leave_out
         self.logs = [log.without(left_out.get(log.file.partition(" (from ")[0], ())) for log in self.logs]
-        self.logs = [piece for log in self.logs for piece in uninterrupted(checked(log))]
+        self.logs = [piece for log in self.logs for piece in uninterrupted(checked_log(log))]
         if self.layout and self.layout.has_wrench:
             self._relate_to_full_force()
         if (layout := self.logged) and (description := self.rov_file.description):
@@ -351,7 +351,7 @@ def _read_description(folder: Path, base: Path | None, draft: Draft | None) -> R
     """Read rov.toml, and explain its purpose where there is none beside tests."""
     path = folder / ROV_FILE
     try:
-        return read_description(path, base, draft)
+        return read_rov_file(path, base, draft)
     except VehicleFileError:
         if path.exists():
             raise
@@ -365,7 +365,7 @@ def _read_description(folder: Path, base: Path | None, draft: Draft | None) -> R
         raise VehicleFileError(f"{path}: {words}") from None
 
 
-def joined_dive(folder: Path, dive: Dive, layout: Layout, names: Names) -> Log:
+def joined_dive(folder: Path, dive: Dive, layout: Layout, names: ColumnNames) -> Log:
     """Read the log of a dive of several files. Raises DataFileError."""
     paths = [folder / part for part in dive.files]
     logs = [log for path in paths for log in read_logs(path, layout, names, is_part=True)]
@@ -382,7 +382,7 @@ def description_beside(path: Path) -> RovFile:
     """Return what the rov.toml beside a log says. Raises FileError if there is no log."""
     with open_file(path):
         described = path.parent / ROV_FILE
-        return read_description(described) if described.exists() else NO_ROV_FILE
+        return read_rov_file(described) if described.exists() else NO_ROV_FILE
 
 
 def one_log(path: Path, layout: Layout, rov_file: RovFile, *, is_part: bool = False) -> Log:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array, Flags, spread
-from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.clocks import gaps, held
 from rov_fmu.tank.findings import Finding
 
@@ -53,7 +53,7 @@ class Source:
 class Channel:
     """The measurements of one quantity by one source, in SI units and in the frames of the model."""
 
-    quantity: Quantity
+    quantity: MeasuredQuantity
     source: Source
     time: Array
     """n: s, ascending, all different."""

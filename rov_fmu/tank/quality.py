@@ -33,14 +33,14 @@ _FASTER_VELOCITY = 2.0
 Other quantities change _FASTER times as fast."""
 
 
-def checked(log: Log) -> Log:
+def checked_log(log: Log) -> Log:
     """Return the log without the values that must be wrong, with findings about these and about doubtful channels."""
     channels, frozen = _without_frozen(log.file, log.channels)
     findings = [*log.findings, *frozen]
     used = [channel for channel in channels if not channel.unused]
     findings += [about(log.file, "depth by pressure", by=one.derived_from) for one in used if one.derived_from]
     findings += [finding for channel in used if (finding := _jumps(log.file, channel))]
-    findings += sources(log.file, channels)
+    findings += source_findings(log.file, channels)
     measured = np.unique(np.concatenate([np.empty(0), *{id(c.time): c.time for c in channels}.values()]))
     commands = log.commands and log.commands.held_while(measured)
     return replace(log, commands=commands, channels=tuple(channels), findings=tuple(findings))
@@ -49,7 +49,7 @@ def checked(log: Log) -> Log:
 # ---- Sources ---------------------------------------------------------------------------------------------------------
 
 
-def sources(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
+def source_findings(file: str, channels: Sequence[Channel]) -> Iterator[Finding]:
     """Yield a finding for each source that is used, with its quantities and the sources that are not used for them, and
     one for each source that is left out although no other one of its quantities is used.
 

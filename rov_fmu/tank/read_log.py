@@ -16,15 +16,15 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import shown
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import Quantity
+from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.channels import channels_of, of_scalar
 from rov_fmu.tank.clocks import LATE, in_rows
 from rov_fmu.tank.columns import (
     COMMAND,
     INPUTS,
     THRUSTERS,
+    ColumnNames,
     LogColumn,
-    Names,
     columns_of_log,
     is_of_inputs,
     thruster_commands,
@@ -33,7 +33,7 @@ from rov_fmu.tank.commands import Commanded, Series, at_rest, commands_of, wrenc
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Channel, Commands, Log, Source
 from rov_fmu.tank.readers.ardusub_frames import frame_of, misfits
-from rov_fmu.tank.readers.content import Content, Piece, described
+from rov_fmu.tank.readers.content import Content, Piece, described_topics
 from rov_fmu.tank.readers.no_measurement import measured_only
 from rov_fmu.tank.readers.parsers import guarded, open_table, read_topics
 from rov_fmu.tank.readers.tables import read_table
@@ -43,7 +43,7 @@ from rov_fmu.tank.readers.tables import read_table
 def read_logs(
     path: Path,
     layout: Layout,
-    names: Names,
+    names: ColumnNames,
     axis: Axis | None = None,
     *,
     is_part: bool = False,
@@ -69,7 +69,7 @@ def _log(
     piece: Piece,
     layout: Layout,
     entries: Mapping[str, LogColumn],
-    names: Names,
+    names: ColumnNames,
     axis: Axis | None,
 ) -> Log:
     """Return the log of a piece: what `entries` say of its fields, and what is recognised besides."""
@@ -108,7 +108,7 @@ def _log(
         rows, values = in_rows(series)
         thrusters, fractions = thruster_commands(layout, values)
         commands = Commands.of_rows(thrusters, rows, fractions * keys.signs(thrusters), source)
-    unread = content.unread | described(topic for topic in piece.topics if topic.source.topic not in used)
+    unread = content.unread | described_topics(topic for topic in piece.topics if topic.source.topic not in used)
     return Log(
         file,
         commands,
@@ -161,7 +161,7 @@ def _meant(
     return channels, commands, labels
 
 
-def _check_bounds(path: Path, field: str, quantity: Quantity, values: Array) -> None:
+def _check_bounds(path: Path, field: str, quantity: MeasuredQuantity, values: Array) -> None:
     """Raise DataFileError for numbers in a table beyond the bounds of a quantity."""
     beyond = values[(values < quantity.minimum) | (values > quantity.maximum)]
     if len(beyond):

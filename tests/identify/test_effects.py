@@ -15,8 +15,8 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE
 from rov_fmu.identify import given
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.effects import effects_of, loggers_of, sensors_of
-from rov_fmu.identify.findings import findings_of, sentences
+from rov_fmu.identify.effects import loggers_of, optional_effects, sensors_of
+from rov_fmu.identify.findings import findings_of, result_sentences
 from rov_fmu.identify.held_out import ahead, cautious
 from rov_fmu.identify.identified_vehicle import identified_vehicle
 from rov_fmu.identify.identify import identify
@@ -66,7 +66,7 @@ def test_an_effect_has_the_interval_of_its_coefficient(wider: str, fit: Fit, sho
     else:
         wide = replace(wide, posterior=widened[1])
     _, coefficients = identified_vehicle(short, wide)
-    (band,) = [effect for effect in effects_of(wide) if effect.kind == "dead band" and effect.of == "top"]
+    (band,) = [effect for effect in optional_effects(wide) if effect.kind == "dead band" and effect.of == "top"]
     assert band.interval == pytest.approx(coefficients["c_0_top"].interval, rel=1e-6)
     assert band.interval[1] - band.interval[0] == pytest.approx(4.0 * HALF, rel=1e-6)
 
@@ -148,10 +148,10 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
     assert end.value <= objective.value(z, objective.runs(z))
     assert end.information[index, index] > 2.0 / 0.3**2, "the logs tell something of it"
     clear = found(replace(fit, posterior=Posterior(table, z, np.eye(len(z)))), wake=1.2)
-    (effect,) = (one for one in effects_of(clear) if one.kind == "wake")
+    (effect,) = (one for one in optional_effects(clear) if one.kind == "wake")
     assert (effect.value, effect.of, effect.kept) == (1.2, "heave", True)
     result = replace(without_findings(), effects=(effect,))
-    (sentence,) = sentences(findings_of(result), "effect")
+    (sentence,) = result_sentences(findings_of(result), "effect")
     interval = f"({1.2 - HALF:.3f} to {1.2 + HALF:.3f})"
     assert sentence == f"heave: the made-up share of the thrust is 1.200 {interval}. Nobody knows why"
     vehicle, numbers = identified_vehicle(short, clear)
@@ -164,7 +164,7 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
 def test_a_lag_faster_than_the_sampling_shows_is_not_told(fit: Fit) -> None:
     """However clear: a lag of 0.0159 s has a corner frequency of 10 Hz, at which the sensor is sampled."""
     for lag, is_told in ((0.0155, False), (0.0163, True)):
-        some = [one for one in effects_of(found(fit, sensor_lag=lag)) if one.kind == "sensor lag"]
+        some = [one for one in optional_effects(found(fit, sensor_lag=lag)) if one.kind == "sensor lag"]
         assert some
         assert all((one.evidence > KEPT, one.kept) == (True, is_told) for one in some)
 
@@ -274,7 +274,7 @@ def test_a_power_of_drag_is_unusual_beyond_a_half_unless_predictions_are_as_exac
     of_heave = {axis: replace(one, ratio=R) for axis, one in fit.structure.items()}
     for power, is_far in ((-0.49, False), (0.51, True)):
         bent = replace(found(fit, power_of_drag=power), structure=of_heave)
-        some = [effect for effect in effects_of(bent) if effect.kind == "power of drag"]
+        some = [effect for effect in optional_effects(bent) if effect.kind == "power of drag"]
         assert [effect.is_unusual for effect in some] == [is_far and R > 1.0] * 2
 
 
@@ -374,7 +374,7 @@ def test_a_lag_is_left_out_only_if_the_log_tells_that_it_is_short(
     names = [f"the {time}" for time in result.times]
     assert names[:1] == ([] if is_short else ["the lag of the thrusters"])
     assert ("the lag of the sensors" in names) == (not is_short)
-    assert len(sentences(findings_of(result), "times")) == (not is_short)
+    assert len(result_sentences(findings_of(result), "times")) == (not is_short)
     assert ("T_top" in result.vehicle.layout.coefficients) == (not is_short)
     assert is_short or contains(result.vehicle.intervals["T_top"], lag)
 

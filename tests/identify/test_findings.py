@@ -17,7 +17,7 @@ from rov_fmu.identify.findings import (
     findings_of,
     next_tests,
     repairs,
-    sentences,
+    result_sentences,
     told,
     with_error,
 )
@@ -36,7 +36,7 @@ from rov_fmu.identify.result import (
 )
 from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.description import Draft, read_description
+from rov_fmu.tank.description import Draft, read_rov_file
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Source
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -64,7 +64,7 @@ def surge(**changes: Any) -> Identification:
 
 def said(result: Identification, kind: str) -> list[str]:
     """The sentences of a kind."""
-    return [*sentences(f for f in findings_of(result) if f.kind == kind)]
+    return [*result_sentences(f for f in findings_of(result) if f.kind == kind)]
 
 
 def disturbance(kind: str = "slow force", **changes: Any) -> Identification:
@@ -83,7 +83,7 @@ def with_channels(*names: str) -> Identification:
 
 def with_description(reason: str) -> Identification:
     """A result of a drafted rov.toml; without a reason, a user has named the base."""
-    described = read_description(Path("rov.toml"), draft=Draft(BLUEROV2, reason))
+    described = read_rov_file(Path("rov.toml"), draft=Draft(BLUEROV2, reason))
     return quiet(folder=replace(quiet().folder, rov_file=described))
 
 

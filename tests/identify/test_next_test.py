@@ -13,7 +13,7 @@ from rov_fmu.identify.beginning import begin
 from rov_fmu.identify.likelihood.fit import Fit
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
-from rov_fmu.identify.likelihood.solve import total
+from rov_fmu.identify.likelihood.solve import total_information
 from rov_fmu.identify.next_test import next_test
 from rov_fmu.identify.result import Answer, NextTest
 from rov_fmu.tank.arrays import Array
@@ -81,7 +81,7 @@ def test_the_interval_after_the_test_is_that_of_data_with_it(fit: Fit, tmp_path:
     z = np.array(
         [usual if n is None else fit.file.posterior.z[n] for n, usual in zip(indices, objective.mean, strict=True)]
     )
-    _, information = total(objective, z, objective.data(z, objective.runs(z)))
+    _, information = total_information(objective, z, objective.data(z, objective.runs(z)))
     after = Posterior.of(objective.table, z, information)
     command = float(test.target.split()[-1].rstrip("%")) / 100.0
 

@@ -11,7 +11,7 @@ import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import result_sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood import file_fit
 from rov_fmu.identify.likelihood.objective import Objective
@@ -96,7 +96,7 @@ def told(folder: Path) -> list[str]:
         found = identify(load_tests(folder))
     except (DataFileError, VehicleFileError) as refusal:
         return str(refusal).splitlines()
-    return [*sentences(finding for finding in found.findings if finding.kind == "slip")]
+    return [*result_sentences(finding for finding in found.findings if finding.kind == "slip")]
 
 
 def names(lines: Sequence[str], file: str, words: str) -> bool:

@@ -11,13 +11,13 @@ from scipy.stats import norm
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.likelihood.filter import Run
+from rov_fmu.identify.likelihood.filter import FilterRun
 from rov_fmu.identify.likelihood.fit import fit_all
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import table_of
 from rov_fmu.identify.likelihood.posterior import Posterior
-from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total
+from rov_fmu.identify.likelihood.solve import Minimum, best_explanations, total_information
 from rov_fmu.identify.result import KEPT
 from rov_fmu.identify.unexplained.causes import _evidence, _Piece, cause_of, independent
 from rov_fmu.identify.unexplained.disturbances import disturbances, followed
@@ -48,7 +48,7 @@ def objective(tmp_path_factory: pytest.TempPathFactory) -> Objective:
     return Objective(table_of(known, logs, []), logs, rows)
 
 
-def run_with(objective: Objective, values: Mapping[int, Array], deviation: float = 0.5) -> Run:
+def run_with(objective: Objective, values: Mapping[int, Array], deviation: float = 0.5) -> FilterRun:
     """Return a run through the dive whose states are next to nothing, but for some."""
     time = objective.records[0].time
     states = np.full((len(time), objective.filters[0].states), 1e-9)
@@ -170,7 +170,7 @@ def test_a_disturbance_has_its_size_and_its_evidence(objective: Objective, monke
     moving = {filter_of.drift + 1: 1.2 * since, **speeds}
     run, runs = run_with(objective, {**slow, **moving}), objective.runs(z)
     data = objective.data(z, runs, exact=False)
-    best = Minimum(z, objective.value(z, runs), runs, data, total(objective, z, data)[1])
+    best = Minimum(z, objective.value(z, runs), runs, data, total_information(objective, z, data)[1])
     posterior = Posterior.of(objective.table, z, best.information)
     found = {
         (str(one.kind), one.axis): one

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.identify.beginning import begin, load_tests
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import result_sentences
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.result import Identification
 from rov_fmu.tank.description import ROV_FILE
@@ -40,8 +40,8 @@ def check_idle(folder: Path, battery: Battery, seed: int, dive: Drawn = DIVE) ->
     found = identified(folder / "with", battery, seed, dive)
     other = without_column(folder / "with", folder / "without")
     assert found.vehicle.layout.voltage is None
-    assert len(sentences(found.findings, "idle voltage")) == 1
-    assert not sentences(other.findings, "idle voltage")
+    assert len(result_sentences(found.findings, "idle voltage")) == 1
+    assert not result_sentences(other.findings, "idle voltage")
     for axis, beside in zip(found.axes, other.axes, strict=True):
         assert axis.verdict.word == beside.verdict.word
         for answer, unlogged in zip(axis.answers, beside.answers, strict=True):

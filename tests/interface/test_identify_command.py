@@ -11,7 +11,7 @@ import pytest
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.related import origin
-from rov_fmu.identify.progress import Work
+from rov_fmu.identify.progress import ProgressReport
 from rov_fmu.interface.identify_command import identify_tests
 from rov_fmu.io.messages import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -127,7 +127,7 @@ def test_a_stage_that_is_left_out_is_no_part_of_the_work() -> None:
     """The stages that are left are then a larger share of it, and so are those that are done."""
     shares: dict[str, list[float]] = {}
     for stages in (["start 1", "quadratic thrust"], ["start 1", "hypotheses", "quadratic thrust"]):
-        work = Work(lambda stage, share: shares.setdefault(stage, []).append(share))
+        work = ProgressReport(lambda stage, share: shares.setdefault(stage, []).append(share))
         for stage in stages:
             show = work.steps(stage)
             for count in range(3):

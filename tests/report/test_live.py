@@ -17,7 +17,7 @@ from rov_fmu.fmu.variables import variables
 from rov_fmu.io.columns import PULSES
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.report.published import load_tables
-from rov_fmu.tank.columns import Names, columns_of_log
+from rov_fmu.tank.columns import ColumnNames, columns_of_log
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -413,7 +413,7 @@ def check_read_alike(recording: Any, log: Log, axes: Sequence[Axis]) -> None:
 def test_a_log_is_read_as_identify_reads_it(name: str, page: Any, vehicle: Vehicle, tmp_path: Path) -> None:
     """After the clock was set back, the rows are another recording."""
     recording = dropped(page, tmp_path / "pool.csv", "\n".join(WRITTEN[name]), ENCODINGS.get(name, "utf-8"))
-    read, *_ = read_logs(tmp_path / "pool.csv", vehicle.layout, Names())
+    read, *_ = read_logs(tmp_path / "pool.csv", vehicle.layout, ColumnNames())
     check_read_alike(recording, read, [form.axis for form in vehicle.layout.axes])
     assert read.commands is not None
     rows = np.unique(np.concatenate([read.commands.rows, *(channel.time for channel in read.channels)]))
@@ -463,7 +463,7 @@ def test_every_column_that_identify_reads_is_read(kind: str, axis: Axis | None, 
     for text, recording in zip(logs, flown, strict=True):
         path.write_text(text, encoding="utf-8")
         try:
-            (log,) = read_logs(path, layout, Names(), axis)
+            (log,) = read_logs(path, layout, ColumnNames(), axis)
         except DataFileError:
             continue
         if log.commands and any(c.quantity.axis in axes and not c.unused for c in log.channels):

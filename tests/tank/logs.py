@@ -11,10 +11,10 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import QUANTITIES
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import ColumnNames
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Channel, Commands, Log, Source
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from rov_fmu.tank.read_log import read_logs
 
 
@@ -72,9 +72,9 @@ class Read:
         return found
 
 
-def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: Names = Names()) -> Read:  # noqa: B008 (frozen)
+def read_log(path: Path, layout: Layout, axis: Axis | None = None, names: ColumnNames = ColumnNames()) -> Read:  # noqa: B008 (frozen)
     """Read the logs of a file. Raises DataFileError, as the command does."""
-    logs = [checked(one) for one in read_logs(path, layout, names, axis)]
+    logs = [checked_log(one) for one in read_logs(path, layout, names, axis)]
     if not any(one.commands for one in logs):
         raise DataFileError(f"{path}: no commands of thrusters were found")
     findings = [finding for one in logs for finding in one.findings]

@@ -12,7 +12,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import rows_of
@@ -150,7 +150,9 @@ def test_a_log_with_the_name_of_a_table_is_a_log(name: str, tmp_path: Path) -> N
 def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
     down = commands(TIME, {"t": np.where(TIME > 2.0, 0.5, 0.0)})
     quantity = "heading" if "heading" in told else "depth"
-    found = checked(log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values)))
+    found = checked_log(
+        log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values))
+    )
     assert sentences(found.findings) == ((f"a.csv: {told}",) if told else ())
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from rov_fmu.identify.findings import SEVERITY, sentences
+from rov_fmu.identify.findings import SEVERITY, result_sentences
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.log import Channel
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from tests.tank.logs import channel, log, used
 
 TIME: Array = np.arange(0.0, 60.0, 0.1)
@@ -35,9 +35,9 @@ def test_what_frozen_sensors_say_is_left_out(value: float | None) -> None:
     """They keep their last value, or say 0, while the voltage goes on."""
     measured = channels(*(frozen(noisy(seed, 0.01, 0.001), 30.0, value) for seed in (1, 2)))
     voltage = channel("voltage", TIME, 16.0 - 0.01 * TIME)
-    found = checked(log(None, *measured, voltage))
+    found = checked_log(log(None, *measured, voltage))
     start = "29.9" if value is None else "30"
-    assert sentences(found.findings) == (
+    assert result_sentences(found.findings) == (
         f"a.csv: depth and heading do not change any more after {start} s, although the log ends at 59.9 s. Did the "
         "log or the sensor stop? Their later values are left out",
     )
@@ -73,7 +73,7 @@ def test_sensors_that_froze_together_are_told(
 def check(told: list[list[float]], *measured: Array) -> None:
     """Check the numbers of the findings about frozen sensors, and that sensors that may be right stay as they are."""
     given = channels(*measured)
-    found = checked(log(None, *given))
+    found = checked_log(log(None, *given))
     assert [pytest.approx([finding.words["start"]]) for finding in found.findings] == told
     assert told or [*found.channels] == given
 

@@ -100,7 +100,7 @@ def test_every_format_is_read_in_the_guarded_process_alone(
     with pytest.raises(AssertionError, match="only a guarded function"):
         parsers.open_table(path)
     assert inspect(path, [BLUEROV2])
-    monkeypatch.setattr(parsers, "budget", lambda _: Limits(time=0.0))
+    monkeypatch.setattr(parsers, "budget_for", lambda _: Limits(time=0.0))
     uses: list[Callable[[], object]] = [
         lambda: read_log(path, BLUEROV2),
         lambda: inspect(path, [BLUEROV2]),

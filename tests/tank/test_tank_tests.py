@@ -11,7 +11,7 @@ import pytest
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.identify.beginning import load_tests
-from rov_fmu.identify.findings import SEVERITY, sentences
+from rov_fmu.identify.findings import SEVERITY, result_sentences
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.published import load_tables
 from rov_fmu.tank.readers.tank_tables import Row, read_rows
@@ -132,7 +132,7 @@ def test_a_copy_of_a_file_is_left_out(folder: Path) -> None:
     assert not {"log_heave_2.csv", "steady_surge_copy.csv"} & found.folder.inputs.keys()
     copies = [finding for finding in found.folder.findings if finding.kind == "copy"]
     assert {SEVERITY[finding.kind] for finding in copies} == {"Warnings"}
-    assert sentences(copies) == (
+    assert result_sentences(copies) == (
         "log_heave_2.csv: left out as a copy of log_heave_1.csv, because the same data must not count twice",
         "steady_surge_copy.csv: left out as a copy of steady_surge.csv, because the same data must not count twice",
     )

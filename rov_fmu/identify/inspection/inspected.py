@@ -16,7 +16,7 @@ from rov_fmu.io.output import Output
 from rov_fmu.io.reading import read_text
 from rov_fmu.io.toml_file import Toml
 from rov_fmu.tank.columns import COMMAND
-from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, read_description
+from rov_fmu.tank.description import NO_ROV_FILE, ROV_FILE, Description, Draft, RovFile, read_rov_file
 from rov_fmu.tank.findings import Finding, about, sentences
 from rov_fmu.tank.folder import folder_and_files, together, unreadable
 from rov_fmu.tank.inspection.draft import (
@@ -119,7 +119,7 @@ def inspect_paths(paths: Sequence[Path]) -> Inspected:
     """
     folder, files = folder_and_files(paths)
     path = folder / ROV_FILE
-    described = read_description(path) if path.exists() else NO_ROV_FILE
+    described = read_rov_file(path) if path.exists() else NO_ROV_FILE
     is_described = bool(described.tables.base or described.tables.thruster or described.tables.has_wrench)
     layouts = [load_vehicle(file).layout for file in SHIPPED.values()]
     listing = Listing(folder, files) if files else list_files(folder)
@@ -153,7 +153,7 @@ def inspect_paths(paths: Sequence[Path]) -> Inspected:
         if not (lacks and path.exists()):
             break
         # What is told is about the file that it will be.
-        described = read_description(path, draft=Draft(completed(own, lacks), ""))
+        described = read_rov_file(path, draft=Draft(completed(own, lacks), ""))
     notes = [finding for finding in findings if finding.kind in ("tank tests", "other files")]
     warnings = [finding for finding in findings if finding not in notes]
     inspected = Inspected(
@@ -171,7 +171,7 @@ def inspect_paths(paths: Sequence[Path]) -> Inspected:
     if own:
         return inspected
     drafted = inspected.draft_for(None) if likely.base else Draft(lacks, "")
-    return replace(inspected, description=read_description(path, draft=drafted).description)
+    return replace(inspected, description=read_rov_file(path, draft=drafted).description)
 
 
 def _dives(path: Path, inspections: Sequence[Inspection]) -> list[Log]:

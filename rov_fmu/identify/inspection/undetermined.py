@@ -7,7 +7,14 @@ import numpy as np
 from rov_fmu.equation.catalogue import Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.beginning import layout_of
-from rov_fmu.identify.findings import LOG_OUTPUTS, UNLOGGED, how_to_measure, how_to_record, is_unlogged, sentences
+from rov_fmu.identify.findings import (
+    LOG_OUTPUTS,
+    UNLOGGED,
+    how_to_measure,
+    how_to_record,
+    is_unlogged,
+    result_sentences,
+)
 from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.likelihood.hypotheses import HYPOTHESES, lost_in_words, thrusters_alike
 from rov_fmu.identify.likelihood.records import driven_axes, lost_between_rows
@@ -83,14 +90,14 @@ def undetermined(
         values = [log.commands.in_rows for log in logs if log.commands and not log.follows_axis]
         for group in thrusters_alike(layout, values):
             if len(group) > 1:
-                yield from sentences([about("", "not told apart", of=listed(group))])
+                yield from result_sentences([about("", "not told apart", of=listed(group))])
         for log, part in concerned.items():
             if log.commands and (lost := lost_between_rows(log, part)):
                 words = lost_in_words(lost, log.commands.interval)
                 yield HYPOTHESES["momentary commands"].sentence.format(of=log.file, **words)
         known = {c.name for c in layout.curves if c.coefficient("a_t") in description.known}
         assumed = (c.name for c in layout.curves if c.name not in known.union(measured))
-        yield from sentences(Finding("assumed thrust", curve=name) for name in assumed)
+        yield from result_sentences(Finding("assumed thrust", curve=name) for name in assumed)
 
 
 def _reason(

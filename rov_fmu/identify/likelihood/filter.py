@@ -172,7 +172,7 @@ class Parameters:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class FilterRun:
     """What the filter found in a log of n samples."""
 
     innovations: Array
@@ -255,12 +255,12 @@ class Filter:
         record: Record,
         parameters: Parameters,
         *,
-        repeated: Run | None = None,
+        repeated: FilterRun | None = None,
         frozen: bool = False,
         begin: float = -1.0,
         span: float = inf,
         with_states: bool = False,
-    ) -> Run:
+    ) -> FilterRun:
         """Run through a log.
 
         `repeated` gives the steps of an earlier run, so that results are smooth functions of the parameters; with
@@ -271,7 +271,7 @@ class Filter:
         pieces = np.ones(n, np.intc) if repeated is None else repeated.pieces
         gains = repeated.gains if repeated is not None and frozen else np.zeros((n, states))
         asked = (n, states) if with_states else (0, 0)
-        found = Run(np.zeros(n), np.zeros(0 if frozen else n), pieces, gains, np.zeros(asked), np.zeros(asked))
+        found = FilterRun(np.zeros(n), np.zeros(0 if frozen else n), pieces, gains, np.zeros(asked), np.zeros(asked))
         mode = _Mode(0 if repeated is None else 2 if frozen else 1, begin, min(span, 1e300))
         if self._run(FILTER_FILE, record, parameters, mode, [found]):
             raise DivergedError
@@ -281,12 +281,12 @@ class Filter:
         self,
         record: Record,
         parameters: Parameters,
-        repeated: Run,
+        repeated: FilterRun,
         *,
         frozen: bool,
         begin: float = -1.0,
         span: float = inf,
-    ) -> list[Run | None]:
+    ) -> list[FilterRun | None]:
         """Run through a log with several sets of parameters, each in a lane of the processor's vectors.
 
         All have the same slow processes, and repeat the steps of an earlier run and, with `frozen`, its gains. They
@@ -295,7 +295,8 @@ class Filter:
         """
         n, gains = len(record.time), repeated.gains if frozen else np.zeros((0, 0))
         found = [
-            Run(np.zeros(n), np.zeros(0 if frozen else n), repeated.pieces, gains) for _ in range(parameters.count)
+            FilterRun(np.zeros(n), np.zeros(0 if frozen else n), repeated.pieces, gains)
+            for _ in range(parameters.count)
         ]
         mode = _Mode(2 if frozen else 1, begin, min(span, 1e300))
         failed = self._run(FILTER_LANES_FILE, record, parameters, mode, found)
@@ -310,7 +311,9 @@ class Filter:
             self._libraries[file] = library.run_filter, list(sizes)
         return self._libraries[file]
 
-    def _run(self, file: Path, record: Record, parameters: Parameters, mode: _Mode, runs: Sequence[Run]) -> set[int]:
+    def _run(
+        self, file: Path, record: Record, parameters: Parameters, mode: _Mode, runs: Sequence[FilterRun]
+    ) -> set[int]:
         """Run through a log with sets of parameters, write the runs, and return the indices of those that diverge."""
         run, (*_, held, whole, lanes) = self._library(file)
         log, failed = self._record(record, parameters), set[int]()

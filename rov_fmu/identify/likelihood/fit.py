@@ -38,7 +38,7 @@ from rov_fmu.identify.likelihood.solve import (
     scaled,
     start_of,
 )
-from rov_fmu.identify.progress import Work
+from rov_fmu.identify.progress import ProgressReport
 from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
@@ -120,7 +120,7 @@ def fit_all(
     known: Prior,
     logs: Sequence[SampledLog],
     rows: Sequence[TableRow],
-    work: Work | None = None,
+    work: ProgressReport | None = None,
     is_mistaken: Callable[[Objective, Array, Array], bool] = lambda *_: False,
 ) -> Fit:
     """Fit all logs and tables: a start or two on thinned logs, and the better one to the end on all samples.
@@ -131,7 +131,7 @@ def fit_all(
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
     the reason, and not the structure. Such a fit is not refined, because nobody should use it.
     """
-    work = work or Work()
+    work = work or ProgressReport()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends, is_enough = _from_starts(quick, work)
     start = StructureFit({}, quick, ends[0], 0.0, 0.0)
@@ -206,7 +206,7 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
     return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
 
 
-def _from_starts(quick: Objective, work: Work) -> tuple[list[Minimum], bool]:
+def _from_starts(quick: Objective, work: ProgressReport) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):

@@ -147,7 +147,7 @@ def _slewing(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, L
 # ---- What may have them ----------------------------------------------------------------------------------------------
 
 
-def commands_of(sampled: SampledLog) -> dict[str, Array]:
+def dive_commands(sampled: SampledLog) -> dict[str, Array]:
     """Return the commands of a dive's thrusters, by their names, in each row.
 
     It is empty for a log of one axis, whose thrusters all follow one command: no contrast tells them apart.
@@ -227,7 +227,7 @@ def _of_twins(known: Prior, logs: Logs, of: Of, _: Start) -> dict[str, str]:
 
 def _thrusters(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that the logs command, one of those that no log tells apart."""
-    for group in thrusters_alike(known.layout, [*map(commands_of, logs)]):
+    for group in thrusters_alike(known.layout, [*map(dive_commands, logs)]):
         yield group[:1]
 
 
@@ -256,14 +256,14 @@ def thrusters_alike(layout: Layout, commands: Sequence[Mapping[str, Array]]) -> 
 
 def twins(known: Prior, logs: Logs, name: str) -> Of:
     """Return the thrusters that no log tells from one of them, with its name."""
-    groups = thrusters_alike(known.layout, [*map(commands_of, logs)])
+    groups = thrusters_alike(known.layout, [*map(dive_commands, logs)])
     return next((group for group in groups if name in group), ())
 
 
 def _pairs(known: Prior, logs: Logs) -> Iterator[Of]:
     alone = [of[0] for of in _thrusters(known, logs)]
     for pair in combinations(alone, 2):
-        commands = [[commands_of(one).get(name, np.zeros(1)) for name in pair] for one in logs]
+        commands = [[dive_commands(one).get(name, np.zeros(1)) for name in pair] for one in logs]
         if not all(np.array_equal(first, second) for first, second in commands):
             yield pair
 

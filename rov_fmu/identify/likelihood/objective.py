@@ -29,7 +29,7 @@ from rov_fmu.equation.catalogue import REVERSE, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
 from rov_fmu.identify.likelihood.curves import Shapes, measured_time_constant
-from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Run
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, FilterRun
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter, Table, table_of
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import SampledLog
@@ -129,7 +129,7 @@ class Data:
     """p."""
 
     @classmethod
-    def of(cls, run: Run, indices: Sequence[int], parameters: int) -> "Data":
+    def of(cls, run: FilterRun, indices: Sequence[int], parameters: int) -> "Data":
         """Return the innovations of a run, with derivatives of 0."""
         empty = np.zeros((len(run.innovations), len(indices)))
         return cls(run.innovations, run.variances, empty, empty.copy(), indices, parameters)
@@ -204,7 +204,7 @@ def cost(innovations: Array, variances: Array) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
+class DataPart:
     """A part of the data: logs and rows by their indices, and the samples that count of logs of which not all do."""
 
     logs: Sequence[int]
@@ -233,7 +233,7 @@ class Objective:
         filters = {one.layout: Filter(one.vehicle(table.base), **steps) for one in logs}
         self.filters = [filters[one.layout] for one in logs]
         self.mean, self.deviation, self.low, self.high = map(table.each, ("mean", "deviation", "low", "high"))
-        self.whole = Part(range(len(logs)), range(len(rows)))
+        self.whole = DataPart(range(len(logs)), range(len(rows)))
 
     @classmethod
     def of_known(
@@ -242,13 +242,13 @@ class Objective:
         """Return J of what is known before the fit, some logs and rows of tables. Raises BuildError."""
         return cls(table_of(known, logs, sorted({row.noise for row in rows})), logs, rows, thinned=thinned)
 
-    def of(self, part: Part) -> "Objective":
+    def of(self, part: DataPart) -> "Objective":
         """Return J for a part of the data."""
         found = copy(self)
         found.logs, found.records = [self.logs[n] for n in part.logs], [self.records[n] for n in part.logs]
         found.filters, found.rows = [self.filters[n] for n in part.logs], [self.rows[n] for n in part.rows]
         chosen = {index: part.chosen[n] for index, n in enumerate(part.logs) if n in part.chosen}
-        found.whole = Part(range(len(part.logs)), range(len(part.rows)), chosen)
+        found.whole = DataPart(range(len(part.logs)), range(len(part.rows)), chosen)
         found.__dict__.pop("_of_rows", None)
         return found
 
@@ -262,7 +262,7 @@ class Objective:
 
     # ---- One log ----
 
-    def run(self, z: Array, number: int, *, table: Table | None = None, **how: object) -> Run:
+    def run(self, z: Array, number: int, *, table: Table | None = None, **how: object) -> FilterRun:
         """Run the filter through a log, if given with the coefficients of another table.
 
         The other options are those of `Filter.run`. Raises DivergedError.
@@ -285,7 +285,7 @@ class Objective:
         return {axis: (largest(-v), largest(v)) for axis, v in measured.items()}
 
     def changes(
-        self, z: Array, n: int, indices: Sequence[int], steps: Array, run: Run, begin: float, span: float
+        self, z: Array, n: int, indices: Sequence[int], steps: Array, run: FilterRun, begin: float, span: float
     ) -> Array:
         """Return the derivatives of the predictions of a log with respect to some parameters, by steps to both sides.
 
@@ -293,7 +293,7 @@ class Objective:
         """
 
         def innovations(sets: Array) -> Array:
-            def some(first: int) -> list[Run | None]:
+            def some(first: int) -> list[FilterRun | None]:
                 parameters = self.table.of_log(sets[:, first : first + _TOGETHER], self.logs[n])
                 return self.filters[n].run_many(self.records[n], parameters, run, frozen=True, begin=begin, span=span)
 
@@ -317,7 +317,7 @@ class Objective:
 
     # ---- All data ----
 
-    def runs(self, z: Array, earlier: Sequence[Run] | None = None) -> list[Run]:
+    def runs(self, z: Array, earlier: Sequence[FilterRun] | None = None) -> list[FilterRun]:
         """Run the filter through all logs, with the steps of earlier runs if they are given."""
         return in_threads(
             [partial(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))]
@@ -340,12 +340,12 @@ class Objective:
         """Return the part of J that the priors contribute."""
         return float(np.sum(((z - self.mean) / self.deviation)[self.free] ** 2))
 
-    def samples(self, z: Array, runs: Sequence[Run]) -> list[Samples]:
+    def samples(self, z: Array, runs: Sequence[FilterRun]) -> list[Samples]:
         """Return the samples of the runs of some parameters, and then those of the rows of tables, if any."""
         found = [(run.innovations, run.variances) for run in runs]
         return [*found, self.row_values(z)] if self.rows else found
 
-    def value(self, z: Array, runs: Sequence[Run]) -> float:
+    def value(self, z: Array, runs: Sequence[FilterRun]) -> float:
         """Return J for the runs of some parameters."""
         return self._sum(z, self.samples(z, runs))
 
@@ -359,7 +359,9 @@ class Objective:
         total = self.prior(z) + sum(costs)
         return total if np.isfinite(total) else np.inf
 
-    def trials(self, z: Array, parts: Sequence[Part], earlier: Sequence[Run]) -> list[tuple[float, list[Samples]]]:
+    def trials(
+        self, z: Array, parts: Sequence[DataPart], earlier: Sequence[FilterRun]
+    ) -> list[tuple[float, list[Samples]]]:
         """Return J for n sets of parameters (p x n), each for a part of the data, with the samples of this part.
 
         The filter takes the steps of earlier runs. All sets run through a log together, in the lanes of vectors. J is
@@ -370,11 +372,11 @@ class Objective:
             (n, some[at : at + _TOGETHER]) for n, some in enumerate(of_log) for at in range(0, len(some), _TOGETHER)
         ]
 
-        def run(n: int, indices: Sequence[int]) -> list[Run | None]:
+        def run(n: int, indices: Sequence[int]) -> list[FilterRun | None]:
             parameters = self.table.of_log(z[:, indices], self.logs[n])
             return self.filters[n].run_many(self.records[n], parameters, earlier[n], frozen=False)
 
-        runs: list[list[Run | None]] = [[] for _ in parts]
+        runs: list[list[FilterRun | None]] = [[] for _ in parts]
         for (_, indices), found in zip(jobs, in_threads([partial(run, *job) for job in jobs]), strict=True):
             for k, of_set in zip(indices, found, strict=True):
                 runs[k].append(of_set)
@@ -391,7 +393,7 @@ class Objective:
     def data(
         self,
         z: Array,
-        runs: Sequence[Run],
+        runs: Sequence[FilterRun],
         *,
         exact: bool = True,
         of_noise: Sequence[Data] = (),
@@ -433,7 +435,7 @@ class Objective:
         z: Array,
         n: int,
         columns: Sequence[int],
-        run: Run,
+        run: FilterRun,
         into: Data,
         scale: Array,
         *,

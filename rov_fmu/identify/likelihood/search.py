@@ -26,7 +26,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     Suspect,
     apart,
     applied,
-    commands_of,
+    dive_commands,
     row_of,
     thrusters_alike,
 )
@@ -35,7 +35,7 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total
+from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total_information
 from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, WRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -419,7 +419,7 @@ def comparison(plain: Objective, held: Starts, point: Array) -> Callable[[Starts
             if not slopes:
                 return changed.value(start, runs)
             data = with_samples(slopes, changed.samples(start, runs))
-            gradient, information = total(objective, z, data)
+            gradient, information = total_information(objective, z, data)
         except DivergedError:
             return inf
         end = z.copy()
@@ -607,7 +607,7 @@ class StructureSearch:
         """The groups of commanded thrusters along one axis that the data do not tell apart."""
         layout, logs = self.plain.objective.table.layout, self.plain.objective.logs
         unknown = {name for name, is_apart in self.apart.items() if not is_apart}
-        same = thrusters_alike(layout, [*map(commands_of, logs)])
+        same = thrusters_alike(layout, [*map(dive_commands, logs)])
         names = {name for group in same if unknown.intersection(group) for name in group}
         along = [layout.thrusters_along(axis) for axis in layout.bare_axes]
         groups = (tuple(t.name for t in some if t.name in names) for some in along)

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from rov_fmu.identify.likelihood.filter import DivergedError, Run
-from rov_fmu.identify.likelihood.objective import Data, Objective, Part, Samples, with_samples
+from rov_fmu.identify.likelihood.filter import DivergedError, FilterRun
+from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective, Samples, with_samples
 from rov_fmu.identify.result import KEPT
 from rov_fmu.tank.arrays import Array
 
@@ -50,7 +50,7 @@ class Minimum:
     z: Array
     value: float
     """J."""
-    runs: Sequence[Run]
+    runs: Sequence[FilterRun]
     data: Sequence[Data]
     """The innovations of each log, and then of the rows of tables, with their derivatives."""
     information: Array
@@ -110,7 +110,7 @@ def _minimised(
                 data = with_samples(near, objective.samples(z, runs))
             else:
                 data = objective.data(now.z, now.runs, exact=stalled > 0)
-            information = total(objective, now.z, data)[1]
+            information = total_information(objective, now.z, data)[1]
         except DivergedError:
             if count == 1:
                 raise
@@ -130,7 +130,9 @@ def _minimised(
             if not now.data:
                 raise
     if last:
-        now = replace(now, runs=objective.runs(now.z, now.runs), information=total(objective, now.z, now.data)[1])
+        now = replace(
+            now, runs=objective.runs(now.z, now.runs), information=total_information(objective, now.z, now.data)[1]
+        )
     return now
 
 
@@ -168,7 +170,7 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
     of_motion = objective.table.each("of_motion")
     for count in range(_WITH_SAME):
         free = of_motion if count == 0 else np.ones(len(now.z), bool)
-        gradient, information = total(objective, now.z, now.data)
+        gradient, information = total_information(objective, now.z, now.data)
         moved = []
         for damping, share in _TRIALS:
             change = share * (_step(objective, now.z, gradient, information, free, damping) - now.z)
@@ -189,14 +191,14 @@ def _descended(objective: Objective, start: Minimum) -> Minimum:
 
 def _within_reach(objective: Objective, minimum: Minimum) -> Minimum:
     """Return what is reached if the next step reduces J by twice what is expected of it."""
-    gradient, information = total(objective, minimum.z, minimum.data)
+    gradient, information = total_information(objective, minimum.z, minimum.data)
     change = _step(objective, minimum.z, gradient, information, np.ones(len(minimum.z), bool), 0.0) - minimum.z
     value = minimum.value + 2.0 * float(gradient @ change + 0.5 * change @ information @ change)
     return replace(minimum, z=minimum.z + change, value=value)
 
 
 def refits(
-    objective: Objective, best: Minimum, parts: Sequence[Part], absent: Sequence[Collection[int]] = ()
+    objective: Objective, best: Minimum, parts: Sequence[DataPart], absent: Sequence[Collection[int]] = ()
 ) -> list[Minimum]:
     """Minimise J for some parts of the data, each from the minimum for all data, without the noise.
 
@@ -216,22 +218,25 @@ def refits(
         moved = np.array([fit.moved for fit in active]).T
         for fit, trial in zip(active, objective.trials(moved, [fit.part for fit in active], best.runs), strict=True):
             fit.judge(*trial)
-    return [Minimum(fit.z, fit.value, fit.runs, fit.data, total(fit.objective, fit.z, fit.data)[1]) for fit in fits]
+    return [
+        Minimum(fit.z, fit.value, fit.runs, fit.data, total_information(fit.objective, fit.z, fit.data)[1])
+        for fit in fits
+    ]
 
 
 class _Refit:
     """A fit to a part of the data, between two steps."""
 
-    def __init__(self, objective: Objective, part: Part, best: Minimum, *, is_inside: bool) -> None:
+    def __init__(self, objective: Objective, part: DataPart, best: Minimum, *, is_inside: bool) -> None:
         self.objective, self.part, self.z, self.is_inside = objective, part, best.z, is_inside
-        self.runs: Sequence[Run] = [best.runs[n] for n in part.logs]
+        self.runs: Sequence[FilterRun] = [best.runs[n] for n in part.logs]
         self.data = _data_of(part, best)
         self.value = objective.value(self.z, self.runs) if is_inside else np.inf
         self.damping = 0.0
 
     def proposes(self, free: Chosen) -> float:
         """Find the next step, which changes no parameter by more than the largest change, and the expected gain."""
-        gradient, information = total(self.objective, self.z, self.data)
+        gradient, information = total_information(self.objective, self.z, self.data)
         while True:
             self.moved = _step(self.objective, self.z, gradient, information, free, self.damping)
             change = self.moved - self.z
@@ -253,18 +258,18 @@ class _Refit:
                 self.data = self.objective.data(self.z, self.runs, exact=False, of_noise=self.data)
 
 
-def _data_of(part: Part, best: Minimum) -> list[Data]:
+def _data_of(part: DataPart, best: Minimum) -> list[Data]:
     """Return the data of a minimum for a part of its logs and rows."""
     rows = [best.data[-1].part(part.rows)] if part.rows else []
     return [*(best.data[n] for n in part.logs), *rows]
 
 
-def information_of(objective: Objective, best: Minimum, part: Part) -> Array:
+def information_of(objective: Objective, best: Minimum, part: DataPart) -> Array:
     """Return the information of a part of the data at the minimum for all, with that of the prior."""
-    return total(objective.of(part), best.z, _data_of(part, best))[1]
+    return total_information(objective.of(part), best.z, _data_of(part, best))[1]
 
 
-def total(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
+def total_information(objective: Objective, z: Array, data: Sequence[Data]) -> tuple[Array, Array]:
     """Return the gradient and the information of J, with those of the prior.
 
     Raises DivergedError where they are no numbers: a motion nearly overflows.

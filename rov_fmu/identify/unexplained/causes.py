@@ -11,7 +11,7 @@ from math import log
 import numpy as np
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
-from rov_fmu.identify.likelihood.filter import Run
+from rov_fmu.identify.likelihood.filter import FilterRun
 from rov_fmu.identify.likelihood.kinds import Process
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.solve import best_explanations, laplace
@@ -39,7 +39,7 @@ class _Piece:
         return float(np.minimum(np.diff(self.time) / time_constant, 1.0).sum())
 
 
-def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process, axis: Axis | None) -> str:
+def cause_of(objective: Objective, z: Array, runs: Sequence[FilterRun], slow: Process, axis: Axis | None) -> str:
     """Return what a slow process follows in words, such as `the voltage`, or an empty text.
 
     `runs` has the states of the filter for each log. Without an axis the process is a change of all thrust.
@@ -60,7 +60,7 @@ def cause_of(objective: Objective, z: Array, runs: Sequence[Run], slow: Process,
     return names[0] if len(names) == 1 else ""
 
 
-def _piece(objective: Objective, z: Array, number: int, run: Run, index: int, axis: Axis | None) -> _Piece:
+def _piece(objective: Objective, z: Array, number: int, run: FilterRun, index: int, axis: Axis | None) -> _Piece:
     sampled, record = objective.logs[number], objective.records[number]
     time = record.time[first_in_each(record.time, 1.0 / _STEP)]
 
@@ -96,7 +96,7 @@ def thrust_along(objective: Objective, z: Array, number: int, time: Array, axis:
     return sampled.thrust(objective.table.coefficients(z), inputs)[:, sampled.layout.bare_axes.index(axis)]
 
 
-def _distance(objective: Objective, number: int, run: Run, time: Array, axis: Axis) -> Array | None:
+def _distance(objective: Objective, number: int, run: FilterRun, time: Array, axis: Axis) -> Array | None:
     """Return the distance from the start along surge or sway, which a tether resists; None along other axes."""
     states, record = objective.filters[number].vehicle_states, objective.records[number]
     if axis not in (SURGE, SWAY) or not {"x", "y"} <= {*states}:

@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, HEAVE, Axis
-from rov_fmu.identify.likelihood.filter import DivergedError, Run
+from rov_fmu.identify.likelihood.filter import DivergedError, FilterRun
 from rov_fmu.identify.likelihood.kinds import SLOW
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.parameters import HORIZONTAL, Parameter
@@ -24,13 +24,13 @@ _STEPS = 8
 """The most derivatives of a fit without a slow process."""
 
 
-def followed(objective: Objective, z: Array) -> list[Run]:
+def followed(objective: Objective, z: Array) -> list[FilterRun]:
     """Return a run through each log with the states of the filter."""
     return [objective.run(z, n, with_states=True) for n in range(len(objective.logs))]
 
 
 def disturbances(
-    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[Run], fitted: Sequence[Axis]
+    objective: Objective, best: Minimum, posterior: Posterior, runs: Sequence[FilterRun], fitted: Sequence[Axis]
 ) -> Iterator[Disturbance]:
     """Yield each slow process of the model in each log that has it, with the evidence for it: those along the axes that
     are fitted, and along no axis."""
@@ -52,7 +52,7 @@ def largest(some: Iterable[Disturbance]) -> Iterator[Disturbance]:
         yield max(own, key=lambda one: one.share)
 
 
-def unknown_forces(objective: Objective, runs: Sequence[Run]) -> Iterator[UnknownForce]:
+def unknown_forces(objective: Objective, runs: Sequence[FilterRun]) -> Iterator[UnknownForce]:
     """Yield the slow force along each axis of each log."""
     for number, (sampled, run) in enumerate(zip(objective.logs, runs, strict=True)):
         first, time = objective.filters[number].force, objective.records[number].time
@@ -88,7 +88,7 @@ def _disturbance(
     number: int,
     z: Array,
     parameter: Parameter,
-    runs: Sequence[Run],
+    runs: Sequence[FilterRun],
     evidence: float,
     error: float,
 ) -> Disturbance | None:

@@ -120,7 +120,7 @@ def name_and_unit(title: str, units: Collection[str]) -> tuple[list[str], str | 
     return words, None if len(words) > 1 and words[-1] in _UNKNOWN_UNITS else ""
 
 
-def layout_of(thrusters: Iterable[str]) -> Layout:
+def assumed_layout(thrusters: Iterable[str]) -> Layout:
     """Return a layout with all axes, and with thrusters of which only the names are known."""
     axes = tuple(VehicleAxis(axis) for axis in AXES.values())
     ahead = SourcedVector((1.0, 0.0, 0.0), "a guess")
@@ -159,7 +159,7 @@ def guessed(
         layout = Layout.of_wrench(map(VehicleAxis, AXES.values()))
         meant = {title: name or _VELOCITIES.get(header_parts(title)[0], "") for title, name in meant.items()}
     else:
-        layout = fitting(names, layouts) or layout_of(names)
+        layout = fitting(names, layouts) or assumed_layout(names)
     known = [thruster.name for thruster in layout.thrusters]
     is_column = KnownColumns(columns_of_log(layout, axis)).has
     columns = {title: f"{of.external} [{of.load}]" for title, of in forces.items() if not is_column(title)}

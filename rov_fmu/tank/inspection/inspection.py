@@ -24,7 +24,7 @@ from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.folder import axis_in_name, kind_of_table
 from rov_fmu.tank.inspection.headers import guessed, guessed_of_table, one_of_several
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked, rate
+from rov_fmu.tank.quality import checked_log, rate
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_columns
 from rov_fmu.tank.readers.parsers import guarded, open_table
@@ -137,7 +137,7 @@ def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tab
         names, _ = names_of(layout, tables)
         axis = None
     layout = layout or Layout((), (), ())
-    logs = [checked(log) for log in read_logs(path, layout, names, axis, is_part=True)]
+    logs = [checked_log(log) for log in read_logs(path, layout, names, axis, is_part=True)]
     return [_of_log(path, log, without_rests(log, layout)[0].findings, unread, columns) for log in logs]
 
 

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.tank.catalogue import is_known
+from rov_fmu.tank.catalogue import is_known_kind
 from rov_fmu.tank.log import Source
-from rov_fmu.tank.readers.content import Content, described, topic_of
-from rov_fmu.tank.readers.mavlink import Message, read_messages
+from rov_fmu.tank.readers.content import Content, described_topics, topic_of
+from rov_fmu.tank.readers.mavlink import MavlinkMessage, read_messages
 from rov_fmu.tank.readers.recordings import (
     ZSTD,
     Damage,
@@ -103,10 +103,10 @@ class _Unknown:
         """Return descriptions of the topics, and of the range of each number in their first messages."""
         rows = {source: self.rows.get(source, []) for source in self.counts}
         topics = [topic_of(source, np.arange(float(len(own))), own) for source, own in rows.items()]
-        return described(topics, {source.topic: count for source, count in self.counts.items()})
+        return described_topics(topics, {source.topic: count for source, count in self.counts.items()})
 
 
-def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown) -> Iterator[Message | None]:
+def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown) -> Iterator[MavlinkMessage | None]:
     """Yield the messages that are read, and None for a damaged one."""
     decoders: dict[Stream, Decode | None] = {}
     frames: dict[Stream, tuple[str, str]] = {}
@@ -115,7 +115,7 @@ def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown)
             decoders[stream] = _decoder(stream)
         decode, match = decoders[stream], _MAVLINK_TOPIC.fullmatch(stream.topic)
         kind = _kind_of(stream)
-        is_read = stream.topic in named or is_known(kind)
+        is_read = stream.topic in named or is_known_kind(kind)
         if not decode or not (match or is_read):
             unknown.add(stream, decode, raw)
             continue
@@ -131,7 +131,7 @@ def _decoded(messages: Iterator[Raw], named: Collection[str], unknown: _Unknown)
             numbers = dict(_numbers("", message))
             if kind != stream.kind:
                 numbers = fields_of(kind, numbers, frames[stream])
-            yield Message(source, time * 1e-9, numbers, stamp=_stamp(message))
+            yield MavlinkMessage(source, time * 1e-9, numbers, stamp=_stamp(message))
         except MemoryError:
             raise
         except Exception:  # a parser may raise anything on damaged bytes
@@ -189,12 +189,12 @@ def _unpacked(raw: bytes) -> bytes:
     return zstandard.ZstdDecompressor().decompressobj().decompress(raw)
 
 
-def _of_mavlink(topic: re.Match[str], body: Any, arrival: float) -> Message:
+def _of_mavlink(topic: re.Match[str], body: Any, arrival: float) -> MavlinkMessage:
     """Return a message of BlueOS, with the sender in the name of the topic. Raises an exception for a damaged one."""
     system, component, kind = topic.groups()
     parameter = _text(body["param_id"]) if kind == "PARAM_VALUE" else ""
     source = Source(topic[0], kind, system, f"component {component}")
-    return Message(source, arrival, dict(_numbers("", body)), parameter)
+    return MavlinkMessage(source, arrival, dict(_numbers("", body)), parameter)
 
 
 def _text(value: Any) -> str:

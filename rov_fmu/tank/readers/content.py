@@ -10,7 +10,7 @@ import numpy as np
 from rov_fmu.tank.arrays import Array, range_in_words
 from rov_fmu.tank.channels import IMPOSSIBLE, Topic
 from rov_fmu.tank.clocks import parts_of_clock, restarts, usual_delay
-from rov_fmu.tank.commands import Parameters
+from rov_fmu.tank.commands import AutopilotParameters
 from rov_fmu.tank.findings import Finding, about
 from rov_fmu.tank.log import Source
 
@@ -24,7 +24,7 @@ class Piece:
     """The messages of a log between two restarts of its clock."""
 
     topics: list[Topic]
-    parameters: Parameters = field(default_factory=Parameters)
+    parameters: AutopilotParameters = field(default_factory=AutopilotParameters)
     since: float = 0.0
     """The time of its first message after that of the log, on a clock that does not restart, s."""
 
@@ -116,7 +116,7 @@ def content_of(
                 topics.append(topic_of(source, np.where(np.isnan(stamp), arrival - delay, stamp), numbers))
                 late[source.topic] += len(stamp) if np.isnan(stamp).any() else 0
         topics = [topic for topic in topics if len(topic.time)]
-        content.pieces.append(Piece(topics, Parameters.of_pairs(parameters, delay), first - begin))
+        content.pieces.append(Piece(topics, AutopilotParameters.of_pairs(parameters, delay), first - begin))
     content.count("time of arrival", late.total(), topics=", ".join(+late))
     return content
 
@@ -127,7 +127,7 @@ def topic_of(source: Source, time: Array, numbers: Sequence[Mapping[str, float]]
     return Topic.of_messages(source, time, {key: np.array([row.get(key, np.nan) for row in numbers]) for key in keys})
 
 
-def described(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProxyType({})) -> dict[str, str]:
+def described_topics(topics: Iterable[Topic], messages: Mapping[str, int] = MappingProxyType({})) -> dict[str, str]:
     """Return the descriptions of topics that are not recognised, and of the range of each number in their messages.
 
     `messages` has the number of all messages, if the topics have only the first ones.

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.tank.arrays import Flags
-from rov_fmu.tank.catalogue import is_known
+from rov_fmu.tank.catalogue import is_known_kind
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
 from rov_fmu.tank.log import Source
@@ -39,7 +39,7 @@ _HORIZONTAL = {"vx", "vy", "VN", "VE", "x", "y", "PN", "PE"}
 
 
 @dataclass
-class Message:
+class MavlinkMessage:
     """A message of MAVLink, from a .tlog or in JSON, or of a DataFlash log."""
 
     source: Source
@@ -59,10 +59,10 @@ def read_telemetry(path: Path, named: Collection[str]) -> Content:
 
 def _is_read(named: Collection[str], *names: str) -> bool:
     """Return True for a kind or a topic that the catalogue or rov.toml knows."""
-    return any(is_known(name) or name in _STATUS or name in named for name in names)
+    return any(is_known_kind(name) or name in _STATUS or name in named for name in names)
 
 
-def read_messages(path: Path, messages: Iterable[Message | None], named: Collection[str]) -> Content:
+def read_messages(path: Path, messages: Iterable[MavlinkMessage | None], named: Collection[str]) -> Content:
     """Return the content of a log of messages; None stands for a damaged one.
 
     Those of MAVLink have times since the vehicle was booted, or none.
@@ -149,7 +149,7 @@ def _of_dataflash(path: Path, reader: Any, counts: Mapping[str, int], named: Col
     return content
 
 
-def _messages(reader: Any, wanted: Collection[str]) -> Iterator[Message | None]:
+def _messages(reader: Any, wanted: Collection[str]) -> Iterator[MavlinkMessage | None]:
     """Yield the messages of some kinds in a log of the vehicle. One without a time is damaged."""
     while message := reader.recv_match(type=wanted):
         try:
@@ -160,10 +160,10 @@ def _messages(reader: Any, wanted: Collection[str]) -> Iterator[Message | None]:
         part = next((f"{word} {numbers[key]:g}" for key, word in _INSTANCES.items() if key in numbers), "")
         arrival = numbers.get("TimeUS", nan) * 1e-6
         parameter = str(message.Name) if kind == "PARM" else ""
-        yield Message(Source(kind, kind, part=part), arrival, numbers, parameter) if isfinite(arrival) else None
+        yield MavlinkMessage(Source(kind, kind, part=part), arrival, numbers, parameter) if isfinite(arrival) else None
 
 
-def _telemetry(path: Path) -> Iterator[Message | None]:
+def _telemetry(path: Path) -> Iterator[MavlinkMessage | None]:
     """Yield the messages in a log of a ground station."""
     from pymavlink import mavutil
 
@@ -173,7 +173,9 @@ def _telemetry(path: Path) -> Iterator[Message | None]:
             source = Source(kind, kind, str(message.get_srcSystem()), f"component {message.get_srcComponent()}")
             parameter = str(message.param_id) if kind == "PARAM_VALUE" else ""
             is_damaged = kind == "BAD_DATA"
-            yield None if is_damaged else Message(source, float(message._timestamp), _numbers(message), parameter)
+            yield (
+                None if is_damaged else MavlinkMessage(source, float(message._timestamp), _numbers(message), parameter)
+            )
 
 
 # ---- The filter ------------------------------------------------------------------------------------------------------

@@ -36,12 +36,12 @@ from rov_fmu.tank.catalogue import (
     QUATERNION,
     VALIDITIES,
     VECTORS,
-    Quantity,
+    MeasuredQuantity,
     words_of,
 )
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import held
-from rov_fmu.tank.columns import LogColumn, Names
+from rov_fmu.tank.columns import ColumnNames, LogColumn
 from rov_fmu.tank.findings import Finding, about
 
 _OUTERMOST, _LEAST_OTHERS = 2, 10
@@ -98,7 +98,7 @@ def flag_of(name: str, valid: Mapping[str, Sequence[str]], field: str = "") -> d
     return dict.fromkeys(meant if others else QUANTITIES, "invalid" not in words)
 
 
-def flag_columns(titles: Iterable[str], known: Mapping[str, LogColumn], names: Names) -> dict[str, str]:
+def flag_columns(titles: Iterable[str], known: Mapping[str, LogColumn], names: ColumnNames) -> dict[str, str]:
     """Return the headers of a table that are flags of validity, by the names under which they are read."""
     is_column = KnownColumns(known).has
     unknown = (title for title in dict.fromkeys(titles) if not is_column(names.columns.get(title, title)))
@@ -208,7 +208,7 @@ def _flags(topics: Sequence[Topic], valid: Mapping[str, Sequence[str]]) -> Itera
 # ---- Marks -----------------------------------------------------------------------------------------------------------
 
 
-def marks(time: Array, values: Array, quantity: Quantity) -> dict[float, str]:
+def marks(time: Array, values: Array, quantity: MeasuredQuantity) -> dict[float, str]:
     """Return the numbers that mark that nothing was measured, of values in SI units, with the kind of the finding."""
     known = np.isfinite(values)
     time, values = time[known], values[known]
@@ -226,7 +226,7 @@ def marks(time: Array, values: Array, quantity: Quantity) -> dict[float, str]:
     return dict.fromkeys(found, "mark")
 
 
-def _far(levels: Array, counts: NDArray[np.intp], quantity: Quantity) -> Iterator[slice]:
+def _far(levels: Array, counts: NDArray[np.intp], quantity: MeasuredQuantity) -> Iterator[slice]:
     """Yield the indices of the outermost levels, of some in ascending order, that are far from all others.
 
     The range of the others is that without the outermost ones on both sides, because there may be marks on both.

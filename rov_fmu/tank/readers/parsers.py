@@ -123,7 +123,7 @@ def guarded(function: Callable[Concatenate[Path, _P], _T]) -> Callable[Concatena
     return in_child
 
 
-def budget(size: int) -> Limits:
+def budget_for(size: int) -> Limits:
     """Return the budget for a file with a content of a size in bytes.
 
     The slowest parser takes about 0.5 s and 4 MB of memory for each MB of messages that it reads.
@@ -174,7 +174,7 @@ class _Parser:
     def call(self, function: Callable[..., Any], path: Path, arguments: Any, options: Any) -> Any:
         """Return what a function returns. Raises what it raises, and UnreadableFileError."""
         growth, file = format_of(path).growth, path.stat()
-        limits = budget(growth * file.st_size)
+        limits = budget_for(growth * file.st_size)
         with self.lock:
             key = _key(file)
             left = replace(limits, time=limits.time and limits.time - self.spent.get(key, 0.0))
@@ -194,7 +194,7 @@ class _Parser:
                     raise UnreadableFileError(f"{path}: {LimitError(error.limit, limits)} to be read") from error
                 raise UnreadableFileError(f"{path}: its parser {error}") from error
             finally:
-                if limits.memory != budget(0).memory:
+                if limits.memory != budget_for(0).memory:
                     self.close()  # memory that it keeps would count for the next file, which may have a smaller budget
 
     def close(self) -> None:

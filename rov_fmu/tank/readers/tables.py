@@ -48,8 +48,8 @@ from rov_fmu.tank.columns import (
     SLIPS,
     THRUSTERS,
     WELL_KNOWN,
+    ColumnNames,
     LogColumn,
-    Names,
     columns_of_log,
     refuse_slips,
 )
@@ -58,7 +58,7 @@ from rov_fmu.tank.log import LEAST_SAMPLES, Source
 from rov_fmu.tank.readers.content import Content, Piece
 from rov_fmu.tank.readers.no_measurement import FLAG, flag_columns
 from rov_fmu.tank.readers.times_of_day import FIRST_ROWS, HOW, time_columns, times_of_day
-from rov_fmu.tank.readers.times_of_day import rules_of_page as clock_rules
+from rov_fmu.tank.readers.times_of_day import time_rules_of_page as clock_rules
 
 _MOST_UNORDERED = 0.2
 """The largest share of rows out of order. If it is exceeded, the times are not those of a log."""
@@ -111,7 +111,7 @@ def read_table(
     path: Path,
     layout: Layout,
     axis: Axis | None,
-    names: Names,
+    names: ColumnNames,
     open_stream: OpenStream,
     *,
     is_part: bool = False,

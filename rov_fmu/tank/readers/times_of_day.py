@@ -46,7 +46,7 @@ _FIND = re.compile(CLOCK, re.IGNORECASE)
 _TITLES = ("time", "timestamp", "t", "date")
 
 
-def rules_of_page() -> dict[str, Any]:
+def time_rules_of_page() -> dict[str, Any]:
     """Return the rules by which recording.js, of the page that flies, reads times of day."""
     return {
         "pattern": CLOCK,

@@ -11,12 +11,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from rov_fmu.tank.catalogue import is_known
+from rov_fmu.tank.catalogue import is_known_kind
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.commands import Parameters
+from rov_fmu.tank.commands import AutopilotParameters
 from rov_fmu.tank.findings import about
 from rov_fmu.tank.log import Source
-from rov_fmu.tank.readers.content import Content, Piece, described
+from rov_fmu.tank.readers.content import Content, Piece, described_topics
 
 _T = TypeVar("_T")
 _FRAMES = {1: "ned", 3: "frd"}
@@ -31,9 +31,9 @@ def read_ulog(path: Path, named: Collection[str]) -> Content:
         log = ULog(file)
     names = Counter(data.name for data in log.data_list)
     topics = [_topic(data, names[data.name] > 1) for data in log.data_list if "timestamp" in data.data]
-    known = (topic for topic in topics if is_known(topic.source.kind) or topic.source.topic in named)
+    known = (topic for topic in topics if is_known_kind(topic.source.kind) or topic.source.topic in named)
     read = [topic for topic in known if len(topic.time)]
-    unread = described(topic for topic in topics if topic not in read)
+    unread = described_topics(topic for topic in topics if topic not in read)
     content = Content(path.name, [Piece(read, _parameters(log))], unread=unread)
     if log.file_corruption:
         content.findings.append(about(path.name, "damaged log"))
@@ -43,11 +43,11 @@ def read_ulog(path: Path, named: Collection[str]) -> Content:
     return content
 
 
-def _parameters(log: Any) -> Parameters:
+def _parameters(log: Any) -> AutopilotParameters:
     values = {name: [(0.0, value)] for name, value in log.initial_parameters.items()}
     for stamp, name, value in log.changed_parameters:
         values.setdefault(name, []).append((stamp * 1e-6, value))
-    return Parameters.of_pairs(values)
+    return AutopilotParameters.of_pairs(values)
 
 
 def _topic(data: Any, several: bool) -> Topic:

@@ -17,7 +17,7 @@ from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.identify.given import with_axes_alone
-from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run, Sensor, Slow
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, FilterRun, Parameters, Record, Sensor, Slow
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.identify.likelihood.sets import one_set
@@ -415,7 +415,7 @@ def test_diverging_motion_is_an_error() -> None:
 # ---- Samples ---------------------------------------------------------------------------------------------------------
 
 
-def turning(values: Array, k: Vehicle = VIDEORAY) -> Run:
+def turning(values: Array, k: Vehicle = VIDEORAY) -> FilterRun:
     """Return the run of a vehicle that turns for 20 s, by its heading."""
     time = 0.25 * np.arange(len(values))
     log = record(
@@ -442,7 +442,7 @@ def test_headings_are_compared_within_half_a_turn() -> None:
 def test_an_outlier_tells_ever_less() -> None:
     """Beyond three standard deviations of the innovation, its weight is 3 / |u|, in the mean and in the covariance."""
 
-    def after(value: float) -> Run:
+    def after(value: float) -> FilterRun:
         log = record((DEPTH,), [(0.0, 0)], np.array([START["z"] + value]))
         return Filter(LAGGING).run(log, parameters(LAGGING, 1), with_states=True)
 

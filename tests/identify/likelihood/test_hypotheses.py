@@ -30,7 +30,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     twins,
 )
 from rov_fmu.identify.likelihood.kinds import KINDS, TURN
-from rov_fmu.identify.likelihood.objective import Data, Objective, Part
+from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
 from rov_fmu.identify.likelihood.search import (
@@ -519,7 +519,7 @@ def test_a_log_that_begins_in_motion_is_predicted_as_well_as_the_whole_one(tmp_p
     some = {f"{n:02}.csv": "\n".join([title, *rows[n:]]) + "\n" for n in (0, *range(45, 60))}
     objective, best = at_truth(folder_of(tmp_path, f'base = "videoray"\n{HEAD}', some))
     for n, runs in enumerate(best.runs):
-        ratios = structure(objective.of(Part([n], [])), replace(best, runs=[runs], data=[best.data[n]]))
+        ratios = structure(objective.of(DataPart([n], [])), replace(best, runs=[runs], data=[best.data[n]]))
         assert worst(ratios) < 1.2, n
 
 

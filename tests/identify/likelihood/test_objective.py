@@ -11,10 +11,10 @@ import pytest
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.likelihood import parameters
-from rov_fmu.identify.likelihood.filter import DivergedError, Filter, Parameters, Record, Run
-from rov_fmu.identify.likelihood.objective import Objective, Part
+from rov_fmu.identify.likelihood.filter import DivergedError, Filter, FilterRun, Parameters, Record
+from rov_fmu.identify.likelihood.objective import DataPart, Objective
 from rov_fmu.identify.likelihood.parameters import Parameter
-from rov_fmu.identify.likelihood.solve import minimise, refits, start_of, total
+from rov_fmu.identify.likelihood.solve import minimise, refits, start_of, total_information
 from rov_fmu.tank.arrays import Array
 from tests.folders import folder_of, pulled, responses
 from tests.identify.conftest import KNOWN, add_voltage
@@ -68,7 +68,9 @@ def test_quadratic_drag_is_that_of_the_model_without_another_power(objective: Ob
         assert trial[0] == pytest.approx(J, abs=1e-6, rel=0.0)
 
 
-def both_ways(objective: Objective, z: Array, n: int, runs: Sequence[Run]) -> Iterator[tuple[float, Array, list[Run]]]:
+def both_ways(
+    objective: Objective, z: Array, n: int, runs: Sequence[FilterRun]
+) -> Iterator[tuple[float, Array, list[FilterRun]]]:
     """Yield a step, the parameters and the runs for one parameter moved by it up, and then down."""
     for step in (
         h := (30.0 if objective.table.parameters[n].of_motion else 3.0) * objective.table.parameters[n].step,
@@ -91,7 +93,7 @@ def test_no_error_of_a_derivative_tells_the_common_scale_of_all_forces(
     An assumed thrust would otherwise be told within 1 % by a log that is nearly exact.
     """
     monkeypatch.setattr(parameters, "_MOTION_STEP", 0.03)
-    logs = objective.of(Part(range(len(objective.logs)), []))
+    logs = objective.of(DataPart(range(len(objective.logs)), []))
     scale = objective.table.scale_of_forces(point)
     for is_exact in (True, False):
         for data in logs.data(point, logs.runs(point), exact=is_exact):
@@ -105,10 +107,10 @@ def test_parameters_in_lanes_have_the_intervals_of_runs_one_by_one(
     runs = objective.runs(point)
 
     def errors() -> Array:
-        _, information = total(objective, point, objective.data(point, runs))
+        _, information = total_information(objective, point, objective.data(point, runs))
         return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
 
-    def one_by_one(self: Filter, record: Record, sets: Parameters, first: Run, **how: bool) -> list[Run]:
+    def one_by_one(self: Filter, record: Record, sets: Parameters, first: FilterRun, **how: bool) -> list[FilterRun]:
         return [self.run(record, one_set(sets, n), repeated=first, **how) for n in range(sets.count)]
 
     in_lanes = errors()
@@ -122,7 +124,7 @@ def check_gradient(objective: Objective, z: Array) -> None:
     A width has kinks, where the ends of windows meet samples.
     """
     runs = objective.runs(z)
-    gradient, information = total(objective, z, objective.data(z, runs))
+    gradient, information = total_information(objective, z, objective.data(z, runs))
     for n, name in enumerate(names(objective.table.parameters)):
         if objective.low[n] == objective.high[n]:
             continue  # of a parameter that is held
@@ -188,7 +190,9 @@ def test_fits_to_parts_of_the_data_end_where_a_full_search_does(objective: Objec
     """Without each log and without each row, from the minimum for all data."""
     best = minimise(objective, point)
     logs, rows = objective.whole.logs, objective.whole.rows
-    parts = [Part([m for m in logs if m != n], rows) for n in logs] + [Part(logs, [m for m in rows if m != rows[0]])]
+    parts = [DataPart([m for m in logs if m != n], rows) for n in logs] + [
+        DataPart(logs, [m for m in rows if m != rows[0]])
+    ]
     of_motion = np.array([p.of_motion for p in objective.table.parameters])
     for part, found in zip(parts, refits(objective, best, parts), strict=True):
         own = objective.of(part)

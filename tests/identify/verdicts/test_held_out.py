@@ -15,7 +15,7 @@ from rov_fmu.identify.held_out import Knowledge, ahead, held_out, predictions, u
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.objective import Objective, Part
+from rov_fmu.identify.likelihood.objective import DataPart, Objective
 from rov_fmu.identify.likelihood.parameters import Parameter, Table
 from rov_fmu.identify.likelihood.search import structure, with_steps, worst
 from rov_fmu.identify.likelihood.solve import minimise
@@ -44,7 +44,7 @@ def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit)
     objective, best = fit.objective, fit.best
     known = Knowledge(objective, best)
     for n, (axis, other) in enumerate(((HEAVE, YAW), (YAW, HEAVE))):
-        alone = Part([n], objective.whole.rows)
+        alone = DataPart([n], objective.whole.rows)
         assert known.informs(axis, alone)
         assert not known.informs(other, alone)
     out = held_out(objective, best)

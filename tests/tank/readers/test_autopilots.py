@@ -15,7 +15,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.readers import parsers
-from rov_fmu.tank.readers.mavlink import Message, read_messages
+from rov_fmu.tank.readers.mavlink import MavlinkMessage, read_messages
 from rov_fmu.tank.readers.parsers import read_topics
 from tests.tank.logs import commanded, measured, read_log, used
 from tests.tank.readers import motion
@@ -63,8 +63,8 @@ def test_the_filter_tells_which_velocities_it_knows() -> None:
     messages = []
     for n, flags in enumerate((0, 253, 255, 126)):
         local = {"time_boot_ms": 1000.0 * n + 500.0, "vx": 1.0, "vy": 2.0, "vz": 3.0}
-        messages += [Message(Source(EKF, EKF, "1"), 9.0 + n, {"flags": flags, "time_boot_ms": 1000.0 * n})]
-        messages += [Message(Source(LOCAL, LOCAL, vehicle), 9.5 + n, local) for vehicle in "12"]
+        messages += [MavlinkMessage(Source(EKF, EKF, "1"), 9.0 + n, {"flags": flags, "time_boot_ms": 1000.0 * n})]
+        messages += [MavlinkMessage(Source(LOCAL, LOCAL, vehicle), 9.5 + n, local) for vehicle in "12"]
     content = read_messages(Path("a.tlog"), messages, ())
     own, other = content.pieces[0].topics
     np.testing.assert_equal([own.fields["vx"], own.fields["vy"]], [[nan] * 3 + [1.0], [nan] * 3 + [2.0]])
@@ -79,7 +79,7 @@ def test_the_primary_core_of_the_filter_is_used_while_it_is_primary() -> None:
             told = {"XKF1": {"VN": 1.0 + core, "VE": 0.0}, "XKF4": {"SS": 831.0, "PI": float(n > 1)}}
             for kind, numbers in told.items():
                 source = Source(kind, kind, part=f"core {core}")
-                messages += [Message(source, float(n), {"TimeUS": 1e6 * n, **numbers})]
+                messages += [MavlinkMessage(source, float(n), {"TimeUS": 1e6 * n, **numbers})]
     content = read_messages(Path("a.bin"), messages, ())
     primary, *cores = content.pieces[0].topics
     assert primary.source.part == "core 0 and 1, the primary one"

@@ -11,7 +11,7 @@ from rov_fmu.tank.catalogue import QUANTITIES, Message
 from rov_fmu.tank.channels import Topic, channels_of, frames_of, of_scalar
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Channel, Log, Source
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from tests.tank.logs import used
 from tests.tank.readers import motion
 from tests.tank.readers.motion import DIVE, TIME
@@ -164,7 +164,7 @@ def test_of_several_barometers_the_one_in_the_water_tells_the_depth() -> None:
         return topic("", TIME, "fluid_pressure", pascals[:, None], Source(name, "sensor_msgs/msg/FluidPressure"))
 
     hull, water = barometer("/hull", 100900.0 + 15.0 * np.sin(7.0 * TIME)), barometer("/bar30", WATER)
-    alone = checked(Log("a", None, tuple(channels_of([hull], None))))
+    alone = checked_log(Log("a", None, tuple(channels_of([hull], None))))
     reason = (
         "its pressure changes by only 3 mm of water and is that of the air, so the barometer seems to be inside the "
     )
@@ -173,7 +173,7 @@ def test_of_several_barometers_the_one_in_the_water_tells_the_depth() -> None:
         f"a: /hull is left out for depth: {reason}",
         "a: pressure from /hull, 10 Hz",
     )
-    both = checked(Log("a", None, tuple(channels_of([hull, water], None))))
+    both = checked_log(Log("a", None, tuple(channels_of([hull, water], None))))
     assert used(both, "depth").values == pytest.approx(motion.DEPTH)
     assert sentences(both.findings) == (
         "a: the depth is computed from the pressure, for fresh water (1000 kg/m3). In sea water the true depth is 2.5 "

@@ -10,7 +10,7 @@ import pytest
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.channels import Topic
 from rov_fmu.tank.clocks import first_in_each, parts_of_clock, restart_rows, restarts, usual_delay
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import ColumnNames
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.log import Source
 from rov_fmu.tank.read_log import read_logs
@@ -138,6 +138,6 @@ def test_times_since_1970(header: str, date: str, tmp_path: Path) -> None:
     """A date is in UTC if it names no offset."""
     path = tmp_path / "dive.csv"
     path.write_text(f"{header};u_5 [%]\n{date};30\n", encoding="utf-8")
-    (log,) = read_logs(path, BLUEROV2, Names(), is_part=True)
+    (log,) = read_logs(path, BLUEROV2, ColumnNames(), is_part=True)
     assert log.commands is not None
     assert log.commands.rows == pytest.approx([1777679990.2], abs=1e-6)

@@ -15,7 +15,7 @@ import pytest
 from rov_fmu.equation.catalogue import AXES
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.channels import Topic
-from rov_fmu.tank.commands import Commanded, LogKeys, Parameters, commands_of, wrench_of
+from rov_fmu.tank.commands import AutopilotParameters, Commanded, LogKeys, commands_of, wrench_of
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Source
 
@@ -51,7 +51,7 @@ def servo_log(name: str, first: int, *outputs: Rows) -> Topic:
 
 def commanded(topics: Sequence[Topic], names: str = "a", told: Numbers | None = None, **keys: object) -> Commanded:
     """Return the commands of thrusters, whose names are letters, with the parameters that were told at first."""
-    parameters = Parameters.of_pairs({name: [(0.0, value)] for name, value in (told or {}).items()})
+    parameters = AutopilotParameters.of_pairs({name: [(0.0, value)] for name, value in (told or {}).items()})
     return commands_of(LOG, topics, [*names], parameters, LogKeys.model_validate(keys))
 
 

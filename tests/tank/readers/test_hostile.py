@@ -21,7 +21,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.readers import parsers
 from rov_fmu.tank.readers.content import Content
-from rov_fmu.tank.readers.parsers import budget, format_of, header_of, one_parser, read_topics
+from rov_fmu.tank.readers.parsers import budget_for, format_of, header_of, one_parser, read_topics
 from tests.tank.logs import read_log
 from tests.tank.readers.motion import BLUEROV2, DIVE
 from tests.tank.readers.writers import Ros, bag, flash
@@ -98,7 +98,7 @@ def test_a_small_file_that_exhausts_the_machine_is_one_line(
     path = write(tmp_path)
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setattr(parsers, "_PARSER", parsers._Parser())  # which begins after the folder of its files has changed
-    monkeypatch.setattr(parsers, "budget", lambda _: Limits(10.0, 450_000_000, 20_000_000))
+    monkeypatch.setattr(parsers, "budget_for", lambda _: Limits(10.0, 450_000_000, 20_000_000))
     # A library that gets no more memory may also abort its process.
     limits = r"needs more than (10 s|0\.45 GB of memory|0\.02 GB of disk space) to be read|ended its process: SIGABRT"
     with pytest.raises(DataFileError, match=limits):
@@ -185,8 +185,8 @@ def test_a_pipe_is_no_file(tmp_path: Path) -> None:
 
 
 def test_the_budget_of_a_large_log_grows_with_its_size(tmp_path: Path) -> None:
-    assert (budget(0).memory, budget(50_000_000).memory) == (10**9, 10**9)
-    assert budget(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
+    assert (budget_for(0).memory, budget_for(50_000_000).memory) == (10**9, 10**9)
+    assert budget_for(200_000_000) == Limits(time=430.0, memory=2_200_000_000, disk=10**9)
     with one_parser():
         path = flash(tmp_path, DIVE)
         assert len({id(parsers._PARSER._child) for _ in range(2) if read_topics(path, ()).pieces}) == 1
@@ -200,7 +200,7 @@ def test_a_log_that_exceeds_its_budget_is_one_line_and_the_next_one_is_read(
     assert read_topics(path, ()).pieces  # from then on the process has imported the parser
     os.utime(path, (0.0, 0.0))  # it is another file then, of which the process has no content
     with monkeypatch.context() as patch:
-        patch.setattr(parsers, "budget", lambda _: Limits(memory=1_000_000))
+        patch.setattr(parsers, "budget_for", lambda _: Limits(memory=1_000_000))
         with pytest.raises(DataFileError) as error:
             read(path)
     assert str(error.value) == f"{path}: needs more than 0.001 GB of memory to be read"

@@ -19,7 +19,7 @@ from rov_fmu.tank.columns import names_of
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import Finding, sentences
 from rov_fmu.tank.log import Log, Source
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from rov_fmu.tank.read_log import read_logs
 from rov_fmu.tank.readers.no_measurement import flag_of, marks, measured_only
 from tests.tank.logs import measured
@@ -136,7 +136,7 @@ def test_the_name_of_a_flag_tells_what_it_is_about(name: str, valid: Iterable[st
 def read(path: Path, **tables: object) -> Log:
     names, mistakes = names_of(BLUEROV2, RovTables.model_validate(tables))
     assert not mistakes
-    (log,) = map(checked, read_logs(path, BLUEROV2, names))
+    (log,) = map(checked_log, read_logs(path, BLUEROV2, names))
     return log
 
 

@@ -11,7 +11,7 @@ from rov_fmu.tank.commands import LogKeys
 from rov_fmu.tank.description import RovTables
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.log import Log
-from rov_fmu.tank.quality import checked
+from rov_fmu.tank.quality import checked_log
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import commanded, measured
 from tests.tank.readers.motion import BLUEROV2, TIME
@@ -22,7 +22,7 @@ from tests.tank.readers.writers import Ros, parameter, write_tlog
 def one(path: Path, keys: LogKeys = LogKeys(), topics: dict[str, str] | None = None) -> Log:  # noqa: B008 (frozen)
     names, mistakes = names_of(BLUEROV2, RovTables(topics=topics or {}, logs=keys))
     assert not mistakes
-    (log,) = map(checked, read_logs(path, BLUEROV2, names))
+    (log,) = map(checked_log, read_logs(path, BLUEROV2, names))
     return log
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import ColumnNames
 from rov_fmu.tank.inspection.inspection import inspect
 from rov_fmu.tank.read_log import read_logs
 from tests.tank.logs import measured
@@ -52,7 +52,7 @@ def times(folder: Path, titles: str, rows: Sequence[str]) -> Array:
     path = folder / "dive.csv"
     lines = [f"{titles};u_5 [%];depth [m]", *(f"{row};{n % 7};{0.1 * n:.3f}" for n, row in enumerate(rows))]
     path.write_text("\n".join(lines), encoding="utf-8")
-    (log,) = read_logs(path, BLUEROV2, Names(), is_part=True)
+    (log,) = read_logs(path, BLUEROV2, ColumnNames(), is_part=True)
     assert measured(log, "depth") == pytest.approx(0.1 * np.arange(len(rows)))
     (channel,) = (one for one in log.channels if one.quantity.name == "depth")
     return channel.time
@@ -156,7 +156,7 @@ def test_cells_that_are_damaged_have_no_time(tmp_path: Path) -> None:
     rows[5], rows[9] = "23:5", "x"
     path = tmp_path / "dive.csv"
     path.write_text("\n".join(["Time,u_5 [%],depth [m]", *(f"{row},{n},{n}" for n, row in enumerate(rows))]))
-    (log,) = read_logs(path, BLUEROV2, Names())
+    (log,) = read_logs(path, BLUEROV2, ColumnNames())
     assert {finding.kind: finding.words for finding in log.findings}["rows without time"]["count"] == 2
 
 

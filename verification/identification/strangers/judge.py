@@ -16,7 +16,7 @@ from time import process_time
 
 import numpy as np
 
-from rov_fmu.identify.findings import sentences
+from rov_fmu.identify.findings import result_sentences
 from rov_fmu.identify.identify import identify, load_tests
 from rov_fmu.identify.result import Identification
 from rov_fmu.io.csv_table import DataFileError
@@ -155,7 +155,7 @@ def _said(folder: Path) -> _Said:
 def _causes(result: Identification) -> Iterator[str]:
     """Yield what is told with a probability."""
     for one in result.findings:
-        if any("probability" in sentence for sentence in sentences([one])):
+        if any("probability" in sentence for sentence in result_sentences([one])):
             yield f"{one.kind} {one.words.get('of', '')}".strip()
 
 
