@@ -8,6 +8,8 @@ from functools import partial
 from pathlib import Path
 from time import perf_counter
 
+import numpy as np
+
 from rov_fmu.c.compile import (
     INTERFACES,
     OTHER_NAMES,
@@ -26,8 +28,9 @@ from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
 from rov_fmu.fmu.reference_results import reference_results
+from rov_fmu.fmus.fmu import Fmu
+from rov_fmu.fmus.instance import RunError
 from rov_fmu.io.file_kinds import FMU
-from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, ProofError, did_you_mean, shown
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.io.reading import open_file
@@ -37,6 +40,8 @@ from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.vehicle.vehicle import Vehicle, check_coefficients
 
 BACKENDS = ("native", "pythonfmu")
+_RUN, _STEPS = 10.0, 100
+"""The length of the run of a new FMU, s, and its steps."""
 
 
 @dataclass(frozen=True)
@@ -258,8 +263,6 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     import fmpy
     from fmpy.validation import validate_fmu
 
-    from rov_fmu.prove.runs import keep_message, restore_logger
-
     if problems := validate_fmu(str(path)):
         raise BuildError(f"the FMU is not valid: {problems[0]}")
     loaded = fmpy.platform if fmi == 2 else fmpy.platform_tuple
@@ -267,17 +270,15 @@ def _check(path: Path, vehicle: Vehicle, platforms: Sequence[str] | None, fmi: i
     known = fmpy.platform in fmpy.supported_platforms(str(path))
     if platforms is not None and not (known and loaded in [_folder(name, fmi) for name in platforms]):
         return "The FMU is valid. It was not run, because it has no binary that FMPy loads on this machine.", False
-    with temporary_folder("fmu-") as folder:
-        fmpy.extract(str(path), unzipdir=folder)
-        axis, others = vehicle.shown_axis, vehicle.unidentified
-        start = vehicle.layout.example(axis)
-        try:
-            result = fmpy.simulate_fmu(folder, start_values=start, logger=keep_message)
-        finally:
-            restore_logger()
+    axis, others, times = vehicle.shown_axis, vehicle.unidentified, np.linspace(0.0, _RUN, _STEPS + 1)
+    start = vehicle.layout.example(axis)
+    try:
+        result = Fmu.open(path, is_ours=True).run(times, {}, [axis.velocity], start)
+    except RunError as error:
+        raise BuildError(f"the FMU cannot be run: {error}") from error
     by_value = {value: " = ".join(name for name in start if start[name] == value) for value in start.values()}
     commands = ", ".join(f"{names} = {value:g}" for value, names in by_value.items())
-    end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {result['time'][-1]:g} s"
+    end = f"{axis.velocity} = {result[axis.velocity][-1]:.4f} {axis.unit} after {_RUN:g} s"
     run = "It runs." if axis in others else f"In a run, {commands} gives {end}."
     return " ".join(
         ["The FMU is valid.", run, *(f"{other.name.capitalize()}: not identified." for other in others)]

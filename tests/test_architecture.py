@@ -27,6 +27,7 @@ PARTS = (
     "build",
     "report",
     "prove",
+    "fmus",
     "fmu",
     "identify",
     "tank",

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.equation.catalogue import AXES, Axis
+from rov_fmu.fmus.description import TIME_LIMIT
+from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import Progress, ProofError, listed, silent
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.prove.check import check_evidence
 from rov_fmu.prove.claims import CLAIMS, Claim, Proof, prove_claims
-from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.measures import Evidence, does_not_apply, holds_if, in_short
 from rov_fmu.prove.proof import prove_fmu
-from rov_fmu.prove.runs import Array, Plan
+from rov_fmu.prove.runs import Plan
 from rov_fmu.prove.signature import signature_path
 from rov_fmu.prove.subject import Subject
 from rov_fmu.report.console import print_claims, print_end, print_evidence, print_proof
@@ -118,7 +119,7 @@ def _energies(
 
     M is measured: its inverse has the accelerations that loads of 1 N or 1 N m give at rest.
     """
-    inputs = {v.name: float(v.start or 0.0) for v in subject.variables.values() if v.causality == "input"}
+    inputs = {v.name: v.start for v in subject.variables.values() if v.causality == "input"}
     velocities = [axis.velocity for axis in axes]
     rates = [f"der({name})" for name in velocities]
     begin = {name: f"{0.5 + 0.1 * n:g}" for n, name in enumerate(velocities)}

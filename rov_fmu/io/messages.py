@@ -58,6 +58,7 @@ class RovError(Exception):
             MismatchError *
             ProofError
             RunError *
+                CallError *
             StudyError
             TimeError *
             TuningError

@@ -9,11 +9,11 @@ from lxml import etree
 
 from rov_fmu.fmu.archive import META_DATA, directory, local_header
 from rov_fmu.fmu.meta_data import ARCHIVE, BEFORE, FILES, GENERATOR, INPUTS, own_hash
+from rov_fmu.fmus.unpacking import check_order, opened_archive
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.messages import FileError, ProofError, brief, shown
 from rov_fmu.io.reading import hash_of, open_file, root_of_xml, too_large
 from rov_fmu.prove.signature import check_signature
-from rov_fmu.prove.unpacking import check_order, opened_archive
 
 _MOST_BYTES = 20_000_000
 """The largest size of the meta-data."""

@@ -6,15 +6,15 @@ from pathlib import Path
 from typing import Any
 
 from rov_fmu.fmu.archive import CARD, FOLDER
+from rov_fmu.fmus.description import TIME_LIMIT
+from rov_fmu.fmus.instance import RunError
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.messages import Progress, ProofError, silent
 from rov_fmu.io.reading import hash_of, open_file
 from rov_fmu.prove import measures
 from rov_fmu.prove.check import MetaData, check_evidence
-from rov_fmu.prove.description import TIME_LIMIT
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.prove.proof import remedy
-from rov_fmu.prove.runs import RunError
 from rov_fmu.prove.subject import Subject, opened
 
 

@@ -8,11 +8,12 @@ from typing import Any, Literal
 
 import numpy as np
 
+from rov_fmu.fmus.instance import Array, RunError
 from rov_fmu.io.child_process import ChildError
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, listed
 from rov_fmu.prove.proof import compare, least_divisor
-from rov_fmu.prove.runs import REAL, Answer, Array, RunError
+from rov_fmu.prove.runs import Answer
 from rov_fmu.prove.subject import Subject
 
 Result = Literal["holds", "fails", "measured", "does not apply"]
@@ -207,12 +208,15 @@ def limits(subject: Subject) -> Evidence:
 
 def _impossible(subject: Subject) -> Iterator[tuple[str, tuple[str, Any]]]:
     """Yield what is impossible in words, with the method of Runs and its argument."""
-    inputs, parameters = (subject.numbers(causality, REAL) for causality in ("input", "parameter"))
-    beyond = {name: value for name in parameters if (value := _beyond(*subject.bounds(name))) is not None}
+    inputs, parameters = (
+        [v for v in subject.variables.values() if (v.causality, v.kind) == (causality, "Real")]
+        for causality in ("input", "parameter")
+    )
+    beyond = {v.name: value for v in parameters if (value := _beyond(v.minimum, v.maximum)) is not None}
     for what, values in {
-        "an input that is not a number": dict.fromkeys(inputs, nan),
-        "an infinite input": dict.fromkeys(inputs, inf),
-        "a parameter that is not a number": dict.fromkeys(parameters, nan),
+        "an input that is not a number": {v.name: nan for v in inputs},
+        "an infinite input": {v.name: inf for v in inputs},
+        "a parameter that is not a number": {v.name: nan for v in parameters},
         "a parameter beyond its bounds": beyond,
     }.items():
         if values:

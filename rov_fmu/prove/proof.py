@@ -1,7 +1,6 @@
 """Prove an FMU: run the experiments that it contains with FMPy, and compare the results with the expected ones."""
 
 import io
-import os
 from collections.abc import Sequence
 from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
@@ -11,12 +10,14 @@ from typing import Any
 
 import numpy as np
 
+from rov_fmu.fmus.description import TIME_LIMIT
+from rov_fmu.fmus.instance import forget_message, keep_message, last_message
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
-from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, reason_of, silent
-from rov_fmu.prove.description import TIME_LIMIT
+from rov_fmu.io.messages import FileError, Progress, ProofError, brief, one_line, silent
 from rov_fmu.prove.experiments import Experiment
-from rov_fmu.prove.runs import Runs, forget_message, keep_message, last_message
+from rov_fmu.prove.runs import Runs
 from rov_fmu.prove.subject import Subject, opened
 
 INTERFACES = {"co-simulation": "coSimulation", "model-exchange": "modelExchange"}
@@ -99,9 +100,9 @@ def remedy(error: Exception) -> str:
     return "; --time-limit allows more" if isinstance(error, LimitError) and error.limit == "time" else ""
 
 
-def least_divisor(variable: Any) -> float:
-    """Return the least divisor of a deviation of one of FMPy's variables; without a nominal value, that of 1."""
-    return _SHARE_OF_NOMINAL * (abs(float(variable.nominal or 0.0)) or 1.0)
+def least_divisor(variable: Variable) -> float:
+    """Return the least divisor of a deviation of a variable; without a nominal value, that of 1."""
+    return _SHARE_OF_NOMINAL * (abs(variable.nominal) or 1.0)
 
 
 class _Experiments(Runs):
@@ -117,13 +118,11 @@ class _Experiments(Runs):
         try:
             result = self._result(experiment, interface, names)
         except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
-            # The cause follows the library's path.
-            what = reason_of(error).replace(self._folder + os.sep, "").rstrip(".")
-            return [_failed(experiment, brief(what + last_message(), 240))]
+            return [_failed(experiment, brief(self.without_folder(error) + last_message(), 240))]
         solved = _LEAST_OF_SOLVER if interface == "model-exchange" else 0.0
         findings = []
         for name, values in zip(names, expected, strict=True):
-            scale = max(float(np.abs(values).max()), least_divisor(self._variables[name]))
+            scale = max(float(np.abs(values).max()), least_divisor(self.variables[name]))
             off = _deviation(result["time"], result[name], times, values)
             findings.append(ProofFinding(experiment.name, name, off / scale, max(experiment.tolerance, solved)))
         return findings
@@ -135,7 +134,7 @@ class _Experiments(Runs):
         share = _TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0
         with redirect_stdout(io.StringIO()):  # FMPy's warnings
             return fmpy.simulate_fmu(
-                self._folder,
+                self.folder,
                 validate=False,
                 start_time=experiment.start,
                 stop_time=experiment.stop,
@@ -145,7 +144,7 @@ class _Experiments(Runs):
                 start_values=dict(experiment.parameters),
                 input=_signals(experiment.stimuli),
                 output=names,
-                model_description=self._description,
+                model_description=self.description,
                 remote_platform=None,
                 debug_logging=True,
                 logger=keep_message,

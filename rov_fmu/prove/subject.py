@@ -1,20 +1,21 @@
 """The FMU that is proved: what it has, and the simulation that the measurements repeat."""
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from math import inf
 from pathlib import Path
 from typing import Any
 
+from rov_fmu.fmus.description import TIME_LIMIT, budget, read_description
+from rov_fmu.fmus.unpacking import unpack_fmu
+from rov_fmu.fmus.variable import Variable, variables_of
 from rov_fmu.io.child_process import ChildProcess
 from rov_fmu.io.file_kinds import FMU, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.reading import open_file
-from rov_fmu.prove.description import TIME_LIMIT, budget, read_description
 from rov_fmu.prove.experiments import (
     DEFAULT_STEPS,
     DEFAULT_TOLERANCE,
@@ -23,8 +24,7 @@ from rov_fmu.prove.experiments import (
     NoResultsError,
     read_experiments,
 )
-from rov_fmu.prove.runs import NUMBERS, Plan, Runs
-from rov_fmu.prove.unpacking import unpack_fmu
+from rov_fmu.prove.runs import Plan, Runs
 
 _TOOL = "rov-fmu "
 """The beginning of the generation tool of our FMUs."""
@@ -47,23 +47,13 @@ class Subject:
     time_limit: float
 
     @cached_property
-    def variables(self) -> dict[str, Any]:
-        """FMPy's variables by name."""
-        return {v.name: v for v in self.description.modelVariables}
+    def variables(self) -> dict[str, Variable]:
+        """The variables that are one number or one text, by name."""
+        return variables_of(self.description)
 
-    def numbers(self, causality: str, types: Collection[str] = NUMBERS) -> list[str]:
-        """Return the names of the variables of a causality that are single numbers of some types."""
-        return [
-            name
-            for name, v in self.variables.items()
-            if v.causality == causality and v.type in types and not getattr(v, "dimensions", None)
-        ]
-
-    def bounds(self, name: str) -> tuple[float, float]:
-        """Return the least and the largest value of a variable, which may be those of its type."""
-        of = self.variables[name]
-        low, high = (getattr(of, key) or getattr(of.declaredType, key, None) for key in ("min", "max"))
-        return float(low or -inf), float(high or inf)
+    def numbers(self, causality: str) -> list[str]:
+        """Return the names of the variables of a causality that are numbers."""
+        return [name for name, v in self.variables.items() if v.causality == causality and v.kind != "String"]
 
     @property
     def is_ours(self) -> bool:

@@ -3,6 +3,7 @@
 from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import replace
 from math import inf, nan
 from pathlib import Path
@@ -11,13 +12,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from fmpy.model_description import ScalarVariable
 
+from rov_fmu.fmus.instance import RunError
 from rov_fmu.interface.prove_command import conservation
 from rov_fmu.io.csv_table import Series
 from rov_fmu.prove import measures
 from rov_fmu.prove.experiments import Experiment
 from rov_fmu.prove.proof import ProofFinding
-from rov_fmu.prove.runs import Answer, Plan, RunError
+from rov_fmu.prove.runs import Answer, Plan
 from rov_fmu.prove.subject import Subject
 
 _VARIABLES = {"X_ext": "input", "u": "output", "der(u)": "local", **dict.fromkeys(("a_d_u", "F_0_u"), "parameter")}
@@ -34,10 +37,9 @@ def subject(call: Callable[..., Any], *experiments: Experiment, **given: Any) ->
             yield SimpleNamespace(call=call)
 
     bounds = given.pop("bounds", {"a_d_u": {"min": "0.5"}, "F_0_u": {"max": "4"}})
-    other: dict[str, Any] = {"type": "Real", "start": "0", "nominal": "-2", "dimensions": [], "min": None, "max": None}
     variables = [
-        SimpleNamespace(name=name, causality=causality, **{**other, "declaredType": None, **bounds.get(name, {})})
-        for name, causality in _VARIABLES.items()
+        ScalarVariable(name, n, "Real", causality=causality, start="0", nominal="-2", **bounds.get(name, {}))
+        for n, (name, causality) in enumerate(_VARIABLES.items())
     ]
     times = {"startTime": "0", "stopTime": "4", "stepSize": "0.5", "tolerance": "1e-4"}
     description: dict[str, Any] = {
@@ -241,7 +243,7 @@ def test_energy_is_neither_lost_without_drag_nor_gained_with_it(
 
 
 def test_energy_is_not_measured_where_drag_cannot_be_switched_off() -> None:
-    fixed = [SimpleNamespace(**vars(one)) for one in subject(_unasked).description.modelVariables]
+    fixed = [copy(one) for one in subject(_unasked).description.modelVariables]
     fixed[-2].causality = "local"
     for given, reason in (
         ({"modelVariables": fixed}, "A_d_u cannot be set to 0."),

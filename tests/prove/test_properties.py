@@ -16,9 +16,9 @@ import pytest
 
 from rov_fmu.fmu.archive import META_DATA, archive
 from rov_fmu.fmu.meta_data import meta_data, own_hash
+from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.io.messages import FileError, ProofError
 from rov_fmu.prove.check import check_evidence
-from rov_fmu.prove.unpacking import unpack_fmu
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.often import often

@@ -10,9 +10,9 @@ import pytest
 
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.estimates import Estimates
-from rov_fmu.study.plan.model import Variable
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.vehicle.schema import Estimated

@@ -14,14 +14,15 @@ import pytest
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.fmus.variable import variables_of
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import WriteError
-from rov_fmu.study.plan.model import variable, vehicle_model
+from rov_fmu.study.plan.model import vehicle_model
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.prepared import Prepared, prepare
 from rov_fmu.study.results.store import Store
+from rov_fmu.study.run.child import simulation
 from rov_fmu.study.run.lanes import _Runs, simulated
-from rov_fmu.study.run.simulator import Simulator
 from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
@@ -74,7 +75,7 @@ def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: 
     rov, folder = KINDS[kind], str(request.getfixturevalue(f"{kind}_dir"))
     prepared = _prepared(rov)
     job, values = prepared.job, prepared.design.rows(0, RUNS)
-    fmu = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+    fmu = simulation(folder, job)
     outputs, ended = simulated(job, rov, values)
     assert ended.all()
     worst: dict[str, float] = {}
@@ -98,8 +99,7 @@ def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
 @pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
 def test_a_vehicle_has_the_variables_of_its_fmu(kind: str, request: pytest.FixtureRequest) -> None:
     folder = request.getfixturevalue(f"{kind}_dir")
-    description = fmpy.read_model_description(str(folder), validate=False)
-    own = {v.name: variable(v) for v in description.modelVariables}
+    own = variables_of(fmpy.read_model_description(str(folder), validate=False))
     computed = {name: replace(own[name], can_be_set=False) for name in QUATERNION if name in own}
     assert vehicle_model(KINDS[kind]).variables == own | computed
 

@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
-from rov_fmu.study.plan.model import Model, Variable, read_model
+from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import Prepared, prepare
 from tests.folders import beside
@@ -181,7 +182,7 @@ def test_variables_have_the_type_bounds_unit_and_start_of_the_description(
         "mode": 0.0,
         "fast": 0.0,
     }
-    assert (has["u"].minimum, has["u"].maximum, has["u"].unit, has["u"].is_continuous) == (-inf, inf, "1", True)
+    assert (has["u"].minimum, has["u"].maximum, has["u"].unit, has["u"].is_continuous) == (-inf, inf, "", True)
     assert [has["fast"].wrong(x) for x in (0.0, 1.0, 0.5)] == ["", "", "must be true or false, or 1 or 0"]
     assert [has["gain"].wrong(x) for x in (2.0, 0.5)] == ["", "must be a whole number"]
     assert (has["a"].wrong(10.0), has["a"].wrong(10.1)) == ("", "must be within -10 ... 10")
@@ -198,7 +199,7 @@ def test_angles_of_an_attitude_are_recorded_and_a_plan_is_the_same_whatever_does
     def prepared(lines: str, names: Sequence[str] = "ab") -> Prepared:
         plan.write_text(head + lines + tail)
         has = {name: replace(kind, name=name) for name in names}
-        return prepare(load_plan(plan), plan, Model("v.fmu", b"", 2, has))
+        return prepare(load_plan(plan), plan, Model("v.fmu", b"", has))
 
     with_attitude = prepared("runs = 9\n", [*"ab", "phi", "theta", "psi"]).job
     assert (with_attitude.angles, with_attitude.recorded) == (("phi", "theta"), ["b", "phi", "theta"])

@@ -5,7 +5,7 @@ import pytest
 from SALib.sample import sobol as salib
 from scipy import stats
 
-from rov_fmu.study.plan.model import Variable
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.sampling import Design
 

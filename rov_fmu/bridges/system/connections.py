@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import dropwhile
 from typing import NamedTuple
 
-from rov_fmu.bridges.system.part import Part, Value, kind_of
+from rov_fmu.bridges.system.part import Part
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import RovError, listed, only, shown
 
@@ -54,7 +55,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
         if sorted(causalities) != sorted(_CAUSALITIES):
             reason = f"an {causalities[0]} of {first} and an {causalities[1]} of {second}"
             raise MismatchError(f"member {member} is {reason}: one must be an output, and the other an input")
-        both = [parts[component].factors.get((port, member), 1.0) for component, port in ends]
+        both = [parts[component].factor(port, member) for component, port in ends]
         if causalities[0] == "input":
             pair, both = pair[::-1], both[::-1]
         found.append(checked(Connection(pair[0], pair[1], both[0] / both[1]), parts))
@@ -85,25 +86,19 @@ def checked(one: Connection, parts: Mapping[str, Part]) -> Connection:
         if variable.causality != wanted:
             place = "begins at an output, and ends at an input"
             raise MismatchError(f"{name} has causality {variable.causality}: a connection {place}")
-    kinds = [*map(kind_of, variables)]
+    kinds = [variable.kind for variable in variables]
     if kinds[0] != kinds[1]:
         raise MismatchError(f"{names[0]} is of type {kinds[0]}, and {names[1]} of type {kinds[1]}")
     if one.factor != 1.0 and kinds[0] != "Real":
         raise MismatchError(f"a factor needs type Real, and {names[0]} is of type {kinds[0]}")
-    units = [parts[component].unit(name) for component, name in (one.start, one.end)]
-    if one.factor == 1.0 and not _are_alike(*units):
+    units = [variable.unit for variable in variables]
+    bases = [parts[component].base(name) for component, name in (one.start, one.end)]
+    if one.factor == 1.0 and all(units) and units[0] != units[1] and (None in bases or bases[0] != bases[1]):
         raise MismatchError(
-            f"{names[0]} is in {units[0][0]}, and {names[1]} in {units[1][0]}: "
+            f"{names[0]} is in {units[0]}, and {names[1]} in {units[1]}: "
             "a third entry is the factor that turns one into the other"
         )
     return one
-
-
-def _are_alike(a: tuple[str, tuple[float, ...] | None], b: tuple[str, tuple[float, ...] | None]) -> bool:
-    """Return False if two units are known and differ."""
-    if not (a[0] and b[0]) or a[0] == b[0]:
-        return True
-    return a[1] is not None and a[1] == b[1]
 
 
 VELOCITIES = {"x": "vg_N", "y": "vg_E", "z": "vg_D"}

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from rov_fmu.bridges.system.master import Name
-from rov_fmu.prove.runs import Array
+from rov_fmu.fmus.instance import Array
 
 _TRUSTED = 0.05
 """The largest root mean square of what half the step changes, relative to a variable's range, for numbers that may be

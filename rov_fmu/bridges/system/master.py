@@ -1,53 +1,58 @@
-"""Step the FMUs of a system with FMPy: all pass on their outputs, then all take a step with what they got (Jacobi).
+"""Step the FMUs of a system together: all pass on their outputs, then all take a step with what they got (Jacobi).
 
 So an input gets the output that another FMU had at the beginning of the step. The error is of first order in the step,
 and the result does not depend on the order of the FMUs. Ecos and libcosim do the same.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
-from functools import partial
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from math import isnan
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
+
 from rov_fmu.bridges.system.connections import Connection
-from rov_fmu.bridges.system.part import Value
+from rov_fmu.fmus.instance import Array, Instance, RunError, Table, Unpacked, check, forget_message, last_message
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.groups import grouped
-from rov_fmu.io.messages import brief, reason_of
-from rov_fmu.prove.runs import (
-    RunError,
-    forget_message,
-    free_instance,
-    function_of,
-    last_message,
-    new_instance,
-    set_up,
-)
+from rov_fmu.io.messages import brief
 
 Name = tuple[str, str]
 """A component and a variable."""
-_Values = dict[Name, Any]
 _MOST_WARNINGS = 20
 """The most warnings of a run that are kept: an FMU may give another one at every step."""
+_BUSY = "busy"
+"""The file with the number of the component that is called, for the case that it does not return."""
+
+
+def folders_of(folder: str | Path, components: Iterable[str]) -> dict[str, Path]:
+    """Return the folder of each component, which has a number: a stranger's name could lead out of the folder."""
+    return {name: Path(folder, str(n)) for n, name in enumerate(components)}
+
+
+def busy(folder: str | Path, components: Iterable[str]) -> str:
+    """Return the component that a master in another process called last; the whole system if it called none."""
+    path = Path(folder, _BUSY)
+    number = int(np.fromfile(path, np.int32)[0]) if path.exists() else -1
+    return "the system" if number < 0 else [*components][number]
 
 
 class Master:
     """The instances of a system, which are stepped together."""
 
-    def __init__(self, folders: Mapping[str, str], connections: Sequence[Connection], read: Sequence[Name]) -> None:
-        """`folders` has the unpacked FMU of each component, and `read` names the variables that are returned."""
-        import fmpy
-
-        self._folders, self._sources, self._read = folders, {c.end: (c.start, c.factor) for c in connections}, read
-        self._descriptions = {
-            name: fmpy.read_model_description(folder, validate=False) for name, folder in folders.items()
-        }
-        self._variables = {
-            (name, v.name): v for name, description in self._descriptions.items() for v in description.modelVariables
-        }
+    def __init__(
+        self, folder: str, components: Sequence[str], connections: Sequence[Connection], read: Sequence[Name]
+    ) -> None:
+        """`folder` has the unpacked FMU of each component, and `read` names the variables that are returned."""
+        self._sources, self._read = {c.end: (c.start, c.factor) for c in connections}, read
+        self._parts = {name: Unpacked(str(path)) for name, path in folders_of(folder, components).items()}
+        self._numbers = {name: n for n, name in enumerate(components)}
+        self._busy = np.memmap(Path(folder, _BUSY), np.int32, "w+", shape=1)
+        self._busy[0] = -1
         self._wanted = {*read, *(c.start for c in connections)}
-        self._fmus: dict[str, Any] = {}
+        self._fmus: dict[str, Instance] = {}
         self._warnings: dict[str, float] = {}
 
     def warnings(self) -> list[str]:
@@ -60,7 +65,7 @@ class Master:
         step: float,
         stop: float,
         start: float = 0.0,
-        inputs: Mapping[Name, Sequence[Any]] = MappingProxyType({}),
+        inputs: Mapping[Name, Array] = MappingProxyType({}),
     ) -> list[float]:
         """Make and initialize the instances, and return the variables at the start. Raises RunError.
 
@@ -68,12 +73,15 @@ class Master:
         """
         self.end()
         self._start, self._step, self._done, self._warnings = start, step, 0, {}
-        for name in self._folders:
-            with self._reasons(name, "the initialization"):
-                self._initialize(name, values.get(name, {}), start, stop)
-        self._getters = self._calls("get", self._wanted)
-        self._setters = self._calls("set", self._sources)
-        self._inputs, self._given = inputs, self._calls("set", inputs)
+        for name, unpacked in self._parts.items():
+            with self._calling(name):
+                fmu = self._fmus[name] = Instance(unpacked, logging=True)
+                tables = fmu.tables(own := values.get(name, {}))
+                for table in tables:
+                    table.values[0] = [own[variable] for variable in table.names]
+                fmu.begin(start, stop, values=tables)
+        self._gets, self._sets, self._given = map(self._tables, (self._wanted, self._sources, inputs))
+        self._inputs = inputs
         self._now = self._outputs()
         return self._row()
 
@@ -81,17 +89,13 @@ class Master:
         """Take some steps, and return the variables after each one. Raises RunError."""
         rows = []
         for _ in range(count):
-            for name, names, put in self._given:
-                with self._reasons(name, "setting the inputs"):
-                    put([self._inputs[one][self._done] for one in names])
-            for name, ends, put in self._setters:
-                with self._reasons(name, "setting the inputs"):
-                    put([self._passed(end) for end in ends])
+            for name, ends, table in self._given:
+                self._set(name, table, [self._inputs[end][self._done] for end in ends])
+            for name, ends, table in self._sets:
+                self._set(name, table, [self._passed(end) for end in ends])
             for name, fmu in self._fmus.items():
-                with self._reasons(name, "the step"):
-                    returned = fmu.doStep(currentCommunicationPoint=self._time, communicationStepSize=self._step)
-                    if returned and returned[1]:
-                        raise RunError("the FMU ended the run")
+                with self._calling(name):
+                    fmu.step(self._time, self._step)
             self._done += 1
             self._now = self._outputs()
             rows.append(self._row())
@@ -100,40 +104,36 @@ class Master:
     def end(self) -> None:
         """End the instances."""
         for fmu in self._fmus.values():
-            with suppress(Exception):
-                fmu.terminate()
-            free_instance(fmu)
+            fmu.end()
         self._fmus = {}
 
-    def _initialize(self, name: str, values: Mapping[str, Value], start: float, stop: float) -> None:
-        fmu = self._fmus[name] = new_instance(self._folders[name], self._descriptions[name], logging=True)
-        begin_initialization = set_up(fmu, start, stop)
-        for _, names, put in self._calls("set", [(name, variable) for variable in values]):
-            put([values[variable] for _, variable in names])
-        begin_initialization()
-        fmu.exitInitializationMode()
+    def _tables(self, names: Iterable[Name]) -> list[tuple[str, list[Name], Table]]:
+        """Return a table for the variables of each type of a component, with their names."""
+        return [
+            (component, [(component, name) for name in table.names], table)
+            for component, own in grouped(names).items()
+            for table in self._fmus[component].tables(own)
+        ]
 
-    def _calls(self, verb: str, names: Iterable[Name]) -> list[tuple[str, list[Name], Callable[..., Any]]]:
-        """Return functions that get or set all variables of a type of a component, with what they get or set."""
-        found: list[tuple[str, list[Name], Callable[..., Any]]] = []
-        for (component, kind), some in grouped(((name[0], self._variables[name].type), name) for name in names).items():
-            references = [self._variables[name].valueReference for name in some]
-            found.append((component, some, partial(function_of(self._fmus[component], verb, kind), references)))
-        return found
+    def _set(self, name: str, table: Table, values: Sequence[Any]) -> None:
+        with self._calling(name):
+            table.values[0] = values
+            check(table.set(0), "setting the inputs", self._time)
 
     def _passed(self, end: Name) -> Any:
-        """Return what an input gets."""
+        """Return the value that an input gets from the output that is connected to it, in the unit of the input."""
         start, factor = self._sources[end]
         return self._now[start] if factor == 1.0 else factor * self._now[start]
 
-    def _outputs(self) -> _Values:
-        now: _Values = {}
-        for name, names, get in self._getters:
-            with self._reasons(name, "reading the outputs"):
-                for key, value in zip(names, get(), strict=True):
+    def _outputs(self) -> dict[Name, Any]:
+        now: dict[Name, Any] = {}
+        for component, names, table in self._gets:
+            with self._calling(component):
+                check(table.get(0), "reading the outputs", self._time)
+                for name, value in zip(names, table.values[0].tolist(), strict=True):
                     if isinstance(value, float) and isnan(value):
-                        raise RunError(f"{key[1]} is no number (NaN)")
-                    now[key] = value
+                        raise RunError(f"reading the outputs at {self._time:.6g} s: {name[1]} is no number (NaN)")
+                    now[name] = value
         return now
 
     def _row(self) -> list[float]:
@@ -144,16 +144,18 @@ class Master:
         return self._start + self._done * self._step
 
     @contextmanager
-    def _reasons(self, name: str, what: str) -> Iterator[None]:
-        """Raise RunError, with the component, what it did and its own reason, in place of what FMPy raises.
+    def _calling(self, name: str) -> Iterator[None]:
+        """Raise RunError, with the component and its own reason, in place of what its call raises.
 
         Keep what the component warned of if it did not fail.
         """
+        self._busy[0] = self._numbers[name]
         forget_message()
         try:
             yield
         except Exception as error:  # FMPy raises that itself
-            reason = brief(reason_of(error).replace(self._folders[name], "").rstrip("."), 240)
-            raise RunError(f"{name}: {what} at {self._time:.6g} s: {reason}{brief(last_message(), 240)}") from error
+            reason = brief(self._parts[name].without_folder(error), 240)
+            told = "" if (message := last_message()) in reason else brief(message, 240)
+            raise RunError(f"{name}: {reason}{told}") from error
         if (text := last_message(f"{name}: ")) and len(self._warnings) < _MOST_WARNINGS:
             self._warnings.setdefault(brief(text, 240), self._time)

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
-from io import BytesIO
 from pathlib import Path
 from time import perf_counter
 from typing import NamedTuple
@@ -11,17 +10,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from rov_fmu.bridges.system.half_step import HalfStep
-from rov_fmu.bridges.system.master import Master, Name
-from rov_fmu.bridges.system.part import kind_of
+from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
 from rov_fmu.bridges.system.ssp import Structure
 from rov_fmu.equation.units import in_degrees
+from rov_fmu.fmus.description import TIME_LIMIT, budget
+from rov_fmu.fmus.instance import Array, RunError
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, Progress, silent
-from rov_fmu.prove.description import TIME_LIMIT, budget
-from rov_fmu.prove.runs import Array, RunError
-from rov_fmu.prove.unpacking import unpack_fmu
 from rov_fmu.report.plots.svg import name_axes, svg_file
 
 _CALL = 0.5
@@ -46,7 +43,7 @@ def recorded(structure: Structure) -> list[Name]:
         (component, name)
         for component, part in structure.parts.items()
         for name in part.names("output")
-        if kind_of(part.variables[name]) != "String"
+        if part.variables[name].kind != "String"
     ]
 
 
@@ -54,14 +51,6 @@ def passed(structure: Structure) -> list[Name]:
     """Return the outputs that are connected and are numbers."""
     starts = {one.start for one in structure.connections}
     return [name for name in recorded(structure) if name in starts]
-
-
-def unpack_parts(structure: Structure, folder: str) -> dict[str, str]:
-    """Unpack the FMU of each component into a folder of its own, and return these folders."""
-    folders = {name: str(Path(folder, name)) for name in structure.parts}
-    for name, part in structure.parts.items():
-        unpack_fmu(BytesIO(part.content), Path(name), Path(folders[name]))
-    return folders
 
 
 def run_system(
@@ -84,8 +73,10 @@ def run_system(
     rows = list[Array]()
     with temporary_folder("system-") as folder, ExitStack() as stack:
         try:
-            folders = unpack_parts(structure, folder)
-            child = ChildProcess(Master, folders, structure.connections, read, limits=budget(TIME_LIMIT))
+            for name, own in folders_of(folder, structure.parts).items():
+                structure.parts[name].unpack(own)
+            system = folder, [*structure.parts], structure.connections, read
+            child = ChildProcess(Master, *system, limits=budget(TIME_LIMIT))
             stack.enter_context(closing(child))
             rows.append(np.array([child.call("begin", structure.values, step / parts, step * steps)]))
             done, count = 0, 1
@@ -98,7 +89,8 @@ def run_system(
             warnings = child.call("warnings")
             child.call("end")
         except (ChildError, RunError) as error:
-            raise FileError(f"{path}: the system cannot be run: {error}") from error
+            who = f"{busy(folder, structure.parts)} " if isinstance(error, ChildError) else ""
+            raise FileError(f"{path}: the system cannot be run: {who}{error}") from error
     return Run(np.concatenate(rows), warnings)
 
 
@@ -115,7 +107,7 @@ def picture(structure: Structure, read: Sequence[Name], names: Sequence[str], st
     columns = {".".join(name): n for n, name in enumerate(read)}
     passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns
     chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
-    units = {name: structure.parts[read[columns[name]][0]].unit(read[columns[name]][1])[0] for name in chosen}
+    units = {name: structure.parts[read[columns[name]][0]].variables[read[columns[name]][1]].unit for name in chosen}
     panels = grouped((unit, name) for name, unit in units.items())
 
     def draw(figure: Figure) -> None:

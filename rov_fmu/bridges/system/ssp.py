@@ -11,15 +11,16 @@ from typing import Any
 from lxml import etree
 
 from rov_fmu.bridges.system.connections import Connection, checked
-from rov_fmu.bridges.system.part import Part, Value, read_part
+from rov_fmu.bridges.system.part import Part
 from rov_fmu.fmu.archive import archive
+from rov_fmu.fmus.unpacking import unpack_fmu
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.file_kinds import SYSTEM, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, brief, shown
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
 from rov_fmu.io.templates import render
-from rov_fmu.prove.unpacking import unpack_fmu
 
 PARAMETER_SET = "initial_values"
 """The name of every component's parameter set. Ecos uses the sets of one name."""
@@ -149,7 +150,7 @@ def _structure(folder: Path, path: Path) -> Structure:
             raise ValueError(f"{_STRUCTURE}: {shown(name)} is no component: systems in systems are not read")
         source = sources[name] = element.get("source", "")
         if source not in read:
-            read[source] = read_part(path, _file(folder, source).read_bytes(), f": {name}")
+            read[source] = Part.open(Path(f"{path}: {name}"), _file(folder, source).read_bytes())
         part = parts[name] = read[source]
         values[name] = {}
         for binding in element.iterfind("{*}ParameterBindings/{*}ParameterBinding"):

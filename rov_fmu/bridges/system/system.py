@@ -24,7 +24,7 @@ from rov_fmu.bridges.system.connections import (
     halves,
     loop,
 )
-from rov_fmu.bridges.system.part import Part, Value, kind_of, read_part
+from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
 from rov_fmu.bridges.system.ssp import Component, Structure, System
 from rov_fmu.build import build_fmu
@@ -32,6 +32,7 @@ from rov_fmu.c.compile import compiler_identity, host_platform
 from rov_fmu.equation.catalogue import before_name
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, InputError, lines_on, listed, only
 from rov_fmu.io.output import kept
@@ -147,9 +148,9 @@ def _part(table: ComponentTable, path: Path, **shape: Any) -> Part:
     """Make a companion of a shape, or read an FMU. Raises FileError."""
     if table.fmu:
         file = inside(path.parent, table.fmu)
-        return read_part(file, read_bytes(file))
+        return Part.open(file)
     assert table.companion
-    return read_part(Path(table.companion), companion(table.companion, **shape), is_ours=True)
+    return Part.open(Path(table.companion), companion(table.companion, **shape), is_ours=True)
 
 
 def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
@@ -221,7 +222,7 @@ def _autopilot(name: str, plan: SystemPlan, path: Path) -> Part:
         made = autopilot_of(_vehicle(held, table, path), plan.step)
     except InputError as error:
         raise SystemPlanError(f"{path}: {key_line(f'component.{name}.for', str(error), held)}") from error
-    return read_part(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
+    return Part.open(Path(AUTOPILOT), autopilot_fmu(made, ["host"]), is_ours=True)
 
 
 def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
@@ -238,7 +239,7 @@ def _vehicle(name: str, table: ComponentTable, path: Path) -> Vehicle:
 def _description(vehicle: Vehicle) -> Part:
     """Return what the FMU of a vehicle will have, before the compilation takes its time. It cannot run yet."""
     content = archive(native_content(vehicle, interface="cs").files)
-    return read_part(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
+    return Part.open(Path(f"{vehicle.identifier}.fmu"), content, is_ours=True)
 
 
 def _built(vehicle: Vehicle) -> bytes:
@@ -304,7 +305,7 @@ def _connect(
         connections += found
     for component, name in plan.plotted:
         has = parts[component].variables if component in parts else {}
-        if name not in has or kind_of(has[name]) == "String":
+        if name not in has or has[name].kind == "String":
             yield key_line("plot", "must name variables that are numbers, as component.variable", f"{component}.{name}")
 
 
@@ -410,7 +411,7 @@ def files_of(plan: SystemPlan, structure: Structure, name: str) -> System:
     for component, part in structure.parts.items():
         inputs = [one.end[1] for one in structure.connections if one.end[0] == component]
         outputs = part.names("output")
-        types = {name: kind_of(part.variables[name]) for name in (*inputs, *outputs)}
+        types = {name: part.variables[name].kind for name in (*inputs, *outputs)}
         values = structure.values[component]
         components[component] = Component(f"{component}.fmu", part.content, values, inputs, outputs, types)
     return System(plan.title or name, components, plan.step, plan.stop_time, structure.connections)

@@ -16,10 +16,10 @@ from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system
 from rov_fmu.bridges.system.run import passed, picture, recorded, run_system, table
 from rov_fmu.bridges.system.ssp import Structure, is_unchanged, ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
+from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM
 from rov_fmu.io.messages import FileError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
-from rov_fmu.prove.runs import Array
 from rov_fmu.report import console
 from rov_fmu.report.progress import Parts, parts
 from rov_fmu.vehicle.shipped import find_vehicle, named_in
@@ -78,7 +78,7 @@ def _half_step(
     except FileError as error:
         shown.print(f"warning: with half the step: {error}")
         return None, None
-    units = [structure.parts[component].unit(name)[0] for component, name in names]
+    units = [structure.parts[component].variables[name].unit for component, name in names]
     half = half_step(np.array([found[name] for name in names]).T, halved.rows, units)
     order = np.argsort(-half.typical, kind="stable")[:_MOST_SHOWN]
     shown.print(half.words(names))

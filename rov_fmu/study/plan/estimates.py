@@ -6,9 +6,10 @@ from math import isclose
 
 import numpy as np
 
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import first_of, listed
 from rov_fmu.io.toml_file import key_line
-from rov_fmu.study.plan.model import Variable, unsettable
+from rov_fmu.study.plan.model import unsettable
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.vehicle.uncertainty import NOTHING, Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle

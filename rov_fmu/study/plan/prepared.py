@@ -8,6 +8,7 @@ from uuid import uuid4
 
 import numpy as np
 
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.csv_table import read_series
 from rov_fmu.io.messages import FileError, lines_on, shown
 from rov_fmu.io.toml_file import key_line
@@ -15,7 +16,7 @@ from rov_fmu.study.plan.estimates import Estimates, some_of
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
 from rov_fmu.study.plan.figures import Array, meaning, read_expression, unusable
-from rov_fmu.study.plan.model import Model, Variable, unknown, unsettable
+from rov_fmu.study.plan.model import Model, unknown, unsettable
 from rov_fmu.study.plan.plan import (
     REASON,
     RUN,

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
-from rov_fmu.study.plan.model import Variable
+from rov_fmu.fmus.variable import Variable
 from rov_fmu.study.plan.plan import Plan, Varied
 from rov_fmu.vehicle.uncertainty import NOTHING, Array, Uncertainty
 

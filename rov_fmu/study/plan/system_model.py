@@ -7,12 +7,13 @@ from io import BytesIO
 from pathlib import Path
 
 from rov_fmu.bridges.system.connections import Connection
-from rov_fmu.bridges.system.master import Name
-from rov_fmu.bridges.system.part import Part, Value, kind_of
+from rov_fmu.bridges.system.master import Name, busy, folders_of
+from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.ssp import read_ssp
+from rov_fmu.fmus.unpacking import unpack_fmu
+from rov_fmu.fmus.variable import Value, Variable
 from rov_fmu.io.reading import read_bytes
-from rov_fmu.prove.unpacking import unpack_fmu
-from rov_fmu.study.plan.model import Model, Variable, variable
+from rov_fmu.study.plan.model import Model
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,8 +29,12 @@ class SystemModel(Model):
     def unpack(self, folder: Path) -> None:
         """Unpack the FMU of each component into a folder of its own. Raises FileError."""
         with zipfile.ZipFile(BytesIO(self.content)) as archive:  # read_ssp has checked it
-            for name, source in self.sources.items():
-                unpack_fmu(BytesIO(archive.read(source)), Path(f"{self.name}: {name}"), folder / name)
+            for name, own in folders_of(folder, self.sources).items():
+                unpack_fmu(BytesIO(archive.read(self.sources[name])), Path(f"{self.name}: {name}"), own)
+
+    def running(self, folder: str) -> str:
+        """Return the component that a process ran which did not return."""
+        return busy(folder, self.sources)
 
 
 def split(name: str) -> Name:
@@ -48,13 +53,11 @@ def read_system(path: Path) -> SystemModel:
         )
         for component, part in system.parts.items()
         for name in part.variables
-        if kind_of(part.variables[name]) != "String"
+        if part.variables[name].kind != "String"
     }
-    # The types of variables are those of SSP, which FMI 2.0 has, too.
     return SystemModel(
         name=path.name,
         content=read_bytes(path),
-        version=2,
         variables=variables,
         sources=system.sources,
         values=system.values,
@@ -64,12 +67,10 @@ def read_system(path: Path) -> SystemModel:
 
 def _variable(component: str, part: Part, name: str, values: Mapping[str, Value], connected: bool) -> Variable:
     """Return a variable of a component with its start value in the system. One that is connected cannot be set."""
-    v = part.variables[name]
-    own = variable(v)
+    own = part.variables[name]
     return replace(
         own,
         name=f"{component}.{name}",
-        type=kind_of(v),
         start=float(values.get(name, own.start)),
         can_be_set=own.can_be_set and not connected,
         causality="connected" if connected else own.causality,

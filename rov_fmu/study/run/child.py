@@ -4,16 +4,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import fmpy
 import numpy as np
 
+from rov_fmu.fmus.description import budget
+from rov_fmu.fmus.instance import Array, LoadError, RunError
+from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
-from rov_fmu.prove.description import budget
-from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.plan.system_model import SystemModel
-from rov_fmu.study.run.run import Evaluation, LoadError, Run, failed_run
-from rov_fmu.study.run.simulator import Simulator
+from rov_fmu.study.run.run import Evaluation, Run, failed_run
 from rov_fmu.study.run.system_simulator import SystemSimulator
 
 _MANY = 10.0
@@ -36,7 +35,7 @@ class Child:
         except ChildError as error:
             if len(rows) > 1:
                 return [run for n in range(len(rows)) for run in self.runs(rows[n : n + 1])]
-            return [failed_run(self._job, f"the FMU {_predicate(error, limit)}")]
+            return [failed_run(self._job, self._words(error, limit))]
         return found
 
     def close(self) -> None:
@@ -66,18 +65,25 @@ class Child:
                 beside = str(Path(self._folder).parent)
                 self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits, temporary=beside)
             except ChildError as error:
-                raise LoadError(f"the FMU {_predicate(error, time)}") from error
+                raise LoadError(self._words(error, time)) from error
         try:
             return self._process.call(method, *arguments, limits=limits)
         except ChildError:
             self._process = None
             raise
 
+    def _words(self, error: ChildError, limit: float) -> str:
+        """Return what an FMU did."""
+        exceeds_time = isinstance(error, LimitError) and error.limit == "time"
+        did = f"did not return within time_limit = {limit:g} s" if exceeds_time else error
+        return f"{self._job.model.running(self._folder)} {did}"
 
-def _predicate(error: ChildError, limit: float) -> str:
-    """Return what the FMU did."""
-    exceeds_time = isinstance(error, LimitError) and error.limit == "time"
-    return f"did not return within time_limit = {limit:g} s" if exceeds_time else str(error)
+
+def simulation(folder: str, job: Job) -> Simulation:
+    """Return the runs of an unpacked FMU. Raises LoadError."""
+    plan = job.plan
+    given = (plan.set, job.inputs, job.recorded, job.varied, plan.tolerance)
+    return Simulation(folder, plan.times, plan.step, *given)
 
 
 class _Runner:
@@ -85,11 +91,11 @@ class _Runner:
 
     def __init__(self, folder: str, job: Job) -> None:
         self._job = job
-        self._simulator: Simulator | SystemSimulator
+        self._simulator: Simulation | SystemSimulator
         if isinstance(job.model, SystemModel):
             self._simulator = SystemSimulator(folder, job, job.model)
         else:
-            self._simulator = Simulator(folder, fmpy.read_model_description(folder, validate=False), job)
+            self._simulator = simulation(folder, job)
         self._evaluation = Evaluation(job)
 
     def can_be_reset(self, values: Array, others: Array) -> bool:

@@ -54,6 +54,6 @@ def _trajectories(job: Job, found: Sequence[Run]) -> pa.StructArray:
     ended = np.array([run.status != FAILED for run in found], bool)
     lists = {TIME: np.tile(times, ended.sum())}
     for index, name in enumerate(job.plan.kept):
-        none = np.empty(0, job.model.variables[name].dtype(job.model.version))
+        none = np.empty(0, job.model.variables[name].dtype)
         lists[name] = np.concatenate([none, *(run.kept[index] for run in found if run.status != FAILED)])
     return nested(ended, lists)

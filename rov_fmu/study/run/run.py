@@ -7,16 +7,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.io.messages import RovError
 from rov_fmu.study.plan.figures import Figures
 from rov_fmu.study.plan.prepared import Job
 
 DONE, INCOMPLETE, FAILED = "done", "incomplete", "failed"
 """The statuses of a run: complete; it ended, but a figure cannot be computed; it did not end."""
-
-
-class LoadError(RovError):
-    """The FMU cannot be instantiated on this machine."""
 
 
 @dataclass(frozen=True)

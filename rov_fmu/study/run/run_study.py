@@ -7,6 +7,7 @@ from multiprocessing import current_process
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
+from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, load_plan
@@ -14,7 +15,6 @@ from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
 from rov_fmu.study.plan.system_model import SystemModel, read_system
 from rov_fmu.study.results.store import RUNS, Part, Store, identity
 from rov_fmu.study.run.lanes import do_in_lanes
-from rov_fmu.study.run.run import LoadError
 from rov_fmu.study.run.system_simulator import half_step_words
 from rov_fmu.study.run.work import Progress, Spent, Work
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -139,7 +139,7 @@ def _description(plan: Plan, prepared: Prepared, model: Model, engine: Engine) -
         "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
         "model": model.name,
         "title": plan.title,
-        "units": {variable.name: variable.unit for variable in named},
+        "units": {variable.name: variable.unit or "1" for variable in named},
         "descriptions": {variable.name: variable.description for variable in named},
         "groups": design.groups,
         "warnings": prepared.warnings,

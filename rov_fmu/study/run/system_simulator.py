@@ -11,11 +11,10 @@ import numpy.typing as npt
 
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.master import Master
-from rov_fmu.bridges.system.part import Value
+from rov_fmu.fmus.description import budget
+from rov_fmu.fmus.instance import Array, RunError
 from rov_fmu.io.child_process import ChildError, ChildProcess, Functions
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.prove.description import budget
-from rov_fmu.prove.runs import Array, RunError
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.plan.system_model import SystemModel, split
 
@@ -26,12 +25,8 @@ class SystemSimulator:
     def __init__(self, folder: str, job: Job, model: SystemModel, parts: int = 1) -> None:
         """Each step of the job is made of some `parts`, between which the FMUs exchange values, too."""
         self._job, self._model, self._parts = job, model, parts
-        folders = {name: f"{folder}/{name}" for name in model.sources}
-        self._master = Master(folders, model.connections, [split(name) for name in job.recorded])
-        self._inputs = {
-            split(name): [self._value(name, x) for x in values for _ in range(parts)]
-            for name, values in job.inputs.items()
-        }
+        self._master = Master(folder, [*model.sources], model.connections, [split(name) for name in job.recorded])
+        self._inputs = {split(name): np.repeat(values, parts) for name, values in job.inputs.items()}
 
     def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
         """Run once and return every recorded variable at every communication point. Raises RunError.
@@ -42,25 +37,18 @@ class SystemSimulator:
         start = {component: dict(own) for component, own in self._model.values.items()}
         for name, value in {**plan.set, **dict(zip(self._job.varied, values, strict=True))}.items():
             component, own = split(name)
-            start[component][own] = self._value(name, value)
+            start[component][own] = value
         rows = [self._master.begin(start, plan.step / self._parts, plan.stop_time, plan.start_time, self._inputs)]
         rows += self._master.step(plan.steps * self._parts)[self._parts - 1 :: self._parts]
         columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
         has = self._model.variables
-        return {
-            name: column.astype(has[name].dtype(2)) for name, column in zip(self._job.recorded, columns, strict=True)
-        }
+        return {name: column.astype(has[name].dtype) for name, column in zip(self._job.recorded, columns, strict=True)}
 
     def renew(self) -> None:
         """End the instances."""
         self._master.end()
 
     reset = renew
-
-    def _value(self, name: str, value: float) -> Value:
-        """Return a value as the type of a variable has it."""
-        kind = self._model.variables[name].type
-        return bool(value) if kind == "Boolean" else int(value) if kind == "Integer" else float(value)
 
 
 def half_step_words(job: Job, model: SystemModel) -> str:
@@ -75,7 +63,8 @@ def half_step_words(job: Job, model: SystemModel) -> str:
             with closing(ChildProcess(Functions, limits=limits)) as child:
                 rows = [child.call("call", _rows, folder, alike, model, parts) for parts in (1, 2)]
         except (ChildError, RunError) as error:
-            return f"half the step was tried in one run, which cannot be done: {error}"
+            who = f"{model.running(folder)} " if isinstance(error, ChildError) else ""
+            return f"half the step was tried in one run, which cannot be done: {who}{error}"
     half = half_step(rows[0], rows[1], [model.variables[name].unit for name in names])
     return f"in one run, {half.words([*map(split, names)])}"
 

@@ -1,5 +1,7 @@
-"""An FMU for tests that fails, warns or returns NaN from 0.5 s on, as its parameter says."""
+"""An FMU for tests that fails, warns, returns NaN, hangs or ends its process from 0.5 s on, as its parameter says."""
 
+import os
+import time
 from math import nan
 
 from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
@@ -24,4 +26,8 @@ class Strange(Fmi2Slave):  # type: ignore[misc]
                 self.y = nan
             if self.kind == 4.0:
                 self.log("the rope is thin", Fmi2Status.warning)
+            while self.kind == 5.0:
+                time.sleep(0.1)
+            if self.kind == 6.0:
+                os.abort()
         return True

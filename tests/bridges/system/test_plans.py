@@ -9,13 +9,15 @@ import pytest
 from fmpy.ssp.ssd import read_ssd
 
 from rov_fmu.bridges.system import companion as companions
-from rov_fmu.bridges.system import ssp, system
+from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.connections import MismatchError, connected, loop
-from rov_fmu.bridges.system.part import Part, read_part
+from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.plan import SystemPlanError, load_system_plan
 from rov_fmu.bridges.system.ssp import is_unchanged, read_ssp
 from rov_fmu.cli import main
 from rov_fmu.fmu.terminals import port_of
+from rov_fmu.fmus import fmu
+from rov_fmu.fmus.description import described as described_here
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, read_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
@@ -60,18 +62,13 @@ def _companion(name: str, **shape: Any) -> bytes:
     return _of_shape(name, json.dumps(shape))
 
 
-def _read_here(path: Path, content: bytes, where: str = "", **_: bool) -> Part:
-    return read_part(path, content, where, is_ours=True)
-
-
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The current folder, with FMUs, where vehicles are described and not compiled."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(system, "build_fmu", undescribed_build)
     # It takes most of the time to start a process that reads an FMU of others: tests of `prove` do.
-    monkeypatch.setattr(system, "read_part", _read_here)
-    monkeypatch.setattr(ssp, "read_part", _read_here)
+    monkeypatch.setattr(fmu, "read_description", lambda _, folder: described_here(str(folder)))
     monkeypatch.setattr(system, "companion", _companion)
     for name, content in {
         "foreign": foreign(),
@@ -370,7 +367,7 @@ def with_point() -> Vehicle:
 
 
 def parts(**content: bytes) -> dict[str, Part]:
-    return {name: read_part(Path(name), one, is_ours=True) for name, one in content.items()}
+    return {name: Part.open(Path(name), one, is_ours=True) for name, one in content.items()}
 
 
 @pytest.mark.usefixtures("folder")
@@ -412,8 +409,8 @@ def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
         found = connected("rov.point_bow", f"tether.{end}", 1.0, has)
         assert len(found) == len(port_of(vehicle.layout.points[0]).members) == 9
         assert {one.start[0] for one in found if one.end[0] == "rov"} == {"tether"}
-        assert {has["tether"].unit(one.end[1])[0] for one in found if one.end[0] == "tether"} == {"m", "m/s"}
-        assert {has["tether"].unit(one.start[1])[0] for one in found if one.start[0] == "tether"} == {"N"}
+        assert {has["tether"].variables[one.end[1]].unit for one in found if one.end[0] == "tether"} == {"m", "m/s"}
+        assert {has["tether"].variables[one.start[1]].unit for one in found if one.start[0] == "tether"} == {"N"}
     with pytest.raises(MismatchError, match=r"F_N is an input of rov.point_bow and an input of rov.point_bow"):
         connected("rov.point_bow", "rov.point_bow", 1.0, has)
 
@@ -422,7 +419,7 @@ def test_ports_of_two_vehicles_and_of_companions_are_of_one_kind() -> None:
 def test_companions_have_units_and_the_same_bytes(name: str) -> None:
     content = companions.companion(name)
     assert companions.companion(name) == content
-    part = read_part(Path(name), content, is_ours=True)
+    part = Part.open(Path(name), content, is_ours=True)
     slave = companions.slave_of(name)(instance_name=name)
     assert part.variables.keys() == slave.variables.keys()
     for variable, (causality, start, unit, text) in slave.variables.items():

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
+from rov_fmu.fmus.description import described, read_description
 from rov_fmu.io.messages import FileError
-from rov_fmu.prove.description import described, read_description
 
 _VARIABLES = """<ModelVariables>
   <ScalarVariable name="p" valueReference="1" causality="parameter" variability="fixed">

@@ -13,9 +13,9 @@ from typing import Any
 import pytest
 
 from rov_fmu.cli import main
+from rov_fmu.fmus.unpacking import refusal, unpack_fmu
 from rov_fmu.io.messages import FileError, shown
 from rov_fmu.io.reading import open_file
-from rov_fmu.prove.unpacking import refusal, unpack_fmu
 
 _LINK = (stat.S_IFLNK | 0o777) << 16
 _STUDY = 'fmu = "bad.fmu"\nstop_time = 1.0\nstep = 0.1\nsampler = "grid"\n[figures]\nend = "u[-1]"\n'

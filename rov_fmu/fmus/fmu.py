@@ -1,0 +1,115 @@
+"""An FMU for Co-Simulation that may come from anyone: what it has, and runs of it in a process with limits."""
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cached_property
+from io import BytesIO
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from lxml import etree
+
+from rov_fmu.fmu.terminals import FOLDER
+from rov_fmu.fmus.description import TIME_LIMIT, budget, described, read_description
+from rov_fmu.fmus.instance import Array, LoadError, RunError
+from rov_fmu.fmus.simulation import Simulation
+from rov_fmu.fmus.unpacking import opened_archive, unpack_fmu
+from rov_fmu.fmus.variable import Variable, variables_of
+from rov_fmu.io.child_process import ChildError, ChildProcess
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.messages import FileError, brief
+from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
+
+_TERMINALS = f"{FOLDER}/terminalsAndIcons.xml"
+_MOST_BYTES = 4_000_000
+"""The largest file of terminals that is read."""
+
+
+@dataclass(frozen=True)
+class Fmu:
+    """An FMU for Co-Simulation of FMI 2.0 or 3.0."""
+
+    path: Path
+    """Where it is from, for messages."""
+    content: bytes
+    description: Any
+    """FMPy's."""
+
+    @classmethod
+    def open(cls, path: Path, content: bytes | None = None, *, is_ours: bool = False) -> Self:
+        """Read an FMU: the file at a path, or its content, of which messages say the path. Raises FileError.
+
+        `is_ours` is True for one that this process has just made, so that it needs no child process to read it.
+        """
+        content = read_bytes(path) if content is None else content
+        with temporary_folder("fmu-") as folder:
+            unpack_fmu(BytesIO(content), path, Path(folder))
+            description = described(folder) if is_ours else read_description(path, Path(folder))
+        if description.fmiVersion[:1] not in ("2", "3"):
+            raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")
+        if description.coSimulation is None:
+            raise FileError(f"{path}: is not for Co-Simulation")
+        return cls(path, content, description)
+
+    @cached_property
+    def variables(self) -> dict[str, Variable]:
+        """The variables that are one number or one text, by name."""
+        return variables_of(self.description)
+
+    @cached_property
+    def terminals(self) -> Mapping[str, Mapping[str, str]]:
+        """The variables by the names of the members, for each terminal. Raises FileError."""
+        where = f"{self.path}: {_TERMINALS}"
+        with opened_archive(BytesIO(self.content), self.path) as zipped:
+            if _TERMINALS not in zipped.namelist():
+                return {}
+            if (size := zipped.getinfo(_TERMINALS).file_size) > _MOST_BYTES:
+                raise FileError(f"{where} {too_large(size, _MOST_BYTES)}")
+            content = zipped.read(_TERMINALS)
+        try:
+            root = root_of_xml(content)
+        except etree.XMLSyntaxError as error:
+            raise FileError(f"{where}: not XML: {brief(error.msg)}") from error
+        return {
+            terminal.get("name", ""): {
+                member.get("memberName", ""): member.get("variableName", "")
+                for member in terminal.findall("TerminalMemberVariable")
+            }
+            for terminal in root.findall("Terminals/Terminal")
+        }
+
+    def unpack(self, folder: Path) -> None:
+        """Unpack the FMU into a folder. Raises FileError."""
+        unpack_fmu(BytesIO(self.content), self.path, folder)
+
+    def run(
+        self,
+        times: Array,
+        inputs: Mapping[str, Array | float],
+        record: Sequence[str],
+        start: Mapping[str, float] = {},
+        time_limit: float = TIME_LIMIT,
+    ) -> dict[str, Array]:
+        """Run the FMU once in a process of its own, and return what is recorded, by variable.
+
+        - `times`: the communication points, s, at equal distances.
+        - `inputs`: the value of each input, or its values at each time but the last one, which are held from there on.
+        - `record`, `start`: the variables that are read at each time, and the start values.
+
+        Raises FileError, and RunError with the reason, also if the FMU ends its process or exceeds a limit.
+        """
+        steps = len(times) - 1
+        held = {name: np.broadcast_to(np.asarray(values, np.float64), steps) for name, values in inputs.items()}
+        with temporary_folder("fmu-") as folder:
+            self.unpack(Path(folder))
+            run = (times, (times[-1] - times[0]) / steps, start, held, record)
+            try:
+                with closing(ChildProcess(Simulation, folder, *run, limits=budget(time_limit))) as child:
+                    found: dict[str, Array] = child.call("run", ())
+            except ChildError as error:
+                raise RunError(f"it {error}") from error
+            except LoadError as error:
+                raise RunError(str(error)) from error
+        return found

@@ -1,0 +1,113 @@
+"""Runs of an unpacked FMU in one instance, where it can be reset."""
+
+from collections import defaultdict
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.fmus.instance import WARNING, Array, CallError, Instance, RunError, Unpacked, check, last_message
+from rov_fmu.io.messages import brief
+
+
+class Simulation:
+    """An FMU that runs again and again, in a process of its own. Raises LoadError."""
+
+    def __init__(
+        self,
+        folder: str,
+        times: Array,
+        step: float,
+        start: Mapping[str, float],
+        inputs: Mapping[str, Array],
+        record: Sequence[str],
+        varied: Sequence[str] = (),
+        tolerance: float | None = None,
+    ) -> None:
+        """The inputs have a value for each step, and what is recorded is read at each of the times.
+
+        `varied` names the variables that get other start values in each run.
+        """
+        self._unpacked, self._times, self._step, self._tolerance = Unpacked(folder), times.tolist(), step, tolerance
+        self._start_values, self._signals, self._record, self._varied = start, inputs, record, varied
+        self._begin_instance()
+
+    def run(self, values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
+        """Run once and return every recorded variable at every communication point.
+
+        `values` are those of the varied variables. The next run overwrites the returned arrays. Raises RunError.
+        """
+        try:
+            self._run(values)
+        except CallError as failed:
+            reason = self._with_message(values) or str(failed)
+            self.renew()
+            raise RunError(brief(reason, 240)) from failed
+        return {name: table.values[:, n] for table in self._reads for n, name in enumerate(table.names)}
+
+    def reset(self) -> None:
+        """Make ready for the next run, with a new instance if the FMU cannot be reset."""
+        from fmpy.fmi1 import FMICallException
+
+        try:
+            self._instance.fmu.terminate()
+            self._instance.fmu.reset()
+        except FMICallException:
+            self.renew()
+
+    def renew(self) -> None:
+        """Continue with a new instance."""
+        self.free()
+        self._begin_instance()
+
+    def free(self) -> None:
+        """Free the instance."""
+        self._instance.free()
+
+    def _begin_instance(self, *, logging: bool = False) -> None:
+        instance = self._instance = Instance(self._unpacked, logging=logging)
+        self._reads = instance.tables(self._record, len(self._times))
+        self._start = instance.tables({**self._start_values, **dict.fromkeys(self._varied)})
+        self._places = {name: table.values[0, n : n + 1] for table in self._start for n, name in enumerate(table.names)}
+        for name, value in self._start_values.items():
+            self._places[name][0] = value
+        self._changes = defaultdict[int, list[tuple[Callable[[int], int], int]]](list)
+        """By step, the calls that set the inputs which change at the beginning of this step."""
+        for table in instance.tables(self._signals, len(self._times) - 1):
+            table.values[:] = np.transpose([self._signals[name] for name in table.names])
+            differs = np.any(table.values[1:] != table.values[:-1], axis=1)
+            for n in [0, *(np.flatnonzero(differs) + 1).tolist()]:
+                self._changes[n].append((table.set, n))
+
+    def _run(self, values: Sequence[float]) -> None:
+        for name, value in zip(self._varied, values, strict=True):
+            self._places[name][0] = value
+        times, step, changes, do_step = self._times, self._step, self._changes, self._instance.do_step
+        reads = [table.get for table in self._reads]
+        self._instance.begin(times[0], times[-1], self._tolerance, self._start, self._set_first)
+        for get in reads:
+            check(get(0), "reading", times[0])
+        for n in range(len(times) - 1):
+            for put, row in changes.get(n, ()):
+                if (status := put(row)) > WARNING:
+                    check(status, "setting the inputs", times[n])
+            if (status := do_step(times[n], step)) > WARNING:
+                check(status, "the step", times[n])
+            for get in reads:
+                if (status := get(n + 1)) > WARNING:
+                    check(status, "reading", times[n + 1])
+
+    def _set_first(self) -> None:
+        for put, row in self._changes.get(0, ()):
+            check(put(row), "setting the inputs", self._times[0])
+
+    def _with_message(self, values: Sequence[float]) -> str:
+        """Repeat a failed run with logging on, and return the reason with the FMU's last warning."""
+        self.free()
+        self._begin_instance(logging=True)
+        try:
+            self._run(values)
+        except CallError as failed:
+            return f"{failed}{last_message()}"
+        return ""
