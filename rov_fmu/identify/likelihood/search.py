@@ -35,7 +35,16 @@ from rov_fmu.identify.likelihood.objective import OUTLYING, Objective, cost, wit
 from rov_fmu.identify.likelihood.parameters import Table
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
-from rov_fmu.identify.likelihood.solve import QUICK, Minimum, evidence, minimise, scaled, start_of, total_information
+from rov_fmu.identify.likelihood.solve import (
+    QUICK,
+    Minimum,
+    evidence,
+    louder,
+    minimise,
+    scaled,
+    start_of,
+    total_information,
+)
 from rov_fmu.identify.result import ALARM, CONSTANTS, KEPT, USUAL, VERY_STRONG, WRONG, least_error, moves
 from rov_fmu.tank.arrays import Array, Flags, rms
 from rov_fmu.tank.clocks import first_in_each, held
@@ -482,12 +491,16 @@ def fitted(
     """Return the minimum of J with some hypotheses for all samples, from that for thinned logs.
 
     `plain` is J without hypotheses, and `prior` 2 ln of the prior probability of these. Each parameter begins where the
-    fit `near` ended, or at its prior mean if the hypotheses change that. If a motion diverges from there, all begin as
-    in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below `enough`.
+    fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise begins
+    as in a first fit: that of a wrong model explains what the right one would. If a motion diverges from there, all
+    begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below
+    `enough`.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
+    if any(HYPOTHESES[kind].changes_thrust for kind, _ in starts.keys() ^ near.starts.keys()):
+        there = louder(thinned, there)
     with suppress(DivergedError):
         first, other = (begun(thinned, z, starts) for z in (there, start_of(thinned)))
         end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False)

@@ -71,8 +71,7 @@ def minimise(
     fit, and then the values of a careful start: rounding decides whether motions that no sensor measures diverge beside
     exact measurements, so they do on one processor and not on another. The other options are those of `_minimised`.
     """
-    louder = np.where(objective.table.each("of_motion"), start, np.maximum(start, start_of(objective)))
-    for z in (start, *elsewhere, louder):
+    for z in (start, *elsewhere, louder(objective, start)):
         with suppress(DivergedError):
             return _minimised(objective, z, on_step, **how)
     return _minimised(objective, start_of(objective, _CAREFUL), on_step, **how)
@@ -146,6 +145,11 @@ def refined(objective: Objective, near: Minimum) -> Minimum:
 def start_of(objective: Objective, number: int = 0) -> Array:
     """Return the coordinates at which a start begins."""
     return np.asarray(objective.mean + objective.deviation * objective.table.each("of_kind.starts")[:, number])
+
+
+def louder(objective: Objective, z: Array) -> Array:
+    """Return the same vehicle with noise that is at least that of a first fit."""
+    return np.where(objective.table.each("of_motion"), z, np.maximum(z, start_of(objective)))
 
 
 def least_from(objective: Objective, start: Array, on_step: OnStep = lambda _: None) -> Minimum:

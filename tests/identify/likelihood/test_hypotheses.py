@@ -929,9 +929,11 @@ def test_another_minimum_is_no_evidence_for_a_hypothesis(
 
 
 @pytest.mark.long
-@pytest.mark.xfail(strict=True, reason="since causes are judged inside the search, none is named after this start")
 def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch: pytest.MonkeyPatch) -> None:
-    """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays."""
+    """If the thruster is taken for dead at first, because nothing else was thought of, the alarm stays.
+
+    The right hypothesis is found from either fit, although the noise of both explains what it would.
+    """
     monkeypatch.setattr(
         "rov_fmu.identify.likelihood.search.applied", lambda plain, starts, **_: applied(plain, starts, thinned=True)
     )
@@ -939,9 +941,10 @@ def test_a_wrong_hypothesis_is_taken_back(reversed_model: Objective, monkeypatch
     near = minimise(quick, start_of(quick), enough=8.0, last=False)
     start = evidence(quick, near)
     search = StructureSearch(StructureFit({}, quick, near, start, start))
-    dead = fitted(search.now, reversed_model, {DEAD: 0.0}, 0.0)
+    dead, right = (fitted(search.now, reversed_model, {one: 0.0}, 0.0) for one in (DEAD, REVERSED))
     assert dead
-    assert dead.score > search.now.score
+    assert right
+    assert right.score > dead.score > search.now.score
     search.tried[frozenset({DEAD})] = search.now = dead
     search.run()
     assert [*search.odds] == [REVERSED]
