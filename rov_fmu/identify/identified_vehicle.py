@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import HEAVE, PITCH, REVERSE, ROLL
+from rov_fmu.equation.catalogue import COUPLED_AXES, HEAVE, PITCH, REVERSE, ROLL
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import EVERY_COMMAND, Part, Range
 from rov_fmu.identify.given import Tests
@@ -324,7 +324,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     written = replace(
         kept,
         axes=tuple(form for form in kept.axes if own.has(form.axis)),
-        coupled=own.coupled,
+        coupled=layout.coupled and all(map(own.has, COUPLED_AXES)),
         curves=tuple(curve if curve.has_lag else replace(curve, lag="force") for curve in kept.curves),
         restoring=tuple(key for key in layout.restoring if key in base or coefficients[key]),
         voltage=layout.voltage if with_voltage else None,

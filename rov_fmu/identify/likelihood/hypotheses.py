@@ -12,7 +12,7 @@ from math import exp, inf, pi, radians
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import SURGE, SWAY
+from rov_fmu.equation.catalogue import COUPLED_AXES, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
 from rov_fmu.identify.likelihood.kinds import KINDS, LAG, PRIORS, TURN
@@ -75,7 +75,7 @@ class Hypothesis:
     alarm: float = ALARM
     """The error over 10 s, relative to the noise, above which it is tried."""
     changes_thrust: bool = True
-    """True if it changes the steady thrust, so that J shows how likely it is before any fit."""
+    """True if it changes the steady forces, so that J shows how likely it is before any fit."""
     has_times: bool = False
     """True if it holds at the beginning and the end of logs, and the unknown force tells until and from when."""
     is_first: bool = False
@@ -130,14 +130,24 @@ def _permuted(permutation: Callable[[Of], tuple[Of, float]]) -> Change:
     return change
 
 
-def _with_rotors(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
-    def lagging(layout: Layout) -> Layout:
-        return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
+def _of_layout(changed: Callable[[Layout, Of], Layout]) -> Change:
+    """Return the change of the structure of the vehicle, in all logs."""
 
-    return (
-        replace(known, layout=lagging(known.layout), curves=[replace(curve, lag="speed") for curve in known.curves]),
-        [replace(one, layout=lagging(one.layout)) for one in logs],
-    )
+    def change(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
+        layout = changed(known.layout, of)
+        curves = [layout.curves_by_name[curve.name] for curve in known.curves]
+        changed_logs = [replace(one, layout=changed(one.layout, of)) for one in logs]
+        return replace(known, layout=layout, curves=curves), changed_logs
+
+    return change
+
+
+def _with_rotors(layout: Layout, _: Of) -> Layout:
+    return replace(layout, curves=tuple(replace(curve, lag="speed") for curve in layout.curves))
+
+
+def _coupled(layout: Layout, _: Of) -> Layout:
+    return replace(layout, coupled=all(map(layout.has, COUPLED_AXES)))
 
 
 def _slewing(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
@@ -291,6 +301,13 @@ def _lagging(known: Prior, logs: Logs) -> Iterator[Of]:
         yield ()
 
 
+def _uncoupled(known: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield one suspect, about the vehicle, if a dive has the velocities ahead, to starboard and about the vertical."""
+    shown = ({s.axis for s in one.record.sensors if s.is_velocity or s.axis is YAW} for one in logs)
+    if not known.layout.coupled and any({*COUPLED_AXES} <= axes for axes in shown):
+        yield ()
+
+
 HYPOTHESES = {
     "unsettled velocity": Hypothesis(
         0.05,
@@ -340,6 +357,16 @@ HYPOTHESES = {
         least=0.05,  # sensors are mounted to about three degrees
         ends=(-pi, pi),  # the same direction
     ),
+    "coupling": Hypothesis(
+        0.005,
+        _uncoupled,
+        _of_layout(_coupled),
+        sentence=(
+            "surge, sway and yaw: a motion along one turns or moves the vehicle along the others, by the Coriolis and "
+            "Munk forces{odds}. The vehicle file says so by coupling = true"
+        ),
+        why_no_null="these forces follow from the mass and the inertia, and nothing makes them smaller",
+    ),
     "reversed commands": Hypothesis(
         0.03,
         _thrusters,
@@ -363,7 +390,7 @@ HYPOTHESES = {
     "rotor lag": Hypothesis(
         0.07,
         _lagging,
-        _with_rotors,
+        _of_layout(_with_rotors),
         sentence=(
             "all thrusters: the speed of the rotors lags behind the command, and not the force{odds}. The vehicle file "
             'says so by lag = "speed"'

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import rov_fmu
-from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import CURVE, HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.identify import identify
 from rov_fmu.identify.likelihood.filter import DivergedError
@@ -176,9 +176,9 @@ def dive(vehicle: str, fault: Fault, rng: np.random.Generator) -> str:
 
 def folder(path: Path, vehicle: str, fault: Fault, seed: int = 0, dives: int = 1) -> Path:
     rng = np.random.default_rng(seed)
-    return folder_of(
-        path, f'base = "{vehicle}"\n{HEAD}', {f"dive_{n}.csv": dive(vehicle, fault, rng) for n in range(dives)}
-    )
+    without = "[body]\ncoupling = false\n" if fault.kind == "coupling" else ""
+    dives_of = {f"dive_{n}.csv": dive(vehicle, fault, rng) for n in range(dives)}
+    return folder_of(path, f'base = "{vehicle}"\n{HEAD}{without}', dives_of)
 
 
 @pytest.fixture(scope="module")
@@ -220,6 +220,27 @@ def test_each_hypothesis_changes_what_acts(four_axes: Objective) -> None:
     assert sum(one.probability for one in HYPOTHESES.values()) < 0.65
 
 
+def uncoupled(objective: Objective) -> Objective:
+    """J of the vehicle without coupling."""
+    known = objective.table.known
+    logs = [replace(one, layout=replace(one.layout, coupled=False)) for one in objective.logs]
+    return Objective.of_known(replace(known, layout=replace(known.layout, coupled=False)), logs, objective.rows)
+
+
+def test_coupling_as_a_hypothesis_is_the_coupling_of_the_file(four_axes: Objective) -> None:
+    """A dive without the velocity to starboard does not tell it."""
+    (sampled,), known = four_axes.logs, four_axes.table.known
+    assert not [*HYPOTHESES["coupling"].suspects(known, [sampled])]
+    plain = uncoupled(four_axes)
+    assert [*HYPOTHESES["coupling"].suspects(plain.table.known, plain.logs)] == [()]
+    others = tuple(one for one in sampled.record.sensors if one.axis is not SWAY)
+    ahead = replace(sampled, record=replace(sampled.record, sensors=others))
+    assert not [*HYPOTHESES["coupling"].suspects(plain.table.known, [ahead])]
+    coupled = applied(plain, {("coupling", ()): None})
+    values = [one.value(one.mean, one.runs(one.mean)) for one in (four_axes, coupled, plain)]
+    assert values[0] == values[1] != values[2]
+
+
 def with_logs(objective: Objective, logs: Sequence[SampledLog]) -> Objective:
     """J with other logs."""
     return Objective.of_known(objective.table.known, logs, objective.rows)
@@ -255,7 +276,8 @@ def one_of_each(model: Objective) -> Starts:
 
 def test_a_set_of_hypotheses_changes_a_model_whatever_their_order(four_axes: Objective) -> None:
     """Lines between momentary commands are those of the commands that act, and a slew limit repeats none of them."""
-    lossy = with_logs(four_axes, [with_jump(replace(one, lost={"yaw": 0.1}, interval=0.5)) for one in four_axes.logs])
+    plain = uncoupled(four_axes)
+    lossy = with_logs(plain, [with_jump(replace(one, lost={"yaw": 0.1}, interval=0.5)) for one in plain.logs])
     starts = one_of_each(lossy)
     every = [*starts]
     for pair in combinations(every, 2):
@@ -963,6 +985,7 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
         if fault.value is not None:
             ((low, high),) = (one.interval for one in found.effects if one.kind == told.kind and one.of == told.of)
             assert low - 0.03 <= fault.value <= high + 0.03
+    assert found.vehicle.layout.coupled == (vehicle == "bluerov2")
     if fault.kind == "health":
         assert found.vehicle[f"health_{fault.of}"] == pytest.approx(fault.health, abs=0.05)
 
@@ -970,6 +993,11 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
 @pytest.mark.long
 def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["dead"], 1, 1)
+
+
+@pytest.mark.long
+def test_a_coupled_vehicle_is_named_and_written(tmp_path: Path) -> None:
+    check(tmp_path, "bluerov2", Fault("coupling"), 1, 1)
 
 
 @pytest.mark.long
