@@ -14,7 +14,7 @@ from sphinx.application import Sphinx
 from rov_fmu import __version__
 from rov_fmu.fmu.content import web_module
 from rov_fmu.io.output import Output, write_whole
-from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -93,7 +93,7 @@ def _fly(app: Sphinx, error: Exception | None) -> None:
     if error is None:
         (folder / "compact").mkdir(parents=True, exist_ok=True)
         for one in FLOWN:
-            flown, name = [Flown(one, web_module(one.layout))], f"{one.identifier}.html"
+            flown, name = [FlyingVehicle(one, web_module(one.layout))], f"{one.identifier}.html"
             write_whole(Output(folder / name, fly_page(flown).encode()), force=True)
             write_whole(Output(folder / "compact" / name, fly_page(flown, compact=True).encode()), force=True)
 

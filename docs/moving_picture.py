@@ -14,7 +14,7 @@ from PIL import Image
 from playwright.sync_api import sync_playwright
 
 from rov_fmu.fmu.content import web_module
-from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -68,7 +68,7 @@ def main(target: Path) -> None:
             executable_path=shutil.which("chromium"), args=["--no-sandbox", "--disable-gpu"]
         )
         page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
-        page.set_content(fly_page([Flown(vehicle, web_module(vehicle.layout))]))
+        page.set_content(fly_page([FlyingVehicle(vehicle, web_module(vehicle.layout))]))
         page.wait_for_selector("#live-section:not([hidden])")
         page.evaluate(_PREPARE)
         first, *others = frames(page)

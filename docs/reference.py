@@ -29,7 +29,7 @@ from rov_fmu.report.page import equations
 from rov_fmu.report.page.pictures import diagram
 from rov_fmu.report.plots.svg import name_axes, svg_file
 from rov_fmu.report.templates import number
-from rov_fmu.study.plan.plan import InputFile, Keep, Plan, Signal, Varied
+from rov_fmu.study.plan.plan import InputFile, InputSignal, Keep, Plan, Varied
 from rov_fmu.tank import catalogue
 from rov_fmu.tank.readers.ardusub_frames import FRAMES, fitting_frames
 from rov_fmu.vehicle.json_schema import json_schema
@@ -56,8 +56,8 @@ def tables() -> dict[str, Table]:
     """By name."""
     schema = json_schema()
     named = {"vehicle": "FileHead", "estimated": "Estimated"}
-    own = ("Validity", "Body", "Arm", "Curve", "Thruster", "Fin", "Point", "Battery", "Commands", "Surface")
-    named |= {name.lower(): name for name in own}
+    named |= {name.lower(): name for name in ("Validity", "Body", "Arm", "Surface")}
+    named |= {name.lower(): f"{name}Table" for name in ("Curve", "Thruster", "Fin", "Point", "Battery", "Commands")}
     categories: Table = [("category", "what")]
     categories += ((f"`{name}`", words) for name, words in LOG_CATEGORIES.items())
     found: dict[str, Table] = {"log_categories": categories, "terminals": _terminals()}
@@ -71,7 +71,7 @@ def tables() -> dict[str, Table]:
     plans: dict[str, type[Strict]] = {
         "plan": Plan,
         "varied": Varied,
-        "signal": Signal,
+        "signal": InputSignal,
         "input_file": InputFile,
         "keep": Keep,
         "system": SystemPlan,

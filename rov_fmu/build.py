@@ -23,7 +23,7 @@ from rov_fmu.c.compile import (
 )
 from rov_fmu.c.prebuilt import prebuilt_binaries
 from rov_fmu.fmu.archive import archive
-from rov_fmu.fmu.content import Content, native_content, python_content, web_module
+from rov_fmu.fmu.content import FmuContent, native_content, python_content, web_module
 from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.model_description import FMI_VERSIONS
 from rov_fmu.fmu.osp import osp_model_description, osp_path
@@ -156,7 +156,7 @@ def build_fmu(
     return Built(output, len(packed), content.guid, sizes, seconds, *checked[0], written, lost)
 
 
-def with_binaries(content: Content, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
+def with_binaries(content: FmuContent, binaries: Mapping[str, bytes], fmi: int) -> dict[str, bytes]:
     """Return the files of an FMU with its binaries by platform."""
     name = content.identifier
     libraries = {
@@ -166,7 +166,7 @@ def with_binaries(content: Content, binaries: Mapping[str, bytes], fmi: int) -> 
     return {**content.files, **libraries}
 
 
-def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> Content:
+def _content(vehicle: Vehicle, platforms: Sequence[str] | None, *, fmi: int, interface: str) -> FmuContent:
     """Return the content of the FMU, with its expected results and its pages; in pure Python without platforms."""
     native = platforms is not None
     results, module = reference_results(vehicle), _module(vehicle)

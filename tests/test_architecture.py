@@ -79,6 +79,10 @@ LARGER_FOLDERS = {
 """The folders that have more than a dozen modules, without their __init__.py."""
 
 
+SHARED = {"Answer", "Part", "Plan", "Rov", "Table", "Variable", "check", "load", "place", "step", "table_of"}
+"""The names of classes and functions that two modules have."""
+
+
 def _python_files(folder: Path) -> Iterator[Path]:
     """Yield the Python files in a folder. Folders that begin with a point hold installed importers."""
     for path in folder.iterdir():
@@ -149,6 +153,17 @@ def test_type_checkers_see_the_public_names() -> None:
     typed = {one.name: node.module for node in stub.body if isinstance(node, ast.ImportFrom) for one in node.names}
     assert typed == rov_fmu.HOMES
     assert [name for name in typed if getattr(getattr(rov_fmu, name), "__module__", typed[name]) != typed[name]] == []
+
+
+def test_a_public_name_belongs_to_one_module() -> None:
+    """Of those in SHARED, programs outside use `Rov`, `load` and `step`."""
+    homes: dict[str, set[str]] = {}
+    for module, path in FILES.items():
+        if module.startswith("rov_fmu"):
+            for node in ast.parse(path.read_text(encoding="utf-8")).body:
+                if isinstance(node, ast.ClassDef | ast.FunctionDef) and not node.name.startswith("_"):
+                    homes.setdefault(node.name, set()).add(module)
+    assert {name for name, modules in homes.items() if len(modules) > 1} <= SHARED
 
 
 def test_nothing_imports_in_a_circle(imports: dict[str, set[str]]) -> None:

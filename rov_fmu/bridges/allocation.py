@@ -12,7 +12,7 @@ from math import ceil
 
 import numpy as np
 
-from rov_fmu.bridges.sdf import Array, written
+from rov_fmu.bridges.sdf import Array, rendered_model
 from rov_fmu.equation.forces import (
     COUPLING,
     DEAD_BAND,
@@ -61,7 +61,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         return fraction if layout.mix else layout.command_of(fraction)
 
     tables = {
-        curve.name: {voltage: table(vehicle, curve, voltage) for voltage in voltages(vehicle, curve)}
+        curve.name: {voltage: thrust_rows(vehicle, curve, voltage) for voltage in voltages(vehicle, curve)}
         for curve in layout.curves
     }
     content = {
@@ -78,7 +78,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
     for curve, by_voltage in tables.items():
         for voltage, rows in by_voltage.items():
             lines += [f"{curve},{voltage or ''},{force:.9g},{command_of(c):.9g}" for force, c in rows]
-    text = written("allocation.yaml.j2", vehicle, (), **content)
+    text = rendered_model("allocation.yaml.j2", vehicle, (), **content)
     return {"allocation.yaml": text, "force_to_command.csv": "\n".join([*lines, ""])}
 
 
@@ -131,7 +131,7 @@ def voltages(vehicle: Vehicle, curve: Curve) -> list[float | None]:
     return [*map(float, found)]
 
 
-def table(vehicle: Vehicle, curve: Curve, voltage: float | None) -> list[Row]:
+def thrust_rows(vehicle: Vehicle, curve: Curve, voltage: float | None) -> list[Row]:
     """Return the forces and commands of one thruster, both rising, from full reverse to full ahead.
 
     Where the force does not rise with the command, the smaller command stands, and it is 0 for no force. Between two

@@ -14,7 +14,7 @@ import numpy as np
 
 from rov_fmu.equation.expression import ARRAYS, Expression, Name, array_functions, compiled
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Table
+from rov_fmu.equation.parts import CommandTable
 from rov_fmu.equation.python.step import cubic
 from rov_fmu.equation.terms import Equation, equation_of
 from rov_fmu.io.messages import InputError, did_you_mean
@@ -123,8 +123,8 @@ def _before_rates(equation: Equation) -> dict[str, Expression]:
     return {name: formula for name, formula in equation.program.items() if name not in equation.thrust}
 
 
-def _table_force(table: Table, interval: Callable[..., Any]) -> Callable[[Any], Any]:
-    """Return the force of a thrust table as a function of the command, as `Table.value` computes it."""
+def _table_force(table: CommandTable, interval: Callable[..., Any]) -> Callable[[Any], Any]:
+    """Return the force of a thrust table as a function of the command, as `CommandTable.value` computes it."""
     rows = table.commands, table.values, table.slopes
     columns = [row[:-1] for row in rows] + [row[1:] for row in rows]
 

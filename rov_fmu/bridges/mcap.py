@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.io.messages import InputError
-from rov_fmu.report.plots.geometry import place
+from rov_fmu.report.plots.geometry import thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ _HULL, _JET = (0.93, 0.69, 0.13, 0.8), (0.34, 0.71, 0.91, 0.9)
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberField:
     """A number in the messages of a topic."""
 
     unit: str
@@ -73,7 +73,7 @@ class Recording:
         self._writer = open_mcap(self._stream, context=self.context, writer_options=options)
         self._writer.write_metadata("vehicle", dict(about))
 
-    def topic(self, name: str, numbers: Mapping[str, Number]) -> Callable[[int, Mapping[str, float]], None]:
+    def topic(self, name: str, numbers: Mapping[str, NumberField]) -> Callable[[int, Mapping[str, float]], None]:
         """Return the function that writes a message of a topic with numbers by name, at a time in ns."""
         from foxglove import Channel
 
@@ -108,7 +108,7 @@ class Recording:
         return self._stream.getvalue()
 
 
-def about(vehicle: Vehicle) -> dict[str, str]:
+def about_vehicle(vehicle: Vehicle) -> dict[str, str]:
     """Return what a file says about its vehicle."""
     return {"name": vehicle.name, "version": vehicle.version, "source": vehicle.source}
 
@@ -123,11 +123,11 @@ def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> b
 
     Raises InputError where foxglove-sdk is not installed.
     """
-    recording = Recording(about(vehicle))
+    recording = Recording(about_vehicle(vehicle))
     layout = vehicle.layout
     groups = {"/inputs": layout.inputs, "/outputs": layout.state | layout.calculated}
     numbers = {
-        topic: {name: Number(of.unit, of.description) for name, of in declared.items() if name in values}
+        topic: {name: NumberField(of.unit, of.description) for name, of in declared.items() if name in values}
         for topic, declared in groups.items()
     }
     write = {topic: recording.topic(topic, own) for topic, own in numbers.items() if own}
@@ -215,7 +215,7 @@ def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "Sce
 
 def hull_size(vehicle: Vehicle) -> Array:
     """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
-    corners = np.abs([(0.0, 0.0, 0.0), *(place(vehicle, thruster) for thruster in vehicle.layout.thrusters)])
+    corners = np.abs([(0.0, 0.0, 0.0), *(thruster_place(vehicle, thruster) for thruster in vehicle.layout.thrusters)])
     size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
     return size
 
@@ -232,7 +232,7 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         turned, _ = Rotation.align_vectors([jet], [[1.0, 0.0, 0.0]])
         length = abs(share) * longest
         yield ArrowPrimitive(
-            pose=_pose(_TO_FRD.apply(place(vehicle, thruster)), turned),
+            pose=_pose(_TO_FRD.apply(thruster_place(vehicle, thruster)), turned),
             shaft_length=0.8 * length,
             shaft_diameter=0.04 * longest,
             head_length=0.2 * length,

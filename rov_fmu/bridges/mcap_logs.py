@@ -8,7 +8,7 @@ from math import isnan, nan
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from rov_fmu.bridges.mcap import Number, Recording, about, nanoseconds
+from rov_fmu.bridges.mcap import NumberField, Recording, about_vehicle, nanoseconds
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW
@@ -30,7 +30,7 @@ class _Series:
     """n: s."""
     columns: Mapping[str, Array]
     """The n values of each number; NaN where there is none."""
-    numbers: Mapping[str, Number]
+    numbers: Mapping[str, NumberField]
 
 
 def identification_mcap(identification: Identification) -> bytes:
@@ -43,7 +43,7 @@ def identification_mcap(identification: Identification) -> bytes:
 
     Raises InputError where foxglove-sdk is not installed.
     """
-    recording = Recording(about(identification.vehicle), IDENTIFIED)
+    recording = Recording(about_vehicle(identification.vehicle), IDENTIFIED)
     messages: list[tuple[int, Callable[[], None]]] = []
     for log in identification.folder.logs:
         series = [*_series_of(identification, log)]
@@ -97,13 +97,15 @@ def _series_of(identification: Identification, log: Log) -> Iterator[_Series]:
 
 def _commands(commands: Commands) -> _Series:
     time = np.unique(commands.time)
-    numbers = {name: Number("1", f"Command of {name}, a fraction of the full command") for name in commands.thrusters}
+    numbers = {
+        name: NumberField("1", f"Command of {name}, a fraction of the full command") for name in commands.thrusters
+    }
     return _Series("commands", time, dict(zip(numbers, commands.at(time).T, strict=True)), numbers)
 
 
 def _measured(channel: Channel) -> _Series:
     name, (time, values) = channel.quantity.name, channel.samples
-    numbers = {"measured": Number(channel.quantity.unit, f"Measured {name}")}
+    numbers = {"measured": NumberField(channel.quantity.unit, f"Measured {name}")}
     return _Series(topic_name(name), time, {"measured": values}, numbers)
 
 
@@ -122,8 +124,8 @@ def _prediction(parts: Sequence[Prediction], channel: Channel | None) -> _Series
         key: np.append(values, none) for key, values in ({"predicted": predicted} | ends).items()
     }
     numbers = {
-        "measured": Number(unit, f"Measured {name}"),
-        "predicted": Number(unit, f"The prediction of the {name} by {parts[0].by}"),
+        "measured": NumberField(unit, f"Measured {name}"),
+        "predicted": NumberField(unit, f"The prediction of the {name} by {parts[0].by}"),
         **_edges(unit, f"95 % band of the measured {name}"),
     }
     return _Series(topic_name(name), time[order], {key: values[order] for key, values in columns.items()}, numbers)
@@ -133,7 +135,10 @@ def _unknown(unknown: UnknownForce) -> _Series:
     axis = unknown.axis
     columns = {"force": unknown.force, **_band(unknown.force, unknown.deviation)}
     words = f"Slow {'torque' if axis.is_rotation else 'force'} in {axis.name} that the model does not explain"
-    numbers = {"force": Number(axis.load, f"{words}, positive {axis.positive}"), **_edges(axis.load, "95 % interval")}
+    numbers = {
+        "force": NumberField(axis.load, f"{words}, positive {axis.positive}"),
+        **_edges(axis.load, "95 % interval"),
+    }
     return _Series(f"unknown_force/{axis.name}", unknown.time, columns, numbers)
 
 
@@ -141,5 +146,5 @@ def _band(values: Array, deviation: Array) -> dict[str, Array]:
     return {"low": values - NORMAL * deviation, "high": values + NORMAL * deviation}
 
 
-def _edges(unit: str, words: str) -> dict[str, Number]:
-    return {end: Number(unit, f"{end.capitalize()} end of the {words}") for end in ("low", "high")}
+def _edges(unit: str, words: str) -> dict[str, NumberField]:
+    return {end: NumberField(unit, f"{end.capitalize()} end of the {words}") for end in ("low", "high")}

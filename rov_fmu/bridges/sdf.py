@@ -63,7 +63,7 @@ IN_GAZEBO = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING,
 
 
 @dataclass(frozen=True)
-class Model:
+class GazeboModel:
     """A model for Gazebo: the text of its file, and what the reader of the console should know."""
 
     text: str
@@ -110,7 +110,7 @@ class Link:
         return np.block([[self.mass * np.eye(3), first_moment.T], [first_moment, about_origin]])
 
 
-def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = False) -> Model:
+def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = False) -> GazeboModel:
     """Return the model of a vehicle, alone or in a world with water.
 
     The added mass stands in the link, in <fluid_added_mass>, or if it is `explicit`, in the Hydrodynamics plugin.
@@ -126,7 +126,7 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
         *_notes_of_motion(vehicle, propellers, explicit=explicit),
     )
     small, radius = _PROPELLER
-    text = written(
+    text = rendered_model(
         "model.sdf.j2",
         vehicle,
         notes,
@@ -141,10 +141,10 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
         hydrodynamics=hydrodynamics(vehicle, link) | (dict(in_plugin(added)) if explicit else {}),
         thrusters=propellers,
     )
-    return Model(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
+    return GazeboModel(text, notes, tuple(_divergence(added, link.matrix)) if explicit else ())
 
 
-def written(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
+def rendered_model(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
     """Return a model of a vehicle with notes, from its template."""
     common = {"number": _number, "vector": _vector, "comment": _comment, "version": __version__, "density": DENSITY}
     folder = Path(__file__).parent / "templates"

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.bridges.sitl_protocol import Address, Kind, Sequence, ServoPacket, reply, servo_packet
+from rov_fmu.bridges.sitl_protocol import Address, PacketKind, Sequence, ServoPacket, reply, servo_packet
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import GRAVITY, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.words import AFLOAT, LEFT_WATER
@@ -84,7 +84,7 @@ class Setup:
     """The frame of ArduSub whose motors the servos are, if it is one."""
 
 
-class Log:
+class FlightLog:
     """A log of one flight: a table in the form that `identify` reads, or MCAP with the variables of the FMU.
 
     The table has commands, velocities over ground, depth and angles. A row holds the motion at its time, and the mean
@@ -222,7 +222,7 @@ class Flight:
         """True when the vehicle is above the surface, which its model does not have."""
         self.outputs = Outputs(setup.servos, motors_of(layout), setup.frame)
         self._held = {**layout.usual_inputs, **setup.start}
-        self.log = Log(setup, most_rows) if setup.log and most_rows else None
+        self.log = FlightLog(setup, most_rows) if setup.log and most_rows else None
 
     @property
     def time(self) -> float:
@@ -311,7 +311,7 @@ class Traffic:
     """The processor time from the arrivals of servo packets to the ends of their replies, s."""
 
 
-class Connection:
+class SitlConnection:
     """The flights of a vehicle with one autopilot, which may be started again."""
 
     def __init__(
@@ -351,16 +351,16 @@ class Connection:
         Raises InputError if the motion cannot be computed, and WriteError if the log cannot be written.
         """
         packet = servo_packet(data)
-        kind = self._kind(packet, sender) if packet else Kind.STRANGE
-        if packet is None or kind is Kind.STRANGE:
+        kind = self._kind(packet, sender) if packet else PacketKind.STRANGE
+        if packet is None or kind is PacketKind.STRANGE:
             self.traffic.ignored += 1
             return b""
-        if kind is Kind.REPEATED:
+        if kind is PacketKind.REPEATED:
             self.traffic.repeated += 1
             return self._answer
         self._passed += self._silence()
         self._last_step = self._clock()
-        if kind is Kind.RESTART:
+        if kind is PacketKind.RESTART:
             self._passed += self.flight.time
             self.end()
             self.traffic.restarts += 1
@@ -377,7 +377,7 @@ class Connection:
         for words, *values in self.flight.outputs.doubts(at_end=at_end):
             self._say_once(f"{words}: {self._question}", *values)
 
-    def _kind(self, packet: ServoPacket, sender: Address) -> Kind:
+    def _kind(self, packet: ServoPacket, sender: Address) -> PacketKind:
         """Return what to do with a packet. Only the first sender is followed.
 
         When it is silent, another one from the same host is the autopilot that was started again.
@@ -387,12 +387,12 @@ class Connection:
         elif sender[0] == self._sender[0] and self._silence() and packet.is_plausible:
             self.order.restart()
             self.order.kind(packet)
-            kind = Kind.RESTART
+            kind = PacketKind.RESTART
         else:
             other, own = (f"{host}:{port}" for host, port, *_ in (sender, self._sender))
             self._say_once(_OTHERS, other, own)
-            return Kind.STRANGE
-        if kind is not Kind.STRANGE:
+            return PacketKind.STRANGE
+        if kind is not PacketKind.STRANGE:
             self._sender = sender
         return kind
 

@@ -62,7 +62,7 @@ def reply(values: Mapping[str, Any]) -> bytes:
     return f"\n{_JSON.encode(values)}\n".encode()
 
 
-class Kind(Enum):
+class PacketKind(Enum):
     """What to do with a servo packet."""
 
     NEW = "a step"
@@ -85,7 +85,7 @@ class Sequence:
     """The last count before a jump, until the next packet shows whether the jump was damage."""
     _strange: int | None = field(default=None, repr=False)
 
-    def kind(self, packet: ServoPacket) -> Kind:
+    def kind(self, packet: ServoPacket) -> PacketKind:
         """Return what to do with a packet.
 
         A packet whose count is older, or much newer, came late or is damaged. It is believed if it comes a second time
@@ -95,19 +95,19 @@ class Sequence:
         count = packet.frame_count
         if self.last is None or not self._is_sure:
             if count == self.last:
-                return Kind.REPEATED
+                return PacketKind.REPEATED
             if not packet.is_plausible:
-                return Kind.STRANGE
+                return PacketKind.STRANGE
             self._is_sure = self.last is not None and count == (self.last + 1) % _WRAP
             self.last = count
-            return Kind.NEW
+            return PacketKind.NEW
         ahead = (count - self.last) % _WRAP
         if ahead == 0:
-            return Kind.REPEATED
+            return PacketKind.REPEATED
         is_next = ahead == 1 or (self._before is not None and count == (self._before + 1) % _WRAP)
         if not is_next and ahead > _MOST_LOST and count != self._strange:
             self._strange = count
-            return Kind.STRANGE
+            return PacketKind.STRANGE
         if is_next:
             self._before = None
         elif self._before is None:
@@ -115,7 +115,7 @@ class Sequence:
         if ahead <= _MOST_LOST:
             self.lost += ahead - 1
         self.last, self._strange = count, None
-        return Kind.NEW if count or is_next or ahead <= _MOST_LOST else Kind.RESTART
+        return PacketKind.NEW if count or is_next or ahead <= _MOST_LOST else PacketKind.RESTART
 
     def restart(self) -> None:
         """Forget which packet is the next one."""

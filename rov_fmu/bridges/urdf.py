@@ -17,7 +17,7 @@ _LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
 """The letters of the forces and moments, by the velocities."""
 
 
-def urdf_model(vehicle: Vehicle) -> sdf.Model:
+def urdf_model(vehicle: Vehicle) -> sdf.GazeboModel:
     """Return the robot description of a vehicle. Raises InputError about a vehicle without a mass or with β = 0."""
     sdf.check_possible(vehicle)
     link = sdf.link_of(vehicle)
@@ -34,7 +34,7 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
         return -0.5 * sum(sdf.both_ways(vehicle, axes[v], key)) if v in axes else 0.0
 
     notes = tuple(_notes(vehicle))
-    text = sdf.written(
+    text = sdf.rendered_model(
         "model.urdf.j2",
         vehicle,
         notes,
@@ -48,7 +48,7 @@ def urdf_model(vehicle: Vehicle) -> sdf.Model:
         drag=drag,
         plugin=sdf.hydrodynamics(vehicle, link) | dict(sdf.in_plugin(added)),
     )
-    return sdf.Model(text, notes, ())
+    return sdf.GazeboModel(text, notes, ())
 
 
 _IN_URDF = (*sdf.IN_GAZEBO, DEAD_TIME, LAG, ROTOR_LAG)

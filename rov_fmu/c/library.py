@@ -28,7 +28,7 @@ from rov_fmu.c.compile import (
     host_platform,
 )
 from rov_fmu.c.prebuilt import prebuilt
-from rov_fmu.c.source import sources
+from rov_fmu.c.source import c_sources
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.output import kept
@@ -48,7 +48,7 @@ _LOADING = Lock()
 
 def engine_sources(layout: Layout, file: Path = ENGINE_FILE) -> dict[str, str]:
     """Return the C files of a library by their names. The last one includes the others."""
-    return sources(layout) | {path.name: path.read_text(encoding="utf-8") for path in _FILES[file]}
+    return c_sources(layout) | {path.name: path.read_text(encoding="utf-8") for path in _FILES[file]}
 
 
 def load_library(vehicle: Vehicle, file: Path = ENGINE_FILE) -> ctypes.CDLL:

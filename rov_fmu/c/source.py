@@ -350,7 +350,7 @@ def unused_sources(layout: Layout) -> list[str]:
     return [name for name, is_needed in needed.items() if not is_needed]
 
 
-def sources(layout: Layout) -> dict[str, str]:
+def c_sources(layout: Layout) -> dict[str, str]:
     """Return the C files of a vehicle's motion by their names: the generated and the shared ones."""
     names = {"real.h", "series.c", "step.c", "coast.c", "heading.c", "delay.c", "lag.c", "table.c"}
     used = sorted(names - {*unused_sources(layout)})

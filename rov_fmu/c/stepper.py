@@ -19,7 +19,7 @@ from rov_fmu.c.simulation import on_cores, pointer, reasons, tables_of
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
-class Memory:
+class EngineMemory:
     """The memory in which C keeps vehicles of the same layout between their steps.
 
     It is an array, so Python frees it, and a copy of this object is a copy of the vehicles.
@@ -66,7 +66,7 @@ class Memory:
             library.single_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
 
 
-class Stepper(Memory):
+class Stepper(EngineMemory):
     """One vehicle that is stepped from time 0 on, with the bits of the FMU. Each step is exact."""
 
     def __init__(self, vehicle: Vehicle, start: Mapping[str, float], record: Sequence[str]) -> None:
@@ -106,7 +106,7 @@ class Stepper(Memory):
         return results
 
 
-class LaneStepper(Memory):
+class LaneStepper(EngineMemory):
     """Many vehicles that are stepped together, in the lanes of vectors on all cores, as `simulate` does with `lanes`.
 
     They begin at rest with the usual inputs. Raises BuildError when the engine cannot be compiled.

@@ -18,7 +18,7 @@ from math import inf, pi
 from typing import Literal
 
 from .attitude import INITIAL, QUATERNION
-from .units import unit_of
+from .units import parsed_unit
 
 # ---- Axes ------------------------------------------------------------------------------------------------------------
 
@@ -223,7 +223,7 @@ class Declaration:
     @property
     def display_unit(self) -> str | None:
         """The unit in which people read the quantity, or None if that is its own unit."""
-        return None if self.unit == "1" and not self.is_share else unit_of(self.unit).display
+        return None if self.unit == "1" and not self.is_share else parsed_unit(self.unit).display
 
     def written(self, value: float) -> str:
         """Return a value with its unit, which a ratio does not have."""

@@ -10,7 +10,7 @@ from .python.step import interpolated
 
 
 @dataclass(frozen=True)
-class Table:
+class CommandTable:
     """Measured thrust or electric current of one thruster over its command, with a cubic between the commands.
 
     The cubics of a thrust are monotone, and those of a current are straight lines. Of two equal commands, the first
@@ -78,11 +78,11 @@ class Curve(Part):
     description: str = ""
     equation: str = ""
     """Where the curve is published: the number of an equation of the paper, or another source."""
-    tables: tuple[Table, ...] = ()
+    tables: tuple[CommandTable, ...] = ()
     """The measured forces, in place of a_t and b_t: one table, or one per voltage in rising order."""
     lag: Lag = "force"
     """What lags with the time constant T: the force, T F' = F(c) - F, or the rotor's speed, T n' = n_c - n."""
-    electric_current: Table | None = None
+    electric_current: CommandTable | None = None
     """The current of one thruster. All curves of a vehicle have it, or none."""
 
     @property

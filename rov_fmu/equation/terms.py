@@ -55,7 +55,7 @@ from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation,
 from .forces import AT_SURFACE, COUPLING, POINTS, WAVES, Effect, Force, above, advance, forces_of, rotation, thrusts
 from .layout import Layout
 from .mass import MassMatrix
-from .parts import EVERY_COMMAND, Curve, Range, Table
+from .parts import EVERY_COMMAND, CommandTable, Curve, Range
 from .thrust import Lag, add_rotor, lags_of, steady_name, thrust_formulas
 
 
@@ -99,7 +99,7 @@ class Equation:
     what they need."""
     ends: Mapping[str, Expression] = field(default_factory=dict)
     """Formulas for the states of the vehicle that are neither in the table nor lag, from the states of the table."""
-    tables: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, CommandTable] = field(default_factory=dict)
     """The tables that the formulas call, by their names."""
     names: Names = field(default_factory=Names)
     """The names of the quantities of the equation."""
@@ -110,7 +110,7 @@ class Equation:
         return {name: table.value for name, table in self.tables.items()}
 
     @property
-    def thrust_tables(self) -> dict[str, Table]:
+    def thrust_tables(self) -> dict[str, CommandTable]:
         """The tables of thrust. Those of electric current are for `outputs` alone."""
         return {name: table for name, table in self.tables.items() if table.kind == "thrust"}
 
@@ -299,7 +299,7 @@ def equation_of(layout: Layout) -> Equation:
     )
 
 
-def _tables(layout: Layout) -> dict[str, Table]:
+def _tables(layout: Layout) -> dict[str, CommandTable]:
     """Return the tables by the functions that formulas call. Raises ValueError when two have the same name."""
     measured = [table for curve in layout.curves for table in (*curve.tables, curve.electric_current) if table]
     tables = {table.function: table for table in measured}

@@ -62,7 +62,7 @@ UNITS = {  # the elements in the order of the schema of OSP-IS
 
 
 @cache
-def unit_of(text: str) -> Unit:
+def parsed_unit(text: str) -> Unit:
     """Return what follows from a unit."""
     unit, exponents = UNITS.get(text, Unit()), Counter[str]()
     if unit.exponents:

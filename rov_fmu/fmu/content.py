@@ -17,13 +17,13 @@ from rov_fmu.c.compile import (
     fmi_headers,
 )
 from rov_fmu.c.prebuilt import MODULE, prebuilt
-from rov_fmu.c.source import sources as motion_sources
+from rov_fmu.c.source import c_sources as motion_sources
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.model_description import build_description, model_description, model_of
 from rov_fmu.fmu.picture import read_png
 from rov_fmu.fmu.python_flavour import python_files, python_sources
 from rov_fmu.fmu.terminals import FOLDER, ICON
-from rov_fmu.fmu.variables import Model, interface_header
+from rov_fmu.fmu.variables import FmuModel, interface_header
 from rov_fmu.io.paths import LICENSE
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError
@@ -39,7 +39,7 @@ _EXTERNAL_DEPENDENCIES = {
 
 
 @dataclass(frozen=True)
-class Content:
+class FmuContent:
     """Everything in an FMU except its compiled binaries."""
 
     identifier: str
@@ -51,18 +51,18 @@ class Content:
 
 
 def native_content(
-    subject: Vehicle | Model,
+    subject: Vehicle | FmuModel,
     pages: Mapping[str, bytes] = MappingProxyType({}),
     fmi: int = 2,
     interface: str = "both",
     platforms: Collection[str] = PLATFORMS.keys(),
-) -> Content:
+) -> FmuContent:
     """Return the FMU in C of a vehicle or another model for one of INTERFACES.
 
     `pages` are further files, by their paths. `platforms` are those of PLATFORMS for which it will have binaries.
     """
     own_files = dict(pages)
-    if isinstance(subject, Model):
+    if isinstance(subject, FmuModel):
         model = subject
     else:
         model = replace(model_of(subject), c_files=motion_sources(subject.layout))
@@ -83,10 +83,10 @@ def native_content(
         files["sources/buildDescription.xml"] = build_description(model.identifier)
         files["documentation/externalDependencies.txt"] = _external_dependencies(platforms).encode()
     documents = _common_files(model, describe(guid=guid)) | own_files
-    return Content(model.identifier, guid, documents | files, sources)
+    return FmuContent(model.identifier, guid, documents | files, sources)
 
 
-def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> Content:
+def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyType({})) -> FmuContent:
     """Return the FMU in pure Python, for Co-Simulation. `pages` are further files by their path."""
     model = model_of(vehicle)
     sources = python_sources(vehicle, model.variables)
@@ -94,7 +94,7 @@ def python_content(vehicle: Vehicle, pages: Mapping[str, bytes] = MappingProxyTy
     guid = _guid(describe(guid=""), sources)
     files = python_files(vehicle.identifier, sources)
     documents = _common_files(model, describe(guid=guid)) | _own_files(vehicle, pages)
-    return Content(vehicle.identifier, guid, documents | files, {})
+    return FmuContent(vehicle.identifier, guid, documents | files, {})
 
 
 def _external_dependencies(platforms: Collection[str]) -> str:
@@ -114,7 +114,7 @@ def _guid(description: bytes, sources: Mapping[str, str]) -> str:
     return f"{{{UUID(digest.hexdigest()[:32])}}}"
 
 
-def _common_files(model: Model, description: bytes) -> dict[str, bytes]:
+def _common_files(model: FmuModel, description: bytes) -> dict[str, bytes]:
     """Return the files that FMUs in C and in Python both have, by their path."""
     terminals = {f"{FOLDER}/terminalsAndIcons.xml": model.terminals}
     license_text = {"documentation/licenses/license.txt": read_bytes(LICENSE, VehicleFileError)}

@@ -6,10 +6,10 @@ from rov_fmu import __version__
 from rov_fmu.c.compile import UNITY_FILE
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.dependencies import parameters_of
-from rov_fmu.equation.units import unit_of
+from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.card import card_text
 from rov_fmu.fmu.terminals import terminals_and_icons
-from rov_fmu.fmu.variables import LOG_CATEGORIES, Model, Variable, variables
+from rov_fmu.fmu.variables import LOG_CATEGORIES, FmuModel, Variable, variables
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -26,10 +26,10 @@ DEAD_TIME_NOTE = (
 """The text that follows the summary of a vehicle with a dead time, if the FMU is for Model Exchange."""
 
 
-def model_of(vehicle: Vehicle) -> Model:
+def model_of(vehicle: Vehicle) -> FmuModel:
     """Return the model of a vehicle, without its C files."""
     layout = vehicle.layout
-    return Model(
+    return FmuModel(
         *(vehicle.identifier, vehicle.version, vehicle.source, vehicle.summary, card_text(vehicle)),
         variables(vehicle),
         terminals_and_icons(layout),
@@ -42,7 +42,7 @@ def model_of(vehicle: Vehicle) -> Model:
 
 
 def model_description(
-    model: Model,
+    model: FmuModel,
     *,
     guid: str,
     interfaces: Sequence[str],
@@ -71,7 +71,7 @@ def model_description(
         description=description,
         interfaces=interfaces,
         source_files=source_files,
-        units={name: unit_of(name) for name in dict.fromkeys(v.unit for v in declared)},
+        units={name: parsed_unit(name) for name in dict.fromkeys(v.unit for v in declared)},
         types={type_names[v.name]: v for v in declared},
         type_names=type_names,
         log_categories=LOG_CATEGORIES,
@@ -95,7 +95,7 @@ def _type_names(variables: Sequence[Variable]) -> dict[str, str]:
     types: dict[tuple[str, tuple[object, ...]], str] = {}
     names: dict[str, str] = {}
     for v in variables:
-        quantity = "Command" if v.display_unit == "%" else unit_of(v.unit).quantity
+        quantity = "Command" if v.display_unit == "%" else parsed_unit(v.unit).quantity
         key = quantity, (v.unit, v.display_unit, v.minimum, v.maximum, v.nominal)
         count = sum(known == quantity for known, _ in types)
         names[v.name] = types.setdefault(key, f"{quantity} {count + 1}" if count else quantity)

@@ -12,7 +12,7 @@ from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import EARTH, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, over_ground_name
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Point
-from rov_fmu.equation.units import UNITS, unit_of
+from rov_fmu.equation.units import UNITS, parsed_unit
 from rov_fmu.io.templates import render
 
 _PORT = "LinearMechanicalPort"
@@ -92,7 +92,7 @@ def osp_model_description(layout: Layout) -> bytes:
             (unit,) = {units[variable] for variable in members}
             # the name of a curve or a thruster may make a name that another group has
             unique = name if names.count(name) == 1 else "_".join((name, *members))
-            groups.append(_Group(unit_of(unit).element, unique, members, unit))
+            groups.append(_Group(parsed_unit(unit).element, unique, members, unit))
     grouped = [variable for group in groups for variable in group.members]
     assert sorted([*grouped, *in_ports]) == sorted(units), "every variable must be in one group"
     order = [*(unit.element for unit in UNITS.values()), _PORT]

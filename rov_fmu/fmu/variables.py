@@ -167,7 +167,7 @@ LOG_CATEGORIES = {
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class FmuModel:
     """What an FMU is of: a vehicle (`model_of`), or something else that the FMI functions in C can run."""
 
     identifier: str
@@ -196,7 +196,7 @@ class Model:
     """True for a vehicle without a surface, so that it must not rise above depth 0."""
 
 
-def interface_header(model: Model, token: str, fmi: int, interfaces: Collection[str]) -> str:
+def interface_header(model: FmuModel, token: str, fmi: int, interfaces: Collection[str]) -> str:
     """Return interface.h: the table of variables for the FMI functions, and their names in a static library."""
     return render(
         "interface.h.j2",

@@ -120,12 +120,12 @@ def _contents(
             there = f"{shell_words('cd', path.parent)} && " if path.parent != Path() else ""
             return files, Exported({}, following=f"{there}python -m {path.name}")
         case "ardusub-gains":
-            from rov_fmu.bridges.ardusub.files import gains_files, table_of  # Matplotlib: few need it
+            from rov_fmu.bridges.ardusub.files import flight_table, gains_files  # Matplotlib: few need it
             from rov_fmu.bridges.ardusub.gains import tuned
 
             found = tuned(vehicle, gains)
             following = f"fly {path / 'gains-from-4.7.param'} (or before-4.7) by rov-fmu sitl, and then in the pool"
-            return gains_files(found), Exported({}, "Note", found.notes, following=following, table=table_of(found))
+            return gains_files(found), Exported({}, "Note", found.notes, following=following, table=flight_table(found))
         case "autopilot":
             from rov_fmu.bridges.autopilot.files import autopilot_files
 

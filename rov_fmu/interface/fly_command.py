@@ -10,7 +10,7 @@ from rov_fmu.io.file_kinds import PAGE
 from rov_fmu.io.messages import print_message
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console
-from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.report.page.recording import recording_of
 from rov_fmu.vehicle.steady import beyond_stated
 from rov_fmu.vehicle.vehicle import load_vehicle
@@ -35,7 +35,9 @@ def write_fly_page(
     flown = recording_of(recording, vehicles[0], identified) if recording else None
     names = [path.name for path in paths]
     names = names if len({*names}) == len(names) else [*map(str, paths)]  # with their folders if the names are the same
-    shown = [Flown(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)]
+    shown = [
+        FlyingVehicle(vehicle, web_module(vehicle.layout), name) for vehicle, name in zip(vehicles, names, strict=True)
+    ]
     path = output or Path(mkdtemp(prefix="rov-fmu-"), f"{vehicles[0].identifier}.html")
     return write_whole(Output(path, sealed(fly_page(shown, recording=flown), "fly").encode()), force=force)
 

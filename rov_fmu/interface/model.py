@@ -95,9 +95,9 @@ class VehicleModel(Vehicle):
         Raises InputError if an argument cannot be used, or if the motion cannot be computed because it overflows or
         needs too many steps; BuildError where the engine cannot be compiled.
         """
-        from rov_fmu.interface.result import simulated
+        from rov_fmu.interface.result import simulated_result
 
-        return simulated(self, time, inputs, start, _NONE, record, workers=1, many=False)
+        return simulated_result(self, time, inputs, start, _NONE, record, workers=1, many=False)
 
     def simulate_many(
         self,
@@ -134,9 +134,11 @@ class VehicleModel(Vehicle):
 
         Raises InputError about an argument that cannot be used; BuildError where the engine cannot be compiled.
         """
-        from rov_fmu.interface.result import simulated
+        from rov_fmu.interface.result import simulated_result
 
-        return simulated(self, time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes)
+        return simulated_result(
+            self, time, inputs, start, coefficients, record, workers=workers, many=True, lanes=lanes
+        )
 
     def to_mcap(self, result: "Result | pd.DataFrame") -> bytes:
         """Return a simulation of this vehicle as the content of an MCAP file, for Foxglove and PlotJuggler.

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from rov_fmu.c.simulation import reasons, simulate, usable_cores
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import AXES
-from rov_fmu.equation.units import in_degrees, unit_of
+from rov_fmu.equation.units import in_degrees, parsed_unit
 from rov_fmu.fmu.variables import units_of
 from rov_fmu.interface.arguments import (
     Inputs,
@@ -147,7 +147,7 @@ class Result(Mapping[str, Array]):
         for name in dict.fromkeys(chosen):
             values = self[name]
             factor, unit = in_degrees(self.units[name])
-            quantity = "thrust" if name.startswith("F_") and unit == "N" else unit_of(self.units[name]).words
+            quantity = "thrust" if name.startswith("F_") and unit == "N" else parsed_unit(self.units[name]).words
             panels.setdefault((quantity, unit), {})[name] = factor * values
         commands = {name: values for name, values in self.commands.items() if names is None and np.any(values)}
         heights = [0.6 if quantity in _SMALL else 1.0 for quantity, _ in panels] + [0.6] * bool(commands)
@@ -176,7 +176,7 @@ class Result(Mapping[str, Array]):
         axes[-1].set_xlabel("time (s)")
 
 
-def simulated(
+def simulated_result(
     vehicle: Vehicle,
     time: ArrayLike,
     inputs: Inputs,

@@ -49,7 +49,7 @@ def simulate_vehicle(
     """
     opens, vehicle = plot == Path(), load(path)
     check_outputs(output, None if opens else plot, [path, *vehicle.files, *filter(None, [commands])], force=force)
-    result = run(vehicle, settings, commands, stop, step, records_inputs=is_mcap(output))
+    result = simulation_of(vehicle, settings, commands, stop, step, records_inputs=is_mcap(output))
     if vehicle.layout.has_only_water and "z" in result and (above := result["z"] < -AFLOAT).any():
         print_message(f"rov-fmu: {LEFT_WATER.format(f'{result.time[above.argmax()]:g}')}")
     picture = Path(mkdtemp(prefix="rov-fmu-"), "simulation.svg") if opens else plot
@@ -125,7 +125,7 @@ def check_outputs(output: Path | None, plot: Path | None, inputs: Sequence[Path]
     check_targets([(output, ""), (plot, "")], inputs, force=force)
 
 
-def run(
+def simulation_of(
     vehicle: VehicleModel,
     settings: Sequence[str],
     commands: Path | None,

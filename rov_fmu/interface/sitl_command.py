@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rov_fmu.bridges.sitl import Connection, Setup
+from rov_fmu.bridges.sitl import Setup, SitlConnection
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.equation.catalogue import HEAVE, ROLL
 from rov_fmu.equation.layout import Layout
@@ -45,7 +45,7 @@ def serve(path: Path, *, host: str, port: int, duration: float | None, **flight:
             server.bind((host, port))
         except OSError as error:
             raise InputError(f"--host {host}, --port {port}: cannot listen there: {error.strerror}") from error
-        connection = Connection(setup, lambda words: print_message(f"rov-fmu: {words}"))
+        connection = SitlConnection(setup, lambda words: print_message(f"rov-fmu: {words}"))
         address, port = server.getsockname()
         for line in _listed(setup.servos, setup.vehicle.layout):
             paragraph(console(), line)
@@ -170,7 +170,7 @@ def _floats(setup: Setup) -> str:
     )
 
 
-def _summary(connection: Connection) -> str:
+def _summary(connection: SitlConnection) -> str:
     """Return a line about the traffic and the time that it took."""
     traffic, order = connection.traffic, connection.order
     own = 1e6 * traffic.own_time / max(traffic.frames + traffic.repeated, 1)

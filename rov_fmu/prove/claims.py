@@ -50,7 +50,7 @@ CLAIMS = (
     Claim(
         "Cost of a step",
         "A step is fast, and takes about as long each time.",
-        measures.cost,
+        measures.step_cost,
         "this machine; another one has other times",
     ),
     Claim(

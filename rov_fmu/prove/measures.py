@@ -154,7 +154,7 @@ def repeatability(subject: Subject) -> Evidence:
     return Evidence(holds_if(same == _RUNS), words, f"{same} of {_RUNS}")
 
 
-def cost(subject: Subject) -> Evidence:
+def step_cost(subject: Subject) -> Evidence:
     """Measure how long a communication step takes."""
     if subject.obstacle:
         return does_not_apply(subject.obstacle)

@@ -15,7 +15,7 @@ from rov_fmu.fmu.card import not_to_use, read_card
 from rov_fmu.prove.claims import Claim, Proof
 from rov_fmu.prove.measures import Evidence
 from rov_fmu.report.console import shell_words
-from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
+from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_step_deviations
 from rov_fmu.report.plots.svg import inline_svg, with_even_text
 from rov_fmu.report.templates import number, page
 
@@ -23,7 +23,7 @@ _SIZE = 3.7, 2.0
 """The size of a plot, inches."""
 _PLOTS: Mapping[str, Callable[..., None]] = {
     "Expected results": plot_expected,
-    "Step size": plot_steps,
+    "Step size": plot_step_deviations,
     "Cost of a step": plot_cost,
 }
 """The plot of a claim, by its name."""

@@ -57,9 +57,9 @@ def page(template: str, **content: object) -> str:
         made=today(),
         version=__version__,
         number=number,
-        text=text,
+        text=number_text,
         unit=pretty_unit,
-        with_interval=with_interval,
+        with_interval=shown_interval,
         sentence=sentence,
         readable=readable,
         palette=PALETTE,
@@ -80,10 +80,10 @@ def number(value: float | None, digits: int | None = None) -> str:
     return _with_signs(repr(value).removesuffix(".0") if is_short else f"{value:.{digits or 6}g}")
 
 
-def with_interval(value: float, interval: tuple[float, float] | None) -> list[str]:
+def shown_interval(value: float, interval: tuple[float, float] | None) -> list[str]:
     """Return a value and the ends of its interval for readers, with digits that suit the interval."""
     texts = numbers.with_interval(value, interval)
-    return [_with_signs(text).replace("inf", "∞").replace("nan", "–") for text in texts]
+    return [_with_signs(number_text).replace("inf", "∞").replace("nan", "–") for number_text in texts]
 
 
 def _with_signs(text: str) -> str:
@@ -95,7 +95,7 @@ def _with_signs(text: str) -> str:
     return text.replace("-", "−")
 
 
-def text(value: float | None, form: str) -> str:
+def number_text(value: float | None, form: str) -> str:
     """Return a number in a format with typographic signs, or a dash for None and NaN."""
     if value is None or isnan(value):
         return "–"
@@ -122,7 +122,7 @@ def pretty_unit(unit: str) -> str:
     return {"1": "1", "us": "µs", "deg": "°", "deg/s": "°/s"}.get(unit) or unit.translate(RAISED).replace(".", "·")
 
 
-def in_words(quantity: str, unit: str) -> str:
+def panel_title(quantity: str, unit: str) -> str:
     """Return the title of a panel: the quantity in words, and its unit if there is one."""
     return with_unit(f"{quantity[:1].upper()}{quantity[1:]}", unit)
 

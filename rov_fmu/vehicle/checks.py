@@ -226,7 +226,7 @@ def check_tables_of_thrust(parts: Tables) -> Iterator[str]:
         )
 
 
-def _check_keys_of_thrust(place: str, curve: schema.Curve) -> Iterator[str]:
+def _check_keys_of_thrust(place: str, curve: schema.CurveTable) -> Iterator[str]:
     """Check that a curve has either coefficients or tables, and both keys of its voltage or neither."""
     given = given_quantities(curve, CURVE)
     if curve.table and curve.tables:

@@ -10,7 +10,7 @@ from rov_fmu.io.columns import FORCE_UNITS
 from rov_fmu.io.messages import only
 from rov_fmu.io.toml_file import Finite, Strict, rule
 from rov_fmu.vehicle.quantity import Quantity
-from rov_fmu.vehicle.schema import Curve
+from rov_fmu.vehicle.schema import CurveTable
 
 USUAL_SQUARE = 0.8
 """The usual share of the thrust at full command that grows with the square of the command."""
@@ -35,7 +35,7 @@ class FullThrust(Strict):
     unit: Annotated[str, AfterValidator(_unit)]
 
 
-class CurveToFit(Curve):
+class CurveToFit(CurveTable):
     """A thrust curve in rov.toml, whose numbers are fitted."""
 
     thrust: FullThrust | None = None

@@ -38,7 +38,7 @@ from rov_fmu.equation.catalogue import (
     declarations_of,
 )
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import SourcedVector, Table, Vector, VehicleAxis
+from rov_fmu.equation.parts import CommandTable, SourcedVector, Vector, VehicleAxis
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.paths import inside_or_shipped
 from rov_fmu.io.toml_file import (
@@ -134,7 +134,7 @@ def _pulses(given: object) -> tuple[float, ...]:
     return tuple(usable)
 
 
-class Commands(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
+class CommandsTable(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
     """The dead time and the form of the commands."""
 
     model_config = DOCUMENTED
@@ -176,8 +176,8 @@ def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
 
 
 _TEXT = WithJsonSchema({"type": "string"})
-_Thrust = Annotated[InstanceOf[Table], _file_read_by(read_thrust), _TEXT]
-_Current = Annotated[InstanceOf[Table], _file_read_by(read_current), _TEXT]
+_Thrust = Annotated[InstanceOf[CommandTable], _file_read_by(read_thrust), _TEXT]
+_Current = Annotated[InstanceOf[CommandTable], _file_read_by(read_current), _TEXT]
 
 
 _Volts = Annotated[Finite, Field(ge=0.1, le=1000.0)]
@@ -208,7 +208,7 @@ _RISING = rule(
 )
 
 
-class Curve(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
+class CurveTable(_coefficients("Curve", _CURVE, needed=False)):  # type: ignore[misc]
     """A thrust curve: a_t m² + b_t m, where m is the command beyond the dead band, or a measured table. In reverse the
     coefficients hold as ahead, unless the curve has its own there."""
 
@@ -319,7 +319,7 @@ class Position(Strict):
     """Where the value comes from."""
 
 
-class Actuator(Strict):
+class ActuatorTable(Strict):
     """A thruster or a fin."""
 
     name: Symbol
@@ -340,7 +340,7 @@ class Actuator(Strict):
 _THRUSTER = {key: kind.filled(thruster="thruster") for key, kind in THRUSTER.items()}
 
 
-class Thruster(_coefficients("Thruster", _THRUSTER, base=Actuator)):  # type: ignore[misc]
+class ThrusterTable(_coefficients("Thruster", _THRUSTER, base=ActuatorTable)):  # type: ignore[misc]
     """A thruster: its curve, its direction and its place."""
 
     model_config = DOCUMENTED
@@ -358,7 +358,7 @@ class Thruster(_coefficients("Thruster", _THRUSTER, base=Actuator)):  # type: ig
 _FIN = {key: kind.filled(fin="fin") for key, kind in FIN.items()}
 
 
-class Fin(_coefficients("Fin", _FIN, base=Actuator)):  # type: ignore[misc]
+class FinTable(_coefficients("Fin", _FIN, base=ActuatorTable)):  # type: ignore[misc]
     """A control surface: its lift is `lift` u|u| δ, its drag is `drag` u|u| δ², and its angle δ is angle_max times the
     command."""
 
@@ -375,7 +375,7 @@ class Place(Position):
     """The position from the origin of the body frame: forward, starboard, down."""
 
 
-class Point(Strict):
+class PointTable(Strict):
     """A point of the vehicle at which forces act on it, such as that of a tether."""
 
     name: Symbol
@@ -395,7 +395,7 @@ class Point(Strict):
         return parts.Point(name=self.name, description=self.description)
 
 
-class Battery(Strict):
+class BatteryTable(Strict):
     """The battery, if thrust depends on its voltage."""
 
     voltage: quantity("Battery_voltage", Declaration("V", "Voltage of the battery", 0.1, 1000.0))  # type: ignore[valid-type]
@@ -473,16 +473,16 @@ class Tables(Strict):
 
     body: Body | None = None
     arm: Arm | None = None
-    curves: dict[Symbol, Curve] = Field(default={}, max_length=MOST)
+    curves: dict[Symbol, CurveTable] = Field(default={}, max_length=MOST)
     """The thrust curves by name."""
-    thruster: list[Thruster] = Field(default=[], max_length=MOST)
+    thruster: list[ThrusterTable] = Field(default=[], max_length=MOST)
     """The thrusters, in the order of their variables in the FMU."""
-    fin: list[Fin] = Field(default=[], max_length=MOST)
+    fin: list[FinTable] = Field(default=[], max_length=MOST)
     """The control surfaces."""
-    point: list[Point] = Field(default=[], max_length=MOST)
+    point: list[PointTable] = Field(default=[], max_length=MOST)
     """The points at which forces act."""
-    battery: Battery | None = None
-    commands: Commands | None = None
+    battery: BatteryTable | None = None
+    commands: CommandsTable | None = None
     surface: Surface | None = None
     current: Passing = "carries"
     """What a current that changes does with the vehicle: `"carries"`, so that it keeps its velocity through the water,
@@ -529,7 +529,7 @@ class Tables(Strict):
         tables: Any = dict(self) | {key: {one.name: one for one in ones} for key, ones in lists.items()}
 
         def entry(table: Any, key: str) -> Any:
-            table = table.coordinates if isinstance(table, Point) else table
+            table = table.coordinates if isinstance(table, PointTable) else table
             return table.get(key) if isinstance(table, dict) else getattr(table, key, None)
 
         return {name: reduce(entry, keys, tables) for name, keys in of.keys_in_file.items()}

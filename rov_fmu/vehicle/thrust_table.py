@@ -6,7 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 from statistics import fmean
 
-from rov_fmu.equation.parts import Table
+from rov_fmu.equation.parts import CommandTable
 from rov_fmu.io.columns import BEYOND, COMMANDS, FORCE_UNITS, Column, read_columns
 from rov_fmu.io.csv_table import DataFileError
 
@@ -18,7 +18,7 @@ _WIDEST = 0.05
 """The largest part of the commands that a table may leave out at each end."""
 
 
-def read_thrust(path: Path) -> Table:
+def read_thrust(path: Path) -> CommandTable:
     """Read a CSV file with the columns command [1], [%], [us] or [N 50], and thrust [N], [kgf] or [lbf].
 
     Raises DataFileError. Rows with equal commands become one point with their mean thrust. The table has no name yet.
@@ -33,7 +33,7 @@ def read_thrust(path: Path) -> Table:
     return thrust_table(commands, forces, path)
 
 
-def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path | None = None) -> Table:
+def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path | None = None) -> CommandTable:
     """Return the table with a force (N) at each command: a monotone cubic between them (Fritsch and Butland 1984).
 
     Beyond the outermost points, the thrust continues with their slopes to the commands -1 and 1.
@@ -48,10 +48,10 @@ def thrust_table(points: Sequence[float], at_points: Sequence[float], path: Path
         if command != end
     ]
     commands, forces, steepness = zip(*sorted(rows + ends), strict=True)
-    return Table("", commands, forces, steepness, path=path)
+    return CommandTable("", commands, forces, steepness, path=path)
 
 
-def read_current(path: Path) -> Table:
+def read_current(path: Path) -> CommandTable:
     """Read a CSV file with the columns command [1], [%], [us] or [N 50], and current [A]. Raises DataFileError.
 
     Rows with equal commands become one point with their mean current. The current is linear between the points, and
@@ -64,7 +64,7 @@ def read_current(path: Path) -> Table:
     lines = [(low, high) for low, high in pairwise(rows) if low[0] < high[0]]
     places, values = zip(*(end for line in lines for end in line), strict=True)
     slopes = [(high - low) / (to - at) for (at, low), (to, high) in lines for _ in range(2)]
-    return Table("", places, values, tuple(slopes), path=path, kind="current")
+    return CommandTable("", places, values, tuple(slopes), path=path, kind="current")
 
 
 _Points = tuple[tuple[float, ...], tuple[float, ...]]

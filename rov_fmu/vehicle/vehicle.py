@@ -17,7 +17,7 @@ from rov_fmu.equation.catalogue import ARM, YAW, Axis
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, Thruster, VehicleAxis, arm
-from rov_fmu.equation.python.printed import model_of
+from rov_fmu.equation.python.printed import printed_model
 from rov_fmu.equation.python.step import Memory, heading, step
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas, steady_name
@@ -60,7 +60,7 @@ class _Formulas:
     def __init__(self, layout: Layout) -> None:
         equation = equation_of(layout)
         self.names = equation.names
-        self.model = model_of(layout)
+        self.model = printed_model(layout)
         self.parameters = compiled(equation.parameters)
         self.thrust = compiled(equation.thrust, equation.measured)
         self.alone = {

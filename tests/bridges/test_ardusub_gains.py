@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.bridges.ardusub.files import gains_files, table_of
+from rov_fmu.bridges.ardusub.files import flight_table, gains_files
 from rov_fmu.bridges.ardusub.gains import Tuned, read_gains, tuned
 from rov_fmu.bridges.ardusub.law import FIRMWARE, ROWS, Leg, fly
 from rov_fmu.c.simulation import Array
@@ -350,7 +350,7 @@ def test_the_table_and_the_picture_show_the_same_legs(flown: Tuned) -> None:
     lines = str(files["steps.csv"]).splitlines()
     assert [line.split(",")[0] for line in lines] == ["leg", *legs]
     assert {line.count(",") for line in lines} == {9}
-    assert [*table_of(flown).columns[0].cells] == legs
+    assert [*flight_table(flown).columns[0].cells] == legs
     picture = files["steps.png"]
     assert isinstance(picture, bytes)
     assert picture[:4] == b"\x89PNG"

@@ -22,7 +22,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 import rov_fmu
-from rov_fmu.bridges.sitl import MOST_LOGS, Connection, Outputs, Setup
+from rov_fmu.bridges.sitl import MOST_LOGS, Outputs, Setup, SitlConnection
 from rov_fmu.bridges.sitl_protocol import ServoPacket, reply, servo_packet
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
@@ -60,11 +60,11 @@ def stamp(answer: bytes) -> float:
 
 
 @contextmanager
-def served(setup: Setup, hint: Callable[[str], None] = lambda _: None) -> Iterator[tuple[Connection, int]]:
+def served(setup: Setup, hint: Callable[[str], None] = lambda _: None) -> Iterator[tuple[SitlConnection, int]]:
     """Serve a vehicle in a thread, and yield the connection and its port."""
     with socket(AF_INET, SOCK_DGRAM) as server:
         server.bind(("127.0.0.1", 0))
-        connection = Connection(setup, hint)
+        connection = SitlConnection(setup, hint)
 
         def serve() -> None:
             try:
@@ -124,13 +124,13 @@ def test_the_duration_is_the_time_of_all_flights_and_of_the_silences() -> None:
     wait, again, late = [(5.0, b""), (1.0, b"")], flight[:1] * 2 + flight[1:10], [(0.0, b"late")]
     server: Any = Server(flight[:10] + wait + again + late)
     hints: list[str] = []
-    Connection(setup_of(), hints.append, server.clock).serve(server, 7.0)
+    SitlConnection(setup_of(), hints.append, server.clock).serve(server, 7.0)
     assert (server.sent, server.packets) == (20, late)
     assert hints == ["waiting for packets of ArduSub to UDP port 40000: start it with --model JSON"]
 
 
 def test_a_reply_byte_by_byte() -> None:
-    rest = Connection(setup_of(load_vehicle(SHIPPED["videoray"]), z=3.0))
+    rest = SitlConnection(setup_of(load_vehicle(SHIPPED["videoray"]), z=3.0))
     answer = rest.answer(packet(400, 0, NEUTRAL), HERE)
     assert answer == (
         b'\n{"timestamp":0.0025,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.80665]},"position":[0.0,0.0,3.0],'
@@ -145,18 +145,18 @@ def test_the_battery_of_the_reply_is_the_sum_over_the_thrusters() -> None:
 
     The file has every third point. Without a current and a voltage, ArduPilot uses its own battery.
     """
-    connection, found = Connection(setup_of()), []
+    connection, found = SitlConnection(setup_of()), []
     for count, pulses in enumerate(([1500] * 8, [0] * 8, [1896, 1700, 1300, *[1500] * 5])):
         battery = json.loads(connection.answer(packet(400, count, [*pulses, *[0] * 8]), HERE))["battery"]
         found += [battery["voltage"], battery["current"]]
     assert found == pytest.approx([16.0, 0.0, 16.0, 0.0, 16.0, 23.9 + 4.58 + 4.4], abs=0.1)
     curves = tuple(replace(curve, electric_current=None) for curve in HEAVY.layout.curves)
-    without = Connection(setup_of(replace(HEAVY, layout=replace(HEAVY.layout, curves=curves))))
+    without = SitlConnection(setup_of(replace(HEAVY, layout=replace(HEAVY.layout, curves=curves))))
     assert b"battery" not in without.answer(packet(400, 0, NEUTRAL), HERE)
 
 
 def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
-    connection = Connection(setup_of())
+    connection = SitlConnection(setup_of())
     first = connection.answer(packet(400, 7, NEUTRAL), HERE)
     assert connection.answer(packet(400, 7, NEUTRAL), HERE) == first
     assert stamp(connection.answer(packet(400, 8, NEUTRAL), HERE)) == pytest.approx(0.005)
@@ -167,7 +167,7 @@ def test_a_repeated_frame_gets_the_same_bytes_without_a_step() -> None:
 
 
 def test_the_count_goes_on_after_its_largest_value_and_a_jump_is_believed_when_it_is_repeated() -> None:
-    connection = Connection(setup_of())
+    connection = SitlConnection(setup_of())
     for count, is_answered in (
         (2**32 - 2, True),
         (2**32 - 1, True),
@@ -198,7 +198,7 @@ def test_what_an_autopilot_would_send() -> None:
 
 def test_late_packets_do_not_move_the_vehicle_and_a_restart_begins_again() -> None:
     now = [0.0]
-    connection = Connection(setup_of(z=1.0), clock=lambda: now[0])
+    connection = SitlConnection(setup_of(z=1.0), clock=lambda: now[0])
     for count in range(50):
         connection.answer(packet(400, count, [1900] * 16), HERE)
     assert connection.answer(packet(400, 45, NEUTRAL), HERE) == b""
@@ -224,7 +224,7 @@ def test_late_packets_do_not_move_the_vehicle_and_a_restart_begins_again() -> No
 def test_random_and_damaged_packets() -> None:
     """None of 10,000 of them raises anything, and the autopilot is served as before."""
     chance = random.Random(1)
-    connection = Connection(setup_of(z=1.0))
+    connection = SitlConnection(setup_of(z=1.0))
     for n in range(10_000):
         whole = bytearray(packet(chance.randrange(2**16), chance.randrange(2**32), [chance.randrange(2**16)] * 32))
         flipped = bytearray(whole)
@@ -246,7 +246,7 @@ def test_two_senders_and_old_files(tmp_path: Path) -> None:
     for name in ("dive.csv", "dive_2.csv"):
         (tmp_path / name).write_text("kept", encoding="utf-8")
     hints: list[str] = []
-    connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
+    connection = SitlConnection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
     for count in range(100):
         assert connection.answer(packet(50, count, NEUTRAL), HERE)
         assert connection.answer(packet(50, 0, NEUTRAL), THERE) == b""
@@ -265,7 +265,7 @@ def test_the_rows_of_the_logs_of_a_run_are_bounded(tmp_path: Path, monkeypatch: 
     """Two flights of 0.5 s and 2 s would have 4 and 19 rows."""
     monkeypatch.setattr("rov_fmu.bridges.sitl.MOST_ROWS", 9)
     hints: list[str] = []
-    connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
+    connection = SitlConnection(replace(setup_of(), log=tmp_path / "dive.csv"), hints.append)
     for count in (*range(25), 0, *range(100)):
         connection.answer(packet(50, count, NEUTRAL), HERE)
     connection.write_log()
@@ -309,7 +309,7 @@ def test_servos_that_do_not_fit_the_vehicle_are_named_once(
     for frames, start in ((120, START), (20, START), (120, 0.0), (20, 0.0)):
         hints: list[str] = []
         rov = SIMPLE if vehicle == "simplerov_4" else load_vehicle(SHIPPED[vehicle])
-        connection = Connection(setup_of(rov, z=9.0), hints.append)
+        connection = SitlConnection(setup_of(rov, z=9.0), hints.append)
         for count in range(frames + round(50 * start)):
             pulses = [1500 + moving * (count % 7)] * motors if count > 3 else []
             sent = started(count / 50.0 + START - start, pulses)
@@ -337,7 +337,7 @@ def test_servos_that_do_not_fit_the_vehicle_are_named_once(
 )
 def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[int]]], said: list[str]) -> None:
     hints: list[str] = []
-    connection = Connection(setup_of(load_vehicle(SHIPPED["bluerov2"]), z=9.0), hints.append)
+    connection = SitlConnection(setup_of(load_vehicle(SHIPPED["bluerov2"]), z=9.0), hints.append)
     sent = [pulses for seconds, pulses in [(START, []), *flight] for _ in range(round(50 * seconds))]
     for count, pulses in enumerate(sent):
         connection.answer(packet(50, count, started(count / 50.0, pulses)), HERE)
@@ -396,7 +396,7 @@ def rotation(phi: float, theta: float, psi: float) -> Array:
 def test_the_sensors_agree_with_each_other(name: str) -> None:
     """Specific force, gyro and velocity are the derivatives of what the other sensors tell."""
     rov = load_vehicle(SHIPPED[name])
-    connection = Connection(setup_of(rov, V_N=0.4, V_E=-0.2, z=2.0))
+    connection = SitlConnection(setup_of(rov, V_N=0.4, V_E=-0.2, z=2.0))
     pulses = [1600, 1450, 1480, 1530, 1700, 1450, 1500, 1520] + [0] * 8
     rate, at = 5000, []
     for count in range(2500):
@@ -423,7 +423,7 @@ def test_no_log_replaces_a_table_of_the_vehicle(tmp_path: Path) -> None:
     for path in (table, old):
         path.write_text("kept", encoding="utf-8")
     with patch.object(type(HEAVY), "files", [table]):
-        connection = Connection(replace(setup_of(), log=tmp_path / "dive.csv", force=True))
+        connection = SitlConnection(replace(setup_of(), log=tmp_path / "dive.csv", force=True))
         for _ in range(2):
             for count in (0, 0, *range(1, 20), 10**6):
                 connection.answer(packet(50, count, NEUTRAL), HERE)
@@ -436,7 +436,7 @@ def test_no_log_replaces_a_table_of_the_vehicle(tmp_path: Path) -> None:
 def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_variables(tmp_path: Path) -> None:
     rov = rov_fmu.load("videoray")
     setup = Setup(rov, servos_of(rov.layout, None, {1: "l", 2: "-r"}), {"u_t": 0.2}, log=tmp_path / "dive.mcap")
-    connection = Connection(setup)
+    connection = SitlConnection(setup)
     for count in range(101):
         connection.answer(packet(100, count, [2100, 1400, *[1900] * 14]), HERE)
     connection.write_log()
@@ -453,9 +453,9 @@ def test_held_and_reversed_inputs_are_those_of_a_simulation_in_a_log_of_all_vari
 
 def test_the_pulses_of_the_vehicle_file_count() -> None:
     rov = load_vehicle(SHIPPED["videoray"])
-    usual = Connection(setup_of(rov)).answer(packet(400, 0, [1700, 1900, *[1500] * 14]), HERE)
+    usual = SitlConnection(setup_of(rov)).answer(packet(400, 0, [1700, 1900, *[1500] * 14]), HERE)
     own = setup_of(pulsed(rov, (1000.0, 1500.0, 2000.0)))
-    assert Connection(own).answer(packet(400, 0, [1750, 2000, 0, *[1500] * 13]), HERE) == usual
+    assert SitlConnection(own).answer(packet(400, 0, [1750, 2000, 0, *[1500] * 13]), HERE) == usual
 
 
 @pytest.mark.parametrize(
@@ -466,7 +466,7 @@ def test_the_distance_to_the_bottom_is_that_of_a_sensor_with_a_range_of_100_m(
     bottom: float, start: dict[str, float], distance: float
 ) -> None:
     """The heading is told within half a turn."""
-    connection = Connection(replace(setup_of(HEAVY, z=5.0, **start), bottom=bottom))
+    connection = SitlConnection(replace(setup_of(HEAVY, z=5.0, **start), bottom=bottom))
     found = parsed(connection.answer(packet(400, 0, NEUTRAL), HERE))
     assert found["rng_1"] == pytest.approx([distance], abs=1e-3)
     assert found["attitude"][2] == pytest.approx(remainder(start.get("psi_0", 0.0), 2.0 * pi), abs=1e-3)

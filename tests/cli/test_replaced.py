@@ -82,7 +82,7 @@ _WORK = (
     "rov_fmu.interface.identify_command.identify",
     "rov_fmu.identify.inspection.inspected.inspect_paths",
     "rov_fmu.interface.fly_command.fly_page",
-    "rov_fmu.interface.simulate_command.run",
+    "rov_fmu.interface.simulate_command.simulation_of",
     "rov_fmu.interface.tune_command.tune",
     "rov_fmu.interface.prove_command.prove_claims",
     "rov_fmu.study.study_command.do_study",

@@ -24,7 +24,7 @@ from examples.system.system import (
 from examples.tether import draw
 from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.plan import load_system_plan
-from rov_fmu.bridges.system.run import recorded
+from rov_fmu.bridges.system.run import recorded_names
 from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
 from rov_fmu.cli import main
 from tests.bridges.system.fmus import undescribed_build
@@ -183,7 +183,7 @@ def test_engines_agree_on_the_tether_of_the_page(engine: str, tmp_path: Path) ->
     motion = np.genfromtxt(ssp.with_suffix(".csv"), delimiter=",", names=True, deletechars="")
     structure = read_ssp(ssp)
     # Those that follow an input at once are of the next step in Ecos.
-    names = [(c, name) for c, name in recorded(structure) if name not in structure.parts[c].direct]
+    names = [(c, name) for c, name in recorded_names(structure) if name not in structure.parts[c].direct]
     if engine.startswith("Ecos"):
         found = engines.by_ecos(ssp, names, 1000, 0.02)
     else:

@@ -16,7 +16,7 @@ from rov_fmu.c import compile as build_options
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Vector
-from rov_fmu.equation.units import unit_of
+from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.model_description import build_description, model_description, model_of
 from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals_and_icons
@@ -309,7 +309,9 @@ def test_every_input_and_output_is_in_one_group(kind: str) -> None:
         assert len({v.causality for v in members}) == 1
         assert [v.unit for v in members] == [variable.get("unit") for variable in group]
         (unit,) = {v.unit for v in members}
-        of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == unit_of(unit).exponents] or ["Generic"]
+        of_unit = [tag for tag, exponents in SEQUENCE.items() if exponents == parsed_unit(unit).exponents] or [
+            "Generic"
+        ]
         assert of_unit == [group.tag.removeprefix(NAMESPACE)]
     order = [[*SEQUENCE, "LinearMechanicalPort"].index(group.tag.removeprefix(NAMESPACE)) for group in every]
     assert order == sorted(order)

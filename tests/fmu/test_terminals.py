@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from lxml import etree
 
-from rov_fmu.fmu.content import Content, native_content, python_content
+from rov_fmu.fmu.content import FmuContent, native_content, python_content
 from rov_fmu.fmu.terminals import terminals_and_icons
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -15,7 +15,7 @@ from tests.fmu.test_properties import terminals_of
 
 @pytest.mark.long
 @pytest.mark.parametrize("content_of", [native_content, python_content])
-def test_the_fmu_has_them_with_their_pictures(content_of: Callable[..., Content]) -> None:
+def test_the_fmu_has_them_with_their_pictures(content_of: Callable[..., FmuContent]) -> None:
     vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
     files = content_of(vehicle, pictures(vehicle)).files
     document = files["terminalsAndIcons/terminalsAndIcons.xml"]

@@ -83,7 +83,7 @@ def test_the_experiment_with_the_most_held_inputs_is_run() -> None:
     ],
 )
 def test_why_an_fmu_cannot_be_run_is_told(given: Mapping[str, Any], reason: str) -> None:
-    for measure in (measures.step_size, measures.repeatability, measures.cost, conservation, measures.limits):
+    for measure in (measures.step_size, measures.repeatability, measures.step_cost, conservation, measures.limits):
         found = measure(subject(_unasked, **given))
         assert (found.result, found.sentence) == ("does not apply", reason)
 
@@ -185,7 +185,7 @@ def test_the_cost_of_a_step_is_its_median_with_most_of_the_steps() -> None:
         assert (method, plan.stop, steps, most) == ("durations", 4.5, 9, 1.0)
         return [*(1e-5 * n for n in range(1, 21)), 1.0]
 
-    found = measures.cost(subject(call, defaultExperiment=SimpleNamespace(stopTime="4.5", stepSize="0.5")))
+    found = measures.step_cost(subject(call, defaultExperiment=SimpleNamespace(stopTime="4.5", stepSize="0.5")))
     assert (found.result, found.figure) == ("measured", "110 µs")
     assert found.sentence == (
         "The median of 21 communication steps of 0.5 s is 110 µs; 90 % take 20 µs to 200 µs, with the call from "
@@ -195,7 +195,7 @@ def test_the_cost_of_a_step_is_its_median_with_most_of_the_steps() -> None:
     assert [bool(share) for share in found.curve["shares"]].count(True) == 21
     assert (sum(found.curve["shares"]), found.curve["shares"][-1]) == pytest.approx((1.0, 1.0 / 21.0))
     for seconds, words in ((9.99e-4, "999 µs"), (1e-3, "1 ms"), (0.999, "999 ms"), (1.0, "1 s")):
-        assert measures.cost(subject(lambda *_, seconds=seconds: [seconds])).figure == words
+        assert measures.step_cost(subject(lambda *_, seconds=seconds: [seconds])).figure == words
 
 
 # ---- Energy ----------------------------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from rov_fmu.fmu.content import web_module
-from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import BARE, ROOT
@@ -106,7 +106,7 @@ def flown_vehicle(kind: str) -> Vehicle:
 
 def write_page(path: Path, *vehicles: Vehicle, compact: bool = False) -> str:
     """Write the page on which a vehicle flies, perhaps beside another one, and return its address."""
-    flown = [Flown(vehicle, web_module(vehicle.layout)) for vehicle in vehicles]
+    flown = [FlyingVehicle(vehicle, web_module(vehicle.layout)) for vehicle in vehicles]
     path.write_text(fly_page(flown, compact=compact), encoding="utf-8")
     return path.as_uri()
 

@@ -8,7 +8,7 @@ import pytest
 from lxml import etree, html
 
 from rov_fmu.fmu.card import card, card_text
-from rov_fmu.fmu.content import Content, native_content, python_content
+from rov_fmu.fmu.content import FmuContent, native_content, python_content
 from rov_fmu.report.page.fmu_page import documentation
 from rov_fmu.report.templates import sentence
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -28,7 +28,7 @@ MOST_WORDS = 1200
     ],
 )
 def test_the_description_of_the_fmu_contains_the_card(
-    vehicle: Vehicle, content_of: Callable[..., Content], path: str
+    vehicle: Vehicle, content_of: Callable[..., FmuContent], path: str
 ) -> None:
     odd = replace(vehicle, limits=("Less than <1> & more",))
     root = etree.fromstring(content_of(odd).files["modelDescription.xml"])

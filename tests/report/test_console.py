@@ -16,7 +16,7 @@ from rov_fmu.process import exit_code
 from rov_fmu.report import console as terminal
 from rov_fmu.report.console import console, paragraph, print_end, print_table, table
 from rov_fmu.report.progress import Display, Parts, StudyParts, compiling, parts
-from rov_fmu.report.templates import in_words, number, pretty_unit, sentence, text
+from rov_fmu.report.templates import number, number_text, panel_title, pretty_unit, sentence
 
 FOREIGN = "a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
 SHOWN = r"a\x1b[31m\x9b2J\u202e[red]\nrov-fmu: forged\x07\u2028\x85\x7fb"
@@ -86,14 +86,14 @@ def test_numbers_and_words_are_written_for_readers() -> None:
     }.items():
         assert number(value) == shown
     assert [number(None), number(1234.5678, 3)] == ["–", "1.23·10³"]
-    written = [text(value, "+.1%") for value in (None, nan, -0.0004, 0.1234, -inf)]
+    written = [number_text(value, "+.1%") for value in (None, nan, -0.0004, 0.1234, -inf)]
     assert written == ["–", "–", "+0.0 %", "+12.3 %", "−∞ %"]
     plain = [terminal.text(value, ".1f") for value in (None, nan, -0.04, -0.06, -inf)]
     assert plain == ["-", "-", "0.0", "-0.1", "-inf"]
     assert sentence("all 3 of -5% (-2 deg) in 3 us") == "All 3 of −5\xa0% (−2 °) in 3 µs"
     assert sentence("log_1.csv: it lacks") == "log_1.csv: it lacks"
     assert [*map(pretty_unit, ("N.m.s2/rad2", "1", "us", "deg/s"))] == ["N·m·s²/rad²", "1", "µs", "°/s"]
-    assert [in_words("time to 63 %", "s"), in_words("force", "1")] == ["Time to 63 % (s)", "Force"]
+    assert [panel_title("time to 63 %", "s"), panel_title("force", "1")] == ["Time to 63 % (s)", "Force"]
 
 
 def test_a_table_that_is_too_wide_for_a_terminal_becomes_several_with_the_first_column(

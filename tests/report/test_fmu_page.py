@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 from lxml import html
 
-from rov_fmu.fmu.content import Content, native_content, python_content
+from rov_fmu.fmu.content import FmuContent, native_content, python_content
 from rov_fmu.report.page.fmu_page import documentation_page
 from rov_fmu.report.published import load_tables
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -97,7 +97,7 @@ def heavy_page(heavy: Vehicle) -> str:
 
 @pytest.mark.parametrize("content_of", [native_content, python_content])
 def test_nothing_of_the_videoray_stands_in_the_fmu_of_another_vehicle(
-    vehicle: Vehicle, heavy: Vehicle, heavy_page: str, content_of: Callable[..., Content]
+    vehicle: Vehicle, heavy: Vehicle, heavy_page: str, content_of: Callable[..., FmuContent]
 ) -> None:
     """Neither its name nor its pictures nor what was found of it alone."""
     assert vehicle.pictures

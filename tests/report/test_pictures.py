@@ -13,7 +13,7 @@ from lxml import etree
 from matplotlib.figure import Figure
 from matplotlib.image import imread
 
-from rov_fmu.fmu.content import Content, native_content, python_content
+from rov_fmu.fmu.content import FmuContent, native_content, python_content
 from rov_fmu.fmu.terminals import ICON
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.svg import inline_svg, with_formulas
@@ -117,7 +117,7 @@ def test_a_plot_that_cannot_be_drawn_costs_only_itself() -> None:
 
 
 @pytest.mark.parametrize("content_of", [native_content, python_content])
-def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content_of: Callable[..., Content]) -> None:
+def test_model_png_is_the_own_picture_or_else_the_icon(vehicle: Vehicle, content_of: Callable[..., FmuContent]) -> None:
     assert vehicle.pictures
     own = (vehicle.pictures / "model.png").read_bytes()
     assert len(own) < 20_000

@@ -11,7 +11,7 @@ from mpmath import mp
 from rov_fmu.equation.expression import Expression, Name, Operation, compiled, where
 from rov_fmu.equation.layout import Layout
 from rov_fmu.report.page import equations
-from rov_fmu.report.page.equations import Equations, Line, mathml, text
+from rov_fmu.report.page.equations import Equations, Line, formula_text, mathml
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.vehicles import EVERYTHING, SIX, VEHICLES, random_body, random_inputs, random_state, random_vehicle
@@ -163,4 +163,4 @@ def test_mathml_says_what_the_text_says(kind: str) -> None:
 def test_a_form_that_cannot_be_shown_is_an_error() -> None:
     choice = where(Name("u") > 3.0, 2.0, Name("w"))
     with pytest.raises(ValueError, match=r"2\.0 if u > 3\.0 else w: there is no way to show this"):
-        text(choice)
+        formula_text(choice)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import SURGE
-from rov_fmu.equation.parts import Table
+from rov_fmu.equation.parts import CommandTable
 from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.thrust_table import read_current, read_thrust
@@ -40,7 +40,7 @@ def table(folder: Path, text: str) -> Path:
     return path
 
 
-def currents_of(vehicle: Vehicle) -> list[Table]:
+def currents_of(vehicle: Vehicle) -> list[CommandTable]:
     """The electric current of each curve. All curves of these vehicles have one."""
     return [current for curve in vehicle.layout.curves if (current := curve.electric_current)]
 

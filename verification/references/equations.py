@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from rov_fmu.equation.parts import Curve, Table, Thruster
+from rov_fmu.equation.parts import CommandTable, Curve, Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
 
 Number = Any  # a float, or a number of mpmath or gmpy2
@@ -166,7 +166,7 @@ def of_voltage(rov: Vehicle, curve: Curve, voltage: Number, numbers: Any, power:
     return (max(numbers.mpf(voltage), numbers.zero) / V_0) ** (n_V * power / 2)
 
 
-def _interpolated(table: Table, command: Number, numbers: Any) -> Number:
+def _interpolated(table: CommandTable, command: Number, numbers: Any) -> Number:
     """Return the force of the monotone cubic, which SciPy computes, at a command."""
     slopes = [
         numbers.mpf(float(x)) for x in PchipInterpolator(table.commands, table.values).derivative()(table.commands)

@@ -66,7 +66,7 @@ def _parameters(tuned: Tuned, version: str, suffix: str) -> str:
     return "\n".join([*lines, ""])
 
 
-def table_of(tuned: Tuned) -> Table:
+def flight_table(tuned: Tuned) -> Table:
     """Return the table of the flight for people: with the firmware's gains, and after the arrow with these."""
     shown = table("A flight with the firmware's gains → with these", "leg", FIGURES)
     for leg, unit, cells in figures(tuned.vehicle, tuned.legs):

@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE, ROWS, Flown, Leg, Mixer, fly
+from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
 from rov_fmu.io.reading import read_text
@@ -89,7 +89,7 @@ class Tuned:
     """The values and their reasons, by the names before ArduSub 4.7. An axis without gains of its own is left out."""
     notes: Sequence[str]
     """What the reader should know: an axis that has not the gains of the rule, or gains of another vehicle."""
-    legs: Sequence[Flown]
+    legs: Sequence[FlownLeg]
     """The first vehicle has these gains, and the second one the firmware's."""
 
 
@@ -112,7 +112,7 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     push = mixer.push(vehicle, HEAVE, 0.5) if HEAVE in axes else 0.0
     legs = [leg for leg in LEGS if leg.axis in (SURGE, *axes)]
 
-    def flight(others: Sequence[tuple[Mapping[str, float], float]], gains: Mapping[str, float]) -> list[Flown]:
+    def flight(others: Sequence[tuple[Mapping[str, float], float]], gains: Mapping[str, float]) -> list[FlownLeg]:
         """Fly vehicles with delays. The second one has the firmware's gains; those after it are loaded."""
         flying = {name: np.where(np.arange(len(others)) == 1, FIRMWARE[name], value) for name, value in gains.items()}
         loads = np.where(np.arange(len(others)) < 2, 0.0, push)
@@ -156,7 +156,7 @@ def tuned(vehicle: Vehicle, given: Path | None = None) -> Tuned:
     return Tuned(vehicle, mixer.frame, gains, notes, [leg.of_first(2) for leg in flown])
 
 
-def _losses(vehicle: Vehicle, flown: Sequence[Flown]) -> Iterator[str]:
+def _losses(vehicle: Vehicle, flown: Sequence[FlownLeg]) -> Iterator[str]:
     """Yield where the gains settle later than the firmware's, by 0.2 s at least."""
     for title, _, (_, (new, old), *_) in figures(vehicle, flown):
         if new > old + 0.2:
@@ -248,7 +248,7 @@ def _variations(vehicle: Vehicle) -> list[tuple[dict[str, float], float]]:
     ]
 
 
-def _flaws(flown: Sequence[Flown], which: int | None = None) -> dict[Axis, str]:
+def _flaws(flown: Sequence[FlownLeg], which: int | None = None) -> dict[Axis, str]:
     """Return what the axes of a vehicle, or of all without the firmware's gains, do that they must not do, in words."""
     flaws: dict[Axis, str] = {}
     for leg in flown:
@@ -269,7 +269,7 @@ def _flaws(flown: Sequence[Flown], which: int | None = None) -> dict[Axis, str]:
     return flaws
 
 
-def figures(vehicle: Vehicle, legs: Sequence[Flown]) -> Iterator[tuple[str, str, Array]]:
+def figures(vehicle: Vehicle, legs: Sequence[FlownLeg]) -> Iterator[tuple[str, str, Array]]:
     """Yield for each leg what it is, its unit, and FIGURES with these gains and with the firmware's (4 x 2).
 
     The overshoot is the largest error beyond the target; ahead, the largest error. The vehicle is settled when it stays

@@ -69,7 +69,7 @@ class Leg:
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
+class FlownLeg:
     """A leg as the vehicles flew it. Where the motion of a vehicle cannot be computed, its errors are NaN."""
 
     leg: Leg
@@ -80,9 +80,9 @@ class Flown:
     fractions: Array
     """The commands from -1 to 1 (times x commands x vehicles)."""
 
-    def of_first(self, count: int) -> "Flown":
+    def of_first(self, count: int) -> "FlownLeg":
         """Return the leg of the first vehicles alone."""
-        return Flown(self.leg, *(part[..., :count].copy() for part in (self.errors, self.demands, self.fractions)))
+        return FlownLeg(self.leg, *(part[..., :count].copy() for part in (self.errors, self.demands, self.fractions)))
 
 
 class Mixer:
@@ -158,7 +158,7 @@ def fly(
     others: Sequence[Mapping[str, float]] = ({},),
     loads: Any = 0.0,
     delays: Sequence[float] | None = None,
-) -> Iterator[Flown]:
+) -> Iterator[FlownLeg]:
     """Yield the legs of a flight of vehicles that differ in some numbers only, one leg after the other.
 
     - `gains`: a number, or an array for the vehicles, by ArduSub's names; others have the firmware's.
@@ -191,4 +191,4 @@ def fly(
         errors[..., 2] -= 2.0 * pi * np.floor(errors[..., 2] / (2.0 * pi) + 0.5)
         errors[flights.failed] = nan
         demands = flown.demands[..., [AXES.index(axis) for axis in DEMANDS]] * signs
-        yield Flown(leg, *(np.moveaxis(part, 0, -1) for part in (errors, demands, flown.outputs)))
+        yield FlownLeg(leg, *(np.moveaxis(part, 0, -1) for part in (errors, demands, flown.outputs)))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from rov_fmu.bridges.autopilot.law import AXES, SENSED, SENSORS, STATE, Sharing, load_law
 from rov_fmu.bridges.sdf import Array
 from rov_fmu.c.simulation import on_cores
-from rov_fmu.c.stepper import Memory
+from rov_fmu.c.stepper import EngineMemory
 from rov_fmu.vehicle.vehicle import Vehicle
 
 
@@ -34,7 +34,7 @@ class _Flight(ctypes.Structure):
 
 
 @dataclass(frozen=True, eq=False)
-class Flown:
+class FlownSteps:
     """Some steps of a flight, as arrays of vehicles x steps x numbers."""
 
     sensors: Array
@@ -63,7 +63,7 @@ class Flights:
         Raises BuildError when the engine cannot be compiled.
         """
         count, layout = len(values), vehicle.layout
-        self._vehicles = Memory(vehicle, count)
+        self._vehicles = EngineMemory(vehicle, count)
         for n, one in enumerate(values):
             self._vehicles.begin(one, (n,))
         self._delays = np.array(delays or [0] * count, np.intp)
@@ -81,7 +81,7 @@ class Flights:
         aims: Array,
         h: float,
         inputs: Mapping[str, Any] = MappingProxyType({}),
-    ) -> Flown:
+    ) -> FlownSteps:
         """Fly steps of h > 0 seconds, one for each row of `aims`.
 
         `loops` are of the type LOOP (6, or vehicles x 6), and `modes` and `aims` have a column for each of AXES.
@@ -115,4 +115,4 @@ class Flights:
 
         on_cores(run_part, count, steps)
         self._done += steps
-        return Flown(*results)
+        return FlownSteps(*results)

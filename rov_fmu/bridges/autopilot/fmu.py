@@ -19,7 +19,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
-from rov_fmu.fmu.variables import Model, Variable
+from rov_fmu.fmu.variables import FmuModel, Variable
 from rov_fmu.io.templates import render
 
 _SHOWN = tuple(GAINS)[: tuple(GAINS).index("k_a")]
@@ -44,7 +44,7 @@ def _unit(axis: Axis, name: str) -> str:
     return units[name]
 
 
-def autopilot_model(autopilot: Autopilot) -> Model:
+def autopilot_model(autopilot: Autopilot) -> FmuModel:
     """Return the model of the FMU of an autopilot."""
     vehicle, layout = autopilot.vehicle, autopilot.vehicle.layout
     sensors = [one for one in terminals(layout) if one.name in _PLUGS]
@@ -122,7 +122,7 @@ def autopilot_model(autopilot: Autopilot) -> Model:
         f"{summary}.\nThe gains are for a step of {autopilot.step:g} s, {autopilot.delay:g} s from sensor to thrust, "
         f"and the lags {told}.\nFor each axis: {_MODES}. It samples once per step."
     )
-    return Model(
+    return FmuModel(
         *(f"{vehicle.identifier}_autopilot", vehicle.version, vehicle.source, summary, card),
         tuple(made),
         terminals_document(_terminals(layout, sensors)),

@@ -16,7 +16,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.bridges.allocation import allocation_matrix, table
+from rov_fmu.bridges.allocation import allocation_matrix, thrust_rows
 from rov_fmu.bridges.autopilot.law import AXES, LOOP, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.io.messages import InputError, listed
@@ -106,7 +106,7 @@ def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing
     curves = list(layout.curves)
     return Sharing(
         *(of_axis, to_axis, commands, tuple(_PRIORITY[axis] for axis in AXES)),
-        tables=tuple(np.array(table(vehicle, curve, None)) for curve in curves),
+        tables=tuple(np.array(thrust_rows(vehicle, curve, None)) for curve in curves),
         table_of=tuple(curves.index(layout.curve_of[one.name]) for one in layout.thrusters),
         attitude=layout.has_attitude,
         pulse=pulse_of(layout),

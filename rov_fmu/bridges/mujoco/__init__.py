@@ -33,7 +33,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
-from rov_fmu.report.plots.geometry import place
+from rov_fmu.report.plots.geometry import thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:
@@ -132,9 +132,9 @@ def mujoco_texts(
     }
     notes = tuple(_notes(vehicle))
     files = {
-        "README.md": sdf.written("mujoco.md.j2", vehicle, notes, **content),
-        "vehicle.xml": sdf.written("mujoco.xml.j2", vehicle, notes, **content),
-        "scene.xml": sdf.written("scene.xml.j2", vehicle, notes, **content),
+        "README.md": sdf.rendered_model("mujoco.md.j2", vehicle, notes, **content),
+        "vehicle.xml": sdf.rendered_model("mujoco.xml.j2", vehicle, notes, **content),
+        "scene.xml": sdf.rendered_model("scene.xml.j2", vehicle, notes, **content),
         "__init__.py": _PACKAGE,
         "__main__.py": _MAIN.format(package=package),
         _PLUGIN.name: _PLUGIN.read_text(encoding="utf-8"),
@@ -208,7 +208,7 @@ def _point(vehicle: Vehicle, point: Point) -> dict[str, object]:
 
 def _drawn(vehicle: Vehicle, thruster: Thruster, radius: float) -> dict[str, object]:
     """Return where and how a thruster is drawn, in MuJoCo's frame."""
-    position, direction = _FLIP * place(vehicle, thruster), _FLIP * thruster.direction.value
+    position, direction = _FLIP * thruster_place(vehicle, thruster), _FLIP * thruster.direction.value
     ends = np.concatenate([position - radius * direction, position + radius * direction])
     return {"name": thruster.name, "position": position, "direction": direction, "radius": radius, "ends": ends}
 

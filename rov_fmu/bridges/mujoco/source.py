@@ -13,7 +13,7 @@ from rov_fmu.equation.attitude import ROTATION
 from rov_fmu.equation.catalogue import AXES, CURRENT, CURRENT_DOWN
 from rov_fmu.equation.expression import ZERO, Expression, to_c
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Table
+from rov_fmu.equation.parts import CommandTable
 from rov_fmu.equation.python.printed import TIME, accelerations_of, arrived, lagging
 from rov_fmu.io.paths import FMU_SRC
 
@@ -140,7 +140,7 @@ def _array(kind: str, name: str, values: Iterable[object]) -> str:
     return f"static const {kind} {name}[] = {{{', '.join(map(str, values)) or 0}}};"
 
 
-def _tables(tables: Mapping[str, Table]) -> str:
+def _tables(tables: Mapping[str, CommandTable]) -> str:
     """Print the functions of the thrust tables."""
     text = '#include "table.c"\n' if tables else ""
     for name, table in tables.items():

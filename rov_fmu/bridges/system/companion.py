@@ -13,7 +13,7 @@ from xml.etree.ElementTree import Element, SubElement, tostring
 
 from rov_fmu.bridges.system.companions import _common
 from rov_fmu.equation.parts import Point
-from rov_fmu.equation.units import unit_of
+from rov_fmu.equation.units import parsed_unit
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.python_flavour import python_files
 from rov_fmu.fmu.terminals import FOLDER, Terminal, port_of, terminals_document
@@ -93,7 +93,7 @@ def _description(made: Any, sources: Mapping[str, str]) -> bytes:
     for unit in sorted({unit for _, _, unit, _ in made.variables.values()}):
         defined = SubElement(definitions, "Unit", name=unit)
         try:
-            exponents = unit_of(unit).exponents
+            exponents = parsed_unit(unit).exponents
         except KeyError:  # a unit that no vehicle has
             continue
         SubElement(defined, "BaseUnit", {base: str(exponent) for base, exponent in exponents.items()})
@@ -121,7 +121,7 @@ def _terminals(made: Any) -> list[Terminal]:
     return found
 
 
-def rows_of(path: Path, columns: tuple[str, ...]) -> Rows:
+def timed_rows(path: Path, columns: tuple[str, ...]) -> Rows:
     """Return the rows of a table by their times, with the depth first. Raises DataFileError."""
     series = read_series(path, lambda name: None if name in columns else f"must be one of {', '.join(columns)}")
     if missing := [name for name in columns[1:-1] if name not in series]:

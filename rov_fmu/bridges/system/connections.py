@@ -33,7 +33,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
     ends = [_end(text, parts) for text in (first, second)]
     is_port = [name not in parts[component].variables for component, name in ends]
     if is_port == [False, False]:
-        return [checked(Connection(ends[0], ends[1], factor), parts)]
+        return [checked_connection(Connection(ends[0], ends[1], factor), parts)]
     if is_port != [True, True]:
         port, variable = (first, second) if is_port[0] else (second, first)
         raise MismatchError(f"{port} is a terminal and {variable} a variable: a terminal joins a terminal")
@@ -58,7 +58,7 @@ def connected(first: str, second: str, factor: float, parts: Mapping[str, Part])
         both = [parts[component].factor(port, member) for component, port in ends]
         if causalities[0] == "input":
             pair, both = pair[::-1], both[::-1]
-        found.append(checked(Connection(pair[0], pair[1], both[0] / both[1]), parts))
+        found.append(checked_connection(Connection(pair[0], pair[1], both[0] / both[1]), parts))
     return found
 
 
@@ -73,7 +73,7 @@ def _end(text: str, parts: Mapping[str, Part]) -> tuple[str, str]:
     return component, name
 
 
-def checked(one: Connection, parts: Mapping[str, Part]) -> Connection:
+def checked_connection(one: Connection, parts: Mapping[str, Part]) -> Connection:
     """Return a connection if its ends exist, and causalities, types and units fit. Raises MismatchError."""
     for component, name in (one.start, one.end):
         if component not in parts:

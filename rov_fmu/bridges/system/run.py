@@ -1,4 +1,4 @@
-"""Run a system from its start to its end, in a child process, as a table and as a plot."""
+"""SystemRun a system from its start to its end, in a child process, as a table and as a plot."""
 
 from collections.abc import Sequence
 from contextlib import ExitStack, closing
@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.bridges.system.half_step import HalfStep
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
-from rov_fmu.bridges.system.ssp import Structure
+from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.fmus.description import TIME_LIMIT, budget
 from rov_fmu.fmus.instance import Array, RunError
@@ -28,7 +28,7 @@ _MOST = 100_000_000
 """The most values of a run, which are in memory."""
 
 
-class Run(NamedTuple):
+class SystemRun(NamedTuple):
     """What a run gave."""
 
     rows: Array
@@ -37,7 +37,7 @@ class Run(NamedTuple):
     """What the FMUs warned of."""
 
 
-def recorded(structure: Structure) -> list[Name]:
+def recorded_names(structure: SystemStructure) -> list[Name]:
     """Return all outputs of a system that are numbers."""
     return [
         (component, name)
@@ -47,22 +47,22 @@ def recorded(structure: Structure) -> list[Name]:
     ]
 
 
-def passed(structure: Structure) -> list[Name]:
+def passed(structure: SystemStructure) -> list[Name]:
     """Return the outputs that are connected and are numbers."""
     starts = {one.start for one in structure.connections}
-    return [name for name in recorded(structure) if name in starts]
+    return [name for name in recorded_names(structure) if name in starts]
 
 
 def run_system(
-    structure: Structure,
+    structure: SystemStructure,
     path: Path,
     read: Sequence[Name],
     step: float,
     steps: int,
     on_progress: Progress = silent,
     parts: int = 1,
-) -> Run:
-    """Run a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
+) -> SystemRun:
+    """SystemRun a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
 
     Raises FileError about the path.
     """
@@ -91,10 +91,10 @@ def run_system(
         except (ChildError, RunError) as error:
             who = f"{busy(folder, structure.parts)} " if isinstance(error, ChildError) else ""
             raise FileError(f"{path}: the system cannot be run: {who}{error}") from error
-    return Run(np.concatenate(rows), warnings)
+    return SystemRun(np.concatenate(rows), warnings)
 
 
-def table(read: Sequence[Name], step: float, rows: Array, half: HalfStep | None = None) -> bytes:
+def system_csv(read: Sequence[Name], step: float, rows: Array, half: HalfStep | None = None) -> bytes:
     """Return the rows as CSV, with the time first, and at the end what half the step changes."""
     columns = [[n * step for n in range(len(rows))], *rows.T.tolist(), *([half.shares.tolist()] if half else [])]
     header = ",".join(["time", *map(".".join, read), *(["half_step"] if half else [])])
@@ -102,7 +102,7 @@ def table(read: Sequence[Name], step: float, rows: Array, half: HalfStep | None 
     return "\n".join([header, *lines, ""]).encode()
 
 
-def picture(structure: Structure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
+def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
     """Return the plot of some variables, or of those that change and pass between the components: one panel a unit."""
     columns = {".".join(name): n for n, name in enumerate(read)}
     passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns

@@ -10,7 +10,7 @@ from typing import Any
 
 from lxml import etree
 
-from rov_fmu.bridges.system.connections import Connection, checked
+from rov_fmu.bridges.system.connections import Connection, checked_connection
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmus.unpacking import unpack_fmu
@@ -112,7 +112,7 @@ def _rendered(template: str, **content: Component | System) -> str:
 
 
 @dataclass(frozen=True)
-class Structure:
+class SystemStructure:
     """A system that was read."""
 
     parts: Mapping[str, Part]
@@ -123,7 +123,7 @@ class Structure:
     """The paths of the FMUs in the archive that was read."""
 
 
-def read_ssp(path: Path) -> Structure:
+def read_ssp(path: Path) -> SystemStructure:
     """Read an SSP 1.0 whose components are FMUs, without systems in the system. Raises FileError."""
     check_suffix(path, SYSTEM)
     with temporary_folder("ssp-") as unpacked:
@@ -137,7 +137,7 @@ def read_ssp(path: Path) -> Structure:
             raise FileError(f"{path}: {error}") from error
 
 
-def _structure(folder: Path, path: Path) -> Structure:
+def _structure(folder: Path, path: Path) -> SystemStructure:
     """Return the system in a folder. Raises FileError, or ValueError with only the reason."""
     root = _root(folder, _STRUCTURE)
     parts: dict[str, Part] = {}
@@ -164,7 +164,7 @@ def _structure(folder: Path, path: Path) -> Structure:
     if not parts:
         raise ValueError(f"{_STRUCTURE}: has no component")
     connections = [_connection(one, parts) for one in root.iterfind("{*}System/{*}Connections/{*}Connection")]
-    return Structure(parts, values, connections, sources)
+    return SystemStructure(parts, values, connections, sources)
 
 
 def _file(folder: Path, name: str) -> Path:
@@ -211,4 +211,4 @@ def _connection(one: Any, parts: Mapping[str, Part]) -> Connection:
     factor = 1.0 if changed is None else float(changed.get("factor", 1.0))
     if (changed is not None and float(changed.get("offset", 0.0))) or not isfinite(factor):
         raise ValueError(f"the connection from {start}.{output}: only a finite factor without an offset is read")
-    return checked(Connection((start, output), (end, name), factor), parts)
+    return checked_connection(Connection((start, output), (end, name), factor), parts)

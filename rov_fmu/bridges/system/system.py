@@ -14,7 +14,7 @@ from platformdirs import user_cache_path
 from rov_fmu import __version__
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
 from rov_fmu.bridges.autopilot.gains import autopilot_of
-from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, rows_of, slave_of
+from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, slave_of, timed_rows
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,
     VELOCITIES,
@@ -26,7 +26,7 @@ from rov_fmu.bridges.system.connections import (
 )
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.plan import SOURCES, ComponentTable, SystemPlan, SystemPlanError
-from rov_fmu.bridges.system.ssp import Component, Structure, System
+from rov_fmu.bridges.system.ssp import Component, System, SystemStructure
 from rov_fmu.build import build_fmu
 from rov_fmu.c.compile import compiler_identity, host_platform
 from rov_fmu.equation.catalogue import before_name
@@ -51,7 +51,7 @@ _MOST_BYTES = 1_000_000_000
 """The most bytes of all FMUs, which are in memory."""
 
 
-def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda _: None) -> Structure:
+def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda _: None) -> SystemStructure:
     """Return the system of a plan, which was read from a path. `on_part` is called with each component.
 
     Raises SystemPlanError with every reason, FileError about a vehicle, BuildError if its FMU cannot be built.
@@ -86,7 +86,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         built = replace(described, content=_built(vehicle))
         parts |= {other: built for other, part in parts.items() if part is described}
         _check_size(parts, name, path)
-    return Structure(parts, values, connections)
+    return SystemStructure(parts, values, connections)
 
 
 def _parts(
@@ -162,7 +162,7 @@ def _tables(plan: SystemPlan, path: Path, unread: list[str]) -> dict[str, Rows]:
             try:
                 if not columns:
                     raise FileError(f"{path}: component.{name}.file: the companion {table.companion} takes no file")
-                found[name] = rows_of(inside(path.parent, table.file), columns)
+                found[name] = timed_rows(inside(path.parent, table.file), columns)
             except FileError as error:
                 unread.append(str(error))
     return found
@@ -381,7 +381,7 @@ def _waves_that_pass(plan: SystemPlan, parts: Mapping[str, Part], connections: S
             yield f"connect: {sea}.current moves {rov}, whose vehicle file {reason}"
 
 
-def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
+def unconnected(plan: SystemPlan, structure: SystemStructure) -> Iterator[str]:
     """Yield a sentence for each port, and each component with other inputs, that the plan neither connects nor sets."""
     ends = {one.end for one in structure.connections}
     for component, part in structure.parts.items():
@@ -402,7 +402,7 @@ def unconnected(plan: SystemPlan, structure: Structure) -> Iterator[str]:
             yield f"{component}: nothing is connected to {names}, which keep their start values"
 
 
-def files_of(plan: SystemPlan, structure: Structure, name: str) -> System:
+def files_of(plan: SystemPlan, structure: SystemStructure, name: str) -> System:
     """Return the system as the writers of SSP and OSP take it.
 
     Only inputs that are connected are connectors, because FMPy sets every one of them at every step.

@@ -13,8 +13,8 @@ from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name
 from rov_fmu.bridges.system.plan import SystemPlan, SystemPlanError, load_system_plan
-from rov_fmu.bridges.system.run import passed, picture, recorded, run_system, table
-from rov_fmu.bridges.system.ssp import Structure, is_unchanged, ssp_content
+from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system, system_csv
+from rov_fmu.bridges.system.ssp import SystemStructure, is_unchanged, ssp_content
 from rov_fmu.bridges.system.system import files_of, made, unconnected
 from rov_fmu.fmus.instance import Array
 from rov_fmu.io.file_kinds import SYSTEM
@@ -50,7 +50,7 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
             shown.print(sentence)
         outputs = [Output(output, ssp_content(files_of(plan, structure, output.stem)))]
         if runs:
-            read = list(dict.fromkeys([*recorded(structure), *plan.plotted]))
+            read = list(dict.fromkeys([*recorded_names(structure), *plan.plotted]))
             rows, warnings = run_system(structure, path, read, plan.step, plan.steps, shown.begin("running"))
             for warning in warnings:
                 shown.print(f"warning: {warning}")
@@ -59,7 +59,7 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
             motion, plot = results
             drawing = picture(structure, read, plan.plot, plan.step, rows)
             outputs += [
-                Output(motion, table(read, plan.step, rows, half)),
+                Output(motion, system_csv(read, plan.step, rows, half)),
                 Output(plot, sealed(drawing, "system").encode()),
             ]
     files = write_whole(*outputs, force=force, is_ours=is_ours)
@@ -69,7 +69,7 @@ def write_system(path: Path, output: Path, *, runs: bool, force: bool) -> None:
 
 
 def _half_step(
-    structure: Structure, plan: SystemPlan, path: Path, found: Mapping[Name, Array], shown: Parts
+    structure: SystemStructure, plan: SystemPlan, path: Path, found: Mapping[Name, Array], shown: Parts
 ) -> tuple[HalfStep | None, Table | None]:
     """Return what half the step changes of the values `found`, also as a table. None, with a line, if it cannot run."""
     names = passed(structure)

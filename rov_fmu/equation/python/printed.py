@@ -13,7 +13,7 @@ from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
 from ..catalogue import AXES
 from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
 from ..layout import Layout
-from ..parts import Table
+from ..parts import CommandTable
 from ..terms import Equation, Term, equation_of, mass_matrix, rate_formula
 from .step import interpolated
 
@@ -89,7 +89,7 @@ def motion(_numbers):
 
 
 @lru_cache(maxsize=100)
-def model_of(layout: Layout) -> ModuleType:
+def printed_model(layout: Layout) -> ModuleType:
     """Return the module of a vehicle."""
     module = ModuleType("equation")
     module.__dict__.update({name: getattr(math, name) for name in _IMPORTED}, interpolated=interpolated)
@@ -257,7 +257,7 @@ def _reversals(equation: Equation) -> Iterable[str]:
     return (f", {written(x, PYTHON, _value)}" for x in reversals(equation))
 
 
-def _tables(tables: Mapping[str, Table]) -> str:
+def _tables(tables: Mapping[str, CommandTable]) -> str:
     """Print the functions of tables."""
     return "".join(
         f"""

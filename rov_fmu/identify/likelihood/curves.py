@@ -20,7 +20,7 @@ from rov_fmu.equation.alone import RISE, alone_formulas, closed_form, stopping_f
 from rov_fmu.equation.catalogue import REVERSE, Axis, delayed_name
 from rov_fmu.equation.expression import ARRAYS, array_functions, compiled
 from rov_fmu.equation.layout import Layout
-from rov_fmu.equation.parts import Curve, Table
+from rov_fmu.equation.parts import CommandTable, Curve
 from rov_fmu.equation.terms import equation_of
 from rov_fmu.equation.thrust import curve_formulas
 from rov_fmu.tank.arrays import Array
@@ -150,7 +150,7 @@ _IN_ARRAYS = array_functions(np)
 _closed_form = compiled({**closed_form(), "distance": stopping_formula()}, _IN_ARRAYS, ARRAYS)
 
 
-def _tables(tables: Iterable[Table]) -> dict[str, Callable[..., Any]]:
+def _tables(tables: Iterable[CommandTable]) -> dict[str, Callable[..., Any]]:
     return _IN_ARRAYS | {table.function: np.vectorize(table.value, otypes=[float]) for table in tables}
 
 

@@ -41,7 +41,7 @@ class Line:
 
     def __str__(self) -> str:
         """Return the equation as plain text."""
-        return f"{text(self.left)} = {text(self.right)}"
+        return f"{formula_text(self.left)} = {formula_text(self.right)}"
 
 
 @dataclass(frozen=True)
@@ -289,7 +289,7 @@ def symbol_of(name: Name) -> Symbol:
     return Symbol(_LETTERS.get(head, head), index, upper, mark)
 
 
-def text(x: Expression) -> str:
+def formula_text(x: Expression) -> str:
     """Write a formula as plain text, with the names of the FMU's variables."""
 
     def name_of(name: Name) -> str:

@@ -24,7 +24,7 @@ from rov_fmu.fmu.reference_results import TOLERANCE
 from rov_fmu.fmu.variables import variables
 from rov_fmu.io.messages import listed
 from rov_fmu.report.page import equations
-from rov_fmu.report.page.live import Flown, live
+from rov_fmu.report.page.live import FlyingVehicle, live
 from rov_fmu.report.page.pictures import pictures
 from rov_fmu.report.plots.drawing import draw_thrusters
 from rov_fmu.report.plots.geometry import scenes
@@ -104,7 +104,7 @@ def documentation_page(
         parts=equations.parts_in_mathml,
         choices=equations.choices,
         unplaced=[t.name for t in layout.thrusters if t.position is None and not t.arm],
-        live=live([Flown(vehicle, module)]) if module and layout.actuators else None,
+        live=live([FlyingVehicle(vehicle, module)]) if module and layout.actuators else None,
         tables=[(table, _agreement(table)) for table in tables.values()],
         start=start,
         tolerance=f"{TOLERANCE:g}",
@@ -137,7 +137,7 @@ def documentation_page(
 
 
 @dataclass(frozen=True)
-class Motion:
+class HeldMotion:
     """The motion that held commands lead to, along one axis and in one direction."""
 
     axis: Axis
@@ -151,7 +151,7 @@ class Motion:
     """The other axes that the last command pushes too, and the force or torque along them."""
 
 
-def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[Motion]:
+def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Iterator[HeldMotion]:
     """Yield the motion along an axis, for each direction if they differ. The commands are in percent."""
     directions = [(1.0, "")]
     if differs_by_direction(vehicle, axis):
@@ -160,7 +160,7 @@ def _motions(vehicle: Vehicle, axis: Axis, commands: Sequence[Decimal]) -> Itera
         signs = {name: sign * one for name, one in vehicle.layout.signs(axis).items()}
         fractions = [sign * float(c) / 100.0 for c in commands]
         responses = [vehicle.response(axis, fraction) for fraction in fractions]
-        yield Motion(axis, words, signs, responses, list(vehicle.side_effects(axis, fractions[-1])))
+        yield HeldMotion(axis, words, signs, responses, list(vehicle.side_effects(axis, fractions[-1])))
 
 
 def differs_by_direction(vehicle: Vehicle, axis: Axis) -> bool:

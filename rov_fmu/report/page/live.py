@@ -17,7 +17,7 @@ from rov_fmu.equation.catalogue import PITCH, ROLL, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.fmu.variables import variables
-from rov_fmu.report.plots.geometry import place, size_of
+from rov_fmu.report.plots.geometry import size_of, thruster_place
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit
 from rov_fmu.tank.catalogue import as_json
@@ -53,7 +53,7 @@ Slider = tuple[str, str, float, float, float, str, str]
 
 
 @dataclass(frozen=True)
-class Flown:
+class FlyingVehicle:
     """A vehicle and its WebAssembly module."""
 
     vehicle: Vehicle
@@ -97,7 +97,7 @@ class Live:
     """The recording that is flown at first as JSON, if there is one."""
 
 
-def live(flown: Sequence[Flown], recording: Mapping[str, Any] | None = None) -> Live:
+def live(flown: Sequence[FlyingVehicle], recording: Mapping[str, Any] | None = None) -> Live:
     """Return the content that flies the first of these vehicles, with a recording if there is one. Raises
     DataFileError."""
     pilot = flown[0].vehicle
@@ -133,7 +133,7 @@ def _json(data: Any) -> Markup:
     return Markup(json.dumps(data, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c"))
 
 
-def _names(flown: Sequence[Flown]) -> list[str]:
+def _names(flown: Sequence[FlyingVehicle]) -> list[str]:
     """Return the names of the vehicles. Equal names also have the version or the file."""
     plain = [one.vehicle.name for one in flown]
     versions = [f"{one.vehicle.name} {one.vehicle.version}" for one in flown]
@@ -141,7 +141,9 @@ def _names(flown: Sequence[Flown]) -> list[str]:
     return next((names for names in (plain, versions, files) if len({*names}) == len(names)), plain)
 
 
-def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mapping[str, Any] | None = None) -> str:
+def fly_page(
+    flown: Sequence[FlyingVehicle], *, compact: bool = False, recording: Mapping[str, Any] | None = None
+) -> str:
     """Return a page that has only the live section: the first vehicle and the second one as a ghost.
 
     A recording (`recording_of`) is flown at once.
@@ -164,7 +166,7 @@ def fly_page(flown: Sequence[Flown], *, compact: bool = False, recording: Mappin
     )
 
 
-def _data(flown: Flown) -> dict[str, Any]:
+def _data(flown: FlyingVehicle) -> dict[str, Any]:
     """Return the data of a vehicle for the scripts."""
     vehicle, layout, labels = flown.vehicle, flown.vehicle.layout, _labels(flown.vehicle)
     return {
@@ -270,7 +272,7 @@ def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any
         "force": f"F_{thruster.name}",
         "commands": list(vehicle.layout.gains[thruster.name]),
         "label": label,
-        "at": place(vehicle, thruster),
+        "at": thruster_place(vehicle, thruster),
         "along": thruster.direction.value,
         "most": most or 1.0,
     }
@@ -291,7 +293,7 @@ def _labels(vehicle: Vehicle) -> dict[str, str]:
 
 
 def _label(vehicle: Vehicle, thruster: Thruster) -> str:
-    x, y, _ = place(vehicle, thruster)
+    x, y, _ = thruster_place(vehicle, thruster)
     least = 0.2 * size_of(vehicle)
     words = [
         "left" if y < -least else "right" if y > least else "",

@@ -35,7 +35,7 @@ _WIDTH = 3.7
 """The width of a drawing, inches."""
 
 
-def place(vehicle: Vehicle, thruster: Thruster) -> Point:
+def thruster_place(vehicle: Vehicle, thruster: Thruster) -> Point:
     """Return the position of a thruster from the centre of mass, m.
 
     A thruster on an arm is at the distance R and the angle γ behind the centre of mass; one without a known position is
@@ -69,7 +69,7 @@ def marks_of(vehicle: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator
     """Yield the marks of a view, which is one of VIEWS."""
     seen: dict[tuple[float, ...], list[str]] = {}
     for thruster in vehicle.layout.thrusters:
-        at, d = place(vehicle, thruster), thruster.direction.value
+        at, d = thruster_place(vehicle, thruster), thruster.direction.value
         along = d[0], d[_INDEX[down]]
         hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
         key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))
@@ -112,7 +112,9 @@ def scenes(vehicle: Vehicle) -> dict[str, Scene]:
 
 def size_of(vehicle: Vehicle) -> float:
     """Return the largest coordinate of a thruster from the centre of mass, m."""
-    return max([_SMALLEST, *(abs(part) for thruster in vehicle.layout.thrusters for part in place(vehicle, thruster))])
+    return max(
+        [_SMALLEST, *(abs(part) for thruster in vehicle.layout.thrusters for part in thruster_place(vehicle, thruster))]
+    )
 
 
 def _arranged(vehicle: Vehicle, view: str, inch: float) -> Scene:
@@ -184,12 +186,12 @@ def _overlaps(box: _Box, others: Iterable[_Box]) -> int:
 
 def has_scale(vehicle: Vehicle) -> bool:
     """Return True if the position of a thruster is known, so that the drawing has a scale."""
-    return any(any(place(vehicle, thruster)) for thruster in vehicle.layout.thrusters)
+    return any(any(thruster_place(vehicle, thruster)) for thruster in vehicle.layout.thrusters)
 
 
 def on_arm(vehicle: Vehicle) -> Point:
     """Return the position of the first thruster on an arm."""
-    return next(place(vehicle, t) for t in vehicle.layout.thrusters if t.position is None and t.arm)
+    return next(thruster_place(vehicle, t) for t in vehicle.layout.thrusters if t.position is None and t.arm)
 
 
 def turn(size: float) -> tuple[Place, Place]:

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from rov_fmu.equation.units import in_degrees
 from rov_fmu.identify.result import Answer, AxisResult, MeasuredPoint
-from rov_fmu.report.plots.logs import draw_band
+from rov_fmu.report.plots.logs import fill_band
 from rov_fmu.report.plots.svg import LIGHT, add_legend, name_axes
 
 
@@ -54,7 +54,7 @@ def _curve(ax: Axes, factor: float, answers: Sequence[Answer], quantity: str, co
             known = [a.steady if quantity == "V_ss" else a.rise for a in own]
             values, low, high = factor * np.array([(value, *interval) for value, interval in known]).T
             commands = np.array([100.0 * a.command for a in own])
-            draw_band(ax, commands, low, high, color)
+            fill_band(ax, commands, low, high, color)
             style = ".-" if color == "blue" else ".--"
             ax.plot(commands, values, style, color=LIGHT[color], linewidth=1.3, label=label)
             label = None

@@ -95,7 +95,7 @@ def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: boo
     some = slice(None, None, max(1, len(shown.time) // MOST_SAMPLES))
     time, half = shown.time[some] - since, factor * NORMAL * shown.deviation[some]
     predicted = factor * shown.predicted[some]
-    draw_band(ax, time, predicted - half, predicted + half)
+    fill_band(ax, time, predicted - half, predicted + half)
     ax.plot(time, factor * shown.measured[some], color=LIGHT["orange"], linewidth=2.6, alpha=0.6, label=names[0])
     ax.plot(time, predicted, color=LIGHT["blue"], linewidth=1.3, label=names[1])
     if shown.compared is not None:
@@ -105,6 +105,6 @@ def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: boo
     name_axes(ax, f"{shown.quantity}{ahead}", unit)
 
 
-def draw_band(ax: Axes, x: Array, low: Array, high: Array, color: str = "blue") -> None:
+def fill_band(ax: Axes, x: Array, low: Array, high: Array, color: str = "blue") -> None:
     """Draw a band between two lines."""
     ax.fill_between(x, low, high, color=LIGHT[color], alpha=0.25, linewidth=0.0)

@@ -24,7 +24,9 @@ def plot_expected(figure: Figure, deviations: Sequence[float], tolerance: Sequen
     add_legend(figure)
 
 
-def plot_steps(figure: Figure, steps: Sequence[float], deviations: Sequence[float], allowed: Sequence[float]) -> None:
+def plot_step_deviations(
+    figure: Figure, steps: Sequence[float], deviations: Sequence[float], allowed: Sequence[float]
+) -> None:
     """Plot how far runs with several communication steps end from a run with one."""
     ax = _logarithmic(figure, "deviation", "communication steps")
     _draw_deviations(ax, np.arange(len(steps)), deviations, [*allowed] * len(steps))

@@ -31,7 +31,7 @@ from rov_fmu.fmu.picture import read_svg
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief, reason_of
 from rov_fmu.report.palette import PALETTE
-from rov_fmu.report.templates import in_words
+from rov_fmu.report.templates import panel_title
 
 LIGHT = {role: light for role, (light, _) in PALETTE.items()}
 """The colours on a light page. In a page, a plot follows the page."""
@@ -98,7 +98,7 @@ def name_axes(ax: Axes, quantity: str, unit: str, x: str = "", *, gap: float = 0
 
     `gap` is the distance of this scale from the panel, in points.
     """
-    ax.set_title(in_words(quantity, unit), loc="left")
+    ax.set_title(panel_title(quantity, unit), loc="left")
     ax.set_xlabel(x)
     ax.locator_params(nbins=6)
     if unit == "m/s":

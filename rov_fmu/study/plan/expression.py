@@ -1,10 +1,10 @@
 """The expressions of a study's figures: a small closed language over numbers and arrays.
 
-A plan may come from anyone, so an expression can compute and do nothing else. This holds by construction: `Expression`
-turns the kinds of syntax that it lists into functions of the values, and refuses all else. There are no attributes,
-texts, lists, comprehensions or statements, and functions take a fixed number of values, because further ones of NumPy
-write into arrays. Every value is a number or an array with one dimension, and no operation gives an array that is
-longer than those it was given, so sizes and times are bounded by the length of the text.
+A plan may come from anyone, so an expression can compute and do nothing else. This holds by construction:
+`FigureExpression` turns the kinds of syntax that it lists into functions of the values, and refuses all else. There
+are no attributes, texts, lists, comprehensions or statements, and functions take a fixed number of values, because
+further ones of NumPy write into arrays. Every value is a number or an array with one dimension, and no operation gives
+an array that is longer than those it was given, so sizes and times are bounded by the length of the text.
 """
 
 import ast
@@ -53,7 +53,7 @@ class BeyondError(RovError, IndexError):
 
 
 @dataclass(frozen=True)
-class Function:
+class FigureFunction:
     """A function that an expression may call."""
 
     compute: Callable[..., _Value]
@@ -65,7 +65,7 @@ class Function:
     """The names of all parameters, if values may be given by name."""
 
     @classmethod
-    def by_name(cls, compute: Callable[..., _Value]) -> "Function":
+    def by_name(cls, compute: Callable[..., _Value]) -> "FigureFunction":
         """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
@@ -84,9 +84,9 @@ class Function:
 # ---- What an expression may use --------------------------------------------------------------------------------------
 
 
-def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> Function:
+def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> FigureFunction:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return Function(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
+    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
 
 
 def _round(y: _Value, decimals: float = 0.0) -> _Value:
@@ -104,22 +104,22 @@ _OF_ONE_VALUE = (
 """Functions of NumPy with one value. Their other parameters are not allowed, because `out`, for example, writes into an
 array."""
 _OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
-FUNCTIONS: Mapping[str, Function] = MappingProxyType(
+FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
     {
-        name: Function(getattr(np, name), count, count)
+        name: FigureFunction(getattr(np, name), count, count)
         for count, names in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
         for name in names
     }
     | {
-        "clip": Function(np.clip, 3, 3),
-        "gradient": Function(np.gradient, 1, 2),
-        "interp": Function(np.interp, 3, 3),
-        "len": Function(lambda y: float(len(y))),
+        "clip": FigureFunction(np.clip, 3, 3),
+        "gradient": FigureFunction(np.gradient, 1, 2),
+        "interp": FigureFunction(np.interp, 3, 3),
+        "len": FigureFunction(lambda y: float(len(y))),
         "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
         "min": _of_all(np.min, np.minimum),
-        "round": Function(_round, 1, 2),
-        "sorted": Function(np.sort),
-        "where": Function(np.where, 3, 3),
+        "round": FigureFunction(_round, 1, 2),
+        "sorted": FigureFunction(np.sort),
+        "where": FigureFunction(np.where, 3, 3),
     }
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
@@ -139,10 +139,10 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., _Value]] = {
 # ---- Reading ---------------------------------------------------------------------------------------------------------
 
 
-class Expression:
+class FigureExpression:
     """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
 
-    def __init__(self, text: str, functions: Mapping[str, Function]) -> None:
+    def __init__(self, text: str, functions: Mapping[str, FigureFunction]) -> None:
         self.names: set[str] = set()
         """The variables and constants that it names."""
         self._functions, self._depth = functions, 0

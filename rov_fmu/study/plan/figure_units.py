@@ -23,7 +23,7 @@ _KNOWN = {
 
 
 def unit_of(expression: str, units: Mapping[str, str]) -> str:
-    """Return the unit of an expression that `Expression` accepts, or an empty text where it does not follow.
+    """Return the unit of an expression that `FigureExpression` accepts, or an empty text where it does not follow.
 
     `units` has those of the variables. Products of two units, powers, logarithms and sums of different units have none.
 

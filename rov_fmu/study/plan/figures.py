@@ -16,8 +16,8 @@ from rov_fmu.study.plan.expression import (
     FUNCTIONS,
     TIME,
     BeyondError,
-    Expression,
-    Function,
+    FigureExpression,
+    FigureFunction,
     elements,
 )
 
@@ -46,7 +46,7 @@ class Responses:
             "at": self.at,
             "final": self.final,
         }
-        self.functions = {name: Function.by_name(function) for name, function in named.items()}
+        self.functions = {name: FigureFunction.by_name(function) for name, function in named.items()}
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
@@ -116,14 +116,14 @@ class Responses:
         return (part - part[0]) / (whole or nan), self._times[window]
 
 
-def _functions(times: Array) -> dict[str, Function]:
+def _functions(times: Array) -> dict[str, FigureFunction]:
     """Return all functions that an expression may call."""
     return {**FUNCTIONS, **Responses(times).functions}
 
 
-def read_expression(text: str) -> Expression:
+def read_expression(text: str) -> FigureExpression:
     """Read an expression without a run. Raises ExpressionError with the reason."""
-    return Expression(text, _functions(np.zeros(1)))
+    return FigureExpression(text, _functions(np.zeros(1)))
 
 
 def meaning(name: str) -> str:
@@ -140,7 +140,7 @@ class Figures:
 
     def __init__(self, expressions: Mapping[str, str], times: Array) -> None:
         functions = _functions(times)
-        self._expressions = {name: Expression(text, functions) for name, text in expressions.items()}
+        self._expressions = {name: FigureExpression(text, functions) for name, text in expressions.items()}
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
@@ -164,7 +164,7 @@ class _NoNumberError(RovError):
     """The value of an expression is not one finite number; the text is the reason."""
 
 
-def _number(expression: Expression, values: Mapping[str, Any]) -> float:
+def _number(expression: FigureExpression, values: Mapping[str, Any]) -> float:
     """Return the value of an expression. Raises _NoNumberError."""
     try:
         value = expression.value(values)
@@ -186,7 +186,7 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
 
     All values of the run are NaN here, so that a wrong type or a wrong time is found if it does not depend on them.
     """
-    expression = Expression(text, _functions(times))
+    expression = FigureExpression(text, _functions(times))
     none = np.full(len(times), nan)
     values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, none), **dict.fromkeys(varied, nan)}
     with warnings.catch_warnings(), np.errstate(all="ignore"):

@@ -69,7 +69,7 @@ class LogNormal(Strict):
     """The standard deviation of the natural logarithm."""
 
 
-class Range(Strict):
+class Spaced(Strict):
     """Evenly spaced numbers from one to another."""
 
     first: Finite = Field(alias="from")
@@ -97,7 +97,7 @@ class Varied(Strict):
     """[low, high]."""
     values: _List | None = None
     """A list; each is as likely as the others."""
-    range: Range | None = None
+    range: Spaced | None = None
     """{ from = ..., to = ..., count = ... }; each is as likely as the others."""
 
     @model_validator(mode="after")
@@ -117,7 +117,7 @@ def _held(given: Any) -> Any:
     """Turn a number into a signal that holds it from the start to the end; true and false are 1 and 0."""
     if isinstance(given, int | float):
         return {"steps": [[_ALWAYS, float(given)]]}
-    if not isinstance(given, dict | Signal):
+    if not isinstance(given, dict | InputSignal):
         raise ValueError("must be a number, { steps = [[time, value], ...] } or { ramps = ... }")
     return given
 
@@ -138,7 +138,7 @@ Points = Annotated[tuple[Annotated[tuple[Finite, Finite], AS_TUPLE], ...], AS_TU
 """[time, value] pairs."""
 
 
-class Signal(Strict):
+class InputSignal(Strict):
     """An input over time, given by points between which it is held or follows a straight line.
 
     Before the first point it has the start value of the FMU, and after the last point the value of that point.
@@ -251,7 +251,7 @@ class Plan(Strict):
     """The variables that differ from run to run. An input that varies is held during a run."""
     set: dict[str, Annotated[Finite, BeforeValidator(_as_number)]] = Field({}, max_length=_MOST_NAMED)
     """Start values of variables for all runs, in place of the FMU's."""
-    inputs: dict[str, Annotated[Signal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
+    inputs: dict[str, Annotated[InputSignal, BeforeValidator(_held)]] = Field({}, max_length=_MOST_NAMED)
     """The inputs over time: each is a number, steps or ramps."""
     input_file: InputFile | None = None
     """Inputs from a CSV file."""

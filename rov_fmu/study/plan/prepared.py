@@ -23,9 +23,9 @@ from rov_fmu.study.plan.plan import (
     STATUS,
     TIME,
     TRAJECTORY,
+    InputSignal,
     Plan,
     PlanError,
-    Signal,
     Varied,
     check_plan,
 )
@@ -78,7 +78,7 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
     own, unread = [*check_plan(plan)], []
-    from_file: Mapping[str, Signal] = {}
+    from_file: Mapping[str, InputSignal] = {}
     lines: Sequence[int] = ()
     try:
         from_file, lines = _file_inputs(plan, path, model)
@@ -119,7 +119,7 @@ def vehicle_file(key: str, given: str, path: Path) -> Path:
     return named_in(path, key, given, PlanError)
 
 
-def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal], Sequence[int]]:
+def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, InputSignal], Sequence[int]]:
     """Read the inputs in the CSV file of the plan, and the line of each row. Raises FileError."""
     if not plan.input_file:
         return {}, ()
@@ -134,7 +134,7 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal
     for name, values in columns:
         points = tuple(zip(times, values, strict=True))
         held = plan.input_file.between == "steps" or not model.variables[name].is_continuous
-        found[name] = Signal(steps=points) if held else Signal(ramps=points)
+        found[name] = InputSignal(steps=points) if held else InputSignal(ramps=points)
     return found, table.lines
 
 
@@ -142,7 +142,7 @@ def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, Signal
 
 
 def _check(
-    plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, Signal], times: Array
+    plan: Plan, model: Model, known: Sequence[str], from_file: Mapping[str, InputSignal], times: Array
 ) -> Iterator[str]:
     """Yield a line for each part of the plan that does not fit; `known` names what varies in addition to [vary]."""
     has = model.variables
@@ -197,7 +197,7 @@ def _check_inputs(plan: Plan, has: Mapping[str, Variable]) -> Iterator[str]:
 
 
 def _check_rows(
-    plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, Signal], lines: Sequence[int]
+    plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, InputSignal], lines: Sequence[int]
 ) -> Iterator[str]:
     """Yield a line for each input in a file that does not fit, with its column and the line of its row."""
     for name, signal in from_file.items():
@@ -210,7 +210,9 @@ def _check_rows(
             yield f"{where}: {reason}"
 
 
-def _misfits(name: str, signal: Signal, plan: Plan, has: Mapping[str, Variable]) -> Iterator[tuple[int | None, str]]:
+def _misfits(
+    name: str, signal: InputSignal, plan: Plan, has: Mapping[str, Variable]
+) -> Iterator[tuple[int | None, str]]:
     """Yield why a signal cannot be an input: the number of a point, or None for the whole signal, and the reason."""
     if name not in has:
         yield None, unknown(name, has)
@@ -225,7 +227,7 @@ def _misfits(name: str, signal: Signal, plan: Plan, has: Mapping[str, Variable])
         yield from _misplaced_jumps(signal, plan, has[name].start)
 
 
-def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, str]]:
+def _out_of_bounds(signal: InputSignal, variable: Variable) -> Iterator[tuple[int, str]]:
     """Yield the number of the first point whose value is not possible, and the reason."""
     for n, (_, value) in enumerate(signal.points):
         if reason := variable.wrong(value):
@@ -233,7 +235,7 @@ def _out_of_bounds(signal: Signal, variable: Variable) -> Iterator[tuple[int, st
             return
 
 
-def _misplaced_jumps(signal: Signal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
+def _misplaced_jumps(signal: InputSignal, plan: Plan, before: float) -> Iterator[tuple[int, str]]:
     """Yield the number of the first jump that would be delayed, because no step begins there, and the rule."""
     for n in signal.jumps(before):
         time = signal.points[n][0]
@@ -263,7 +265,7 @@ def _check_figures(plan: Plan, has: Mapping[str, Variable], varied: set[str], ti
 # ---- Over time -------------------------------------------------------------------------------------------------------
 
 
-def _sampled(signal: Signal, times: Array, before: float) -> Array:
+def _sampled(signal: InputSignal, times: Array, before: float) -> Array:
     """Return the signal at these times, the middles of the steps; `before` is the value before its first point.
 
     An input is held over a step. With the value at the middle of the step, the error is of second order in the step.

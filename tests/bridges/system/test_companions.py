@@ -14,14 +14,14 @@ from pythonfmu.builder import FmuBuilder
 from scipy.optimize import brentq
 
 from rov_fmu.bridges.system import run
-from rov_fmu.bridges.system.companion import companion, rows_of, slave_of
+from rov_fmu.bridges.system.companion import companion, slave_of, timed_rows
 from rov_fmu.bridges.system.companion import levels_of as levels_of_rows
 from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.run import run_system
-from rov_fmu.bridges.system.ssp import Structure
+from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.io.csv_table import DataFileError
@@ -74,7 +74,7 @@ AT = {
 def water_of(folder: Path, text: str, *places: str) -> Any:
     """Return a current with a file, as its FMU has it."""
     (folder / "current.csv").write_text(text, encoding="utf-8")
-    rows = rows_of(folder / "current.csv", Current.columns)
+    rows = timed_rows(folder / "current.csv", Current.columns)
     with zipfile.ZipFile(BytesIO(companion("current", rows=rows, places=places, levels=levels_of_rows(rows)))) as fmu:
         fmu.extract("resources/shape.json", folder)
     return Current(instance_name="water", resources=folder / "resources")
@@ -336,7 +336,7 @@ def test_an_output_arrives_a_step_later(tmp_path: Path) -> None:
     part = Part.open(Path("water"), companion("current"), is_ours=True)
     values = {"speed": 1.0, "exponent": 1.0, "seabed": 1.0, "z": 0.5}
     connections = [Connection(("a", "V_N"), ("b", "z"), 0.5)]
-    structure = Structure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections)
+    structure = SystemStructure({"a": part, "b": part}, {"a": {**values, "rise": 2.0}, "b": values}, connections)
     names = [("a", "V_N"), ("b", "V_N")]
     rows = run_system(structure, tmp_path, names, 1.0, 3).rows
     assert rows[:, 0].tolist() == [0.0, 0.25, 0.5, 0.5]
@@ -404,4 +404,4 @@ def test_a_run_that_fails_is_one_line_and_writes_nothing(tmp_path: Path, capsys:
 def test_a_run_with_too_many_values_is_refused(tmp_path: Path) -> None:
     part = Part.open(Path("water"), companion("current"), is_ours=True)
     with pytest.raises(FileError, match="give 300,000,003 values"):
-        run_system(Structure({"a": part}, {}, []), tmp_path, [("a", "V_N")] * 3, 1.0, 10**8)
+        run_system(SystemStructure({"a": part}, {}, []), tmp_path, [("a", "V_N")] * 3, 1.0, 10**8)

@@ -14,7 +14,7 @@ import pytest
 
 from rov_fmu.bridges.jacobian import step_jacobian
 from rov_fmu.c.simulation import simulate
-from rov_fmu.c.source import sources
+from rov_fmu.c.source import c_sources
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve
@@ -147,7 +147,7 @@ def check_c(plain: Vehicle, other: Vehicle) -> None:
     A new name must not be a word of the C sources, because it could have another meaning there.
     """
     new: dict[str, str] = {}
-    for text, renamed_text in zip(sources(plain.layout).values(), sources(other.layout).values(), strict=True):
+    for text, renamed_text in zip(c_sources(plain.layout).values(), c_sources(other.layout).values(), strict=True):
         one, two = (_COMMENT.sub(" ", c) for c in (text, renamed_text))
         assert _WORD.sub("", one) == _WORD.sub("", two)
         for word, renamed_word in zip(_WORD.findall(one), _WORD.findall(two), strict=True):

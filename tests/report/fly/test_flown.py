@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.report.page.live import Flown, live
+from rov_fmu.report.page.live import FlyingVehicle, live
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.report.conftest import flown_vehicle
 from tests.vehicles import VEHICLES, a_vehicle
@@ -17,7 +17,7 @@ from tests.vehicles import VEHICLES, a_vehicle
 
 def data_of(vehicle: Vehicle) -> Any:
     """Return the data of a vehicle that the scripts of the page read."""
-    return json.loads(live([Flown(vehicle, b"")]).data)[0]
+    return json.loads(live([FlyingVehicle(vehicle, b"")]).data)[0]
 
 
 def shown(rows: Iterable[Sequence[Any]]) -> str:
@@ -28,7 +28,7 @@ def shown(rows: Iterable[Sequence[Any]]) -> str:
 def test_keys_loads_and_places_of_the_heavy() -> None:
     """A T200 of the Heavy gives 53.2 N ahead and 41.4 N in reverse, so that four aslant push with 134 N."""
     heavy = flown_vehicle("bluerov2_heavy")
-    found, axes = live([Flown(heavy, b"")]), data_of(heavy)["axes"]
+    found, axes = live([FlyingVehicle(heavy, b"")]), data_of(heavy)["axes"]
     keys = ", ".join(f"{axis.name} {keys}" for axis, keys in found.keys)
     assert keys == "surge WS, sway EQ, heave FR, roll LJ, pitch IK, yaw DA"
     positions = ", ".join(f"{axis['position']} {axis['positionUnit']}" for axis in axes)
@@ -39,13 +39,15 @@ def test_keys_loads_and_places_of_the_heavy() -> None:
     assert ", ".join(found.places.values()) == f"{around}, {around.replace(',', ' vertical,')} vertical"
     assert [*found.places] == [*heavy.layout.commands]
     assert found.can_level
-    assert not live([Flown(flown_vehicle("videoray"), b""), Flown(heavy, b"")]).can_level, "the ghost does not matter"
+    assert not live([FlyingVehicle(flown_vehicle("videoray"), b""), FlyingVehicle(heavy, b"")]).can_level, (
+        "the ghost does not matter"
+    )
     assert (found.title, found.other) == ("BlueROV2 Heavy", None)
     assert ", ".join(found.tests[:5]) == "surge 10 %, surge 40 %, surge 70 %, surge 100 %, sway 10 %"
 
 
 def test_sliders_reach_from_half_to_twice_a_mass_and_20_cm_beside_a_centre() -> None:
-    found = live([Flown(flown_vehicle("bluerov2_heavy").with_(alpha_u=0.05, beta_w=2.0, health_8=1.1), b"")])
+    found = live([FlyingVehicle(flown_vehicle("bluerov2_heavy").with_(alpha_u=0.05, beta_w=2.0, health_8=1.1), b"")])
     ballast, health, tuning = found.tunable.values()
     mass = "m_rov m_rov 6.75 27 13.5 kg, W W 106.1 165.7 132.6 N, B B 105.3 164.5 131.6 N"
     assert shown(row[:-1] for row in ballast) == f"{mass}, z_B z_B -0.21 0.19 -0.01 m"
@@ -55,14 +57,14 @@ def test_sliders_reach_from_half_to_twice_a_mass_and_20_cm_beside_a_centre() -> 
     assert shown(row[:-1] for row in (tuning[0], tuning[1], tuning[8])) == (
         "alpha_u α of surge 0.05 3 0.05 , alpha_v α of sway 0.1 3 1 , beta_w β of heave 0.1 4 2 "
     )
-    effects = live([Flown(flown_vehicle("thrust effects"), b"")])
+    effects = live([FlyingVehicle(flown_vehicle("thrust effects"), b"")])
     assert shown(effects.loads).endswith(", voltage 29.6 V"), "twice its start value"
     sliders = shown(row[1:-1] for row in effects.tunable["Ballast and payload"])
     assert sliders == "m_rov 10 40 20 kg, k_t_main 0.45 1.8 0.9 , k_t_bow 0.5 2 1 "
     assert shown(effects.places.items()) == "u_l left rear, u_r right rear, u_bow front, u_top vertical"
     assert not effects.can_level
     with_mix = flown_vehicle("everything")
-    assert live([Flown(with_mix, b"")]).places == {}
+    assert live([FlyingVehicle(with_mix, b"")]).places == {}
     assert ", ".join(thruster["label"] for thruster in data_of(with_mix)["thrusters"]) == (
         "right front, left front, 3 right rear, 4 left rear, vertical, l left rear, r right rear"
     )
@@ -110,6 +112,6 @@ def test_columns_of_thrusters_become_the_commands_that_give_them_best() -> None:
     ],
 )
 def test_vehicles_of_the_same_name_are_told_apart(vehicle: Vehicle, changes: dict[str, Any], title: str) -> None:
-    found = live([Flown(vehicle, b"", "old.toml"), Flown(replace(vehicle, **changes), b"", "new.toml")])
+    found = live([FlyingVehicle(vehicle, b"", "old.toml"), FlyingVehicle(replace(vehicle, **changes), b"", "new.toml")])
     assert found.title == title.format(version=vehicle.version)
     assert found.other == found.title.split(" beside ")[1]

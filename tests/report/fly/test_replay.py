@@ -10,7 +10,7 @@ from lxml import html
 
 from rov_fmu.bridges import mcap
 from rov_fmu.cli import main
-from rov_fmu.report.page.live import Flown, fly_page
+from rov_fmu.report.page.live import FlyingVehicle, fly_page
 from rov_fmu.report.page.recording import recording_of, topic_name
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -44,7 +44,7 @@ def replay(tmp_path: Path, fly: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def test_the_page_of_a_recording_says_what_was_flown(csv: Path, vehicle: Vehicle) -> None:
-    page = html.fromstring(fly_page([Flown(vehicle, b"")], recording=recording_of(csv, vehicle)))
+    page = html.fromstring(fly_page([FlyingVehicle(vehicle, b"")], recording=recording_of(csv, vehicle)))
     assert page.findtext(".//title") == page.findtext(".//h1") == "dive.csv, flown by VideoRay Pro 4"
     _, *rows = csv.read_text("utf-8").splitlines()
     end, *commands = np.array([row.split(",")[:4] for row in rows], float).T
@@ -146,7 +146,7 @@ def test_a_log_of_each_format_is_flown_to_its_end(suffix: str, tmp_path: Path, r
 @pytest.fixture
 def identified(csv: Path, tmp_path: Path) -> Path:
     """What `identify --mcap` writes: a band of the depth from 5 s on, and the unknown force of heave."""
-    number = mcap.Number("m", "a number")
+    number = mcap.NumberField("m", "a number")
     written = mcap.Recording({"name": "VideoRay"})
     name = topic_name(csv.name)
     depth = written.topic(f"/{name}/depth", dict.fromkeys(("measured", "predicted", "low", "high"), number))

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_steps
+from rov_fmu.report.plots.proof import plot_cost, plot_expected, plot_step_deviations
 
 
 def lines(ax: Axes) -> dict[str, tuple[list[float], list[float]]]:
@@ -31,7 +31,7 @@ def test_deviations_are_shown_below_or_above_what_is_allowed_and_steps_by_their_
     assert low < 1e-17
     assert high > 1e-6
     assert ax.yaxis.get_major_formatter()(1e-9) == "10⁻⁹"
-    plot_steps(steps, [1.0, 10.0], [1e-15, 1e-16], [1e-14])
+    plot_step_deviations(steps, [1.0, 10.0], [1e-15, 1e-16], [1e-14])
     (ax,) = steps.axes
     assert [text.get_text() for text in ax.get_xticklabels()] == ["1", "10"]
     assert (lines(ax)["found"], lines(ax)["allowed"][1]) == (([0, 1], [1e-15, 1e-16]), [1e-14] * 2)

@@ -16,7 +16,7 @@ from matplotlib.text import Annotation
 from rov_fmu.equation.catalogue import HEAVE
 from rov_fmu.report.page.fmu_page import plot_steps
 from rov_fmu.report.plots.drawing import draw_thrusters
-from rov_fmu.report.plots.geometry import place, scenes
+from rov_fmu.report.plots.geometry import scenes, thruster_place
 from rov_fmu.report.plots.steps import held_commands, tables_by_axis
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.vehicles import HEAVY, SIX, VEHICLES, VIDEORAY
@@ -53,7 +53,7 @@ def test_a_drawing_holds_its_arrows_and_names_which_do_not_cover_each_other(vehi
     assert all(left < x < right and high < y < low for x, y in tips)
     axes = ax.transData.transform([(1.4 * n * size, 0.0) for n in np.linspace(0.0, 1.0, 200)])
     for thruster in vehicle.layout.thrusters:
-        at, d = place(vehicle, thruster), thruster.direction.value
+        at, d = thruster_place(vehicle, thruster), thruster.direction.value
         assert max(map(abs, at)) <= size
         (mark,) = (mark for mark in scene.marks if f"$F_{{{thruster.name}}}$" in mark.label)
         assert (*mark.at, *mark.along) == pytest.approx((at[0], at[down], d[0], d[down]), abs=1e-3)
@@ -68,7 +68,7 @@ def test_the_arm_of_the_paper_stands_where_its_torque_says() -> None:
     """(4): x F_y - y F_x of a force ahead is ±R sin γ, behind the centre of mass. The drawing has R, γ and a scale."""
     k = VIDEORAY
     for thruster, side in zip(k.layout.thrusters[:2], (1.0, -1.0), strict=True):
-        x, y, _ = place(k, thruster)
+        x, y, _ = thruster_place(k, thruster)
         assert x < 0.0
         assert hypot(x, y) == pytest.approx(k["R"])
         assert -y == pytest.approx(side * k["R"] * sin(k["gamma"]))
