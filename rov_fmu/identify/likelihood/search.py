@@ -14,6 +14,7 @@ from itertools import islice
 from math import hypot, inf, isnan, log, nan, sqrt
 
 import numpy as np
+from scipy.special import chdtri
 
 from rov_fmu.equation.catalogue import SURGE, SWAY, Axis
 from rov_fmu.equation.layout import Layout
@@ -66,8 +67,6 @@ _FARTHEST = 3.0
 """The most by which parameters adapt to a hypothesis there, in deviations of their priors."""
 _SOON = 2.0
 """The time of predictions that tell what a fast axis does, and after a step of the commands, s."""
-_LEAST_CHANCE = {_SOON: CONSTANTS["steps"].value, AHEAD: CONSTANTS["late steps"].value}
-"""χ² per degree of freedom from which steps of the commands differ by more than noise, by the time of predictions."""
 _LEAST_STEP, _APART, _FEWEST_STEPS = 0.08, 0.6, 4
 """The least step of a command along an axis, the time between two, s, and the fewest steps that tell their spread."""
 _FEWEST, _FEWEST_IN_STEP = 10, 6
@@ -181,7 +180,7 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
         if sampled.is_momentary or sampled.lost:
             continue
         begin, counts = usual(best, n, record)
-        for span in _LEAST_CHANCE:
+        for span in (_SOON, AHEAD):
             try:
                 run = objective.run(best.z, n, begin=begin, span=span)
                 steps = np.full(len(indices), _LOG_STEP)
@@ -204,9 +203,9 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
                     chosen = (own & (part >= 0.0) & one for one in after)
                     every = (_of_step(pairs[at], record.time[at], part[at], drifts) for at in chosen)
                     results.setdefault((axis, span), []).extend(one for one in every if one[1] > _LEAST_WEIGHT)
-    for (axis, span), steps_of in results.items():
+    for (axis, _), steps_of in results.items():
         values, weights = np.reshape(steps_of, (-1, 2)).T
-        spread = Misfit(spread=min(_spread(values, weights, _LEAST_CHANCE[span]), 1.0))
+        spread = Misfit(spread=min(_spread(values, weights), 1.0))
         found[axis] = spread.or_larger(found.get(axis, Misfit()))
     return found
 
@@ -236,13 +235,14 @@ def _of_step(pairs: Array, time: Array, part: Array, drifts: int) -> tuple[float
     return float(slope @ error) / max(weight, 1e-300), weight
 
 
-def _spread(values: Array, weights: Array, most: float) -> float:
-    """Return the standard deviation of values beyond their errors; 0 if χ² per degree of freedom is at most `most`."""
+def _spread(values: Array, weights: Array) -> float:
+    """Return the standard deviation of values beyond their errors; 0 if noise alone may well make them differ so."""
     free, total_weight = len(values) - 1, weights.sum()
     if free < _FEWEST_STEPS - 1:
         return 0.0
     chi2 = float(weights @ (values - weights @ values / total_weight) ** 2)
-    return sqrt((chi2 - free) / (total_weight - weights @ weights / total_weight)) if chi2 > most * free else 0.0
+    least = chdtri(free, CONSTANTS["steps"].value)
+    return sqrt((chi2 - free) / (total_weight - weights @ weights / total_weight)) if chi2 > least else 0.0
 
 
 def usual(best: Minimum, n: int, record: Record) -> tuple[float, Flags]:

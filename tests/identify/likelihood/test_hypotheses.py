@@ -574,9 +574,9 @@ def test_a_spread_is_what_exceeds_the_errors() -> None:
     """For equal errors, it is the sample variance minus theirs."""
     values, error = np.array([0.3, -0.2, 0.1, 0.5, -0.4]), 0.1
     weights = np.full(5, error**-2)
-    assert _spread(values, weights, 1.25) == pytest.approx(np.sqrt(np.var(values, ddof=1) - error**2))
-    assert _spread(values, weights / 20.0, 1.25) == 0.0
-    assert _spread(values[:3], weights[:3], 1.25) == 0.0
+    assert _spread(values, weights) == pytest.approx(np.sqrt(np.var(values, ddof=1) - error**2))
+    assert _spread(values, weights / 20.0) == 0.0
+    assert _spread(values[:3], weights[:3]) == 0.0
 
 
 @pytest.mark.parametrize("shared", [0.0, 0.06])
