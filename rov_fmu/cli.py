@@ -721,9 +721,12 @@ def _system(plan: Path | None, output: Path | None, *, runs: bool, lists: bool, 
     help="What runs a vehicle: its equations in this process, which is the default, or its FMU on Dask workers.",
 )
 @click.option(
-    "--part", type=_part, metavar="K/N", help="Do part K of N alone, in RESULTS/parts/K-of-N, as in --part 3/64."
+    "--part",
+    type=_part,
+    metavar="K/N",
+    help="Do part K of N alone, as in --part 3/64, also beside others.",
 )
-@click.option("--merge", is_flag=True, help="Do no run. Copy those of all parts into RESULTS, and write the page.")
+@click.option("--merge", is_flag=True, help="Do no run. Check the files of all parts in RESULTS, and write the page.")
 @click.option(
     "--mcap",
     "run",

@@ -11,7 +11,7 @@ from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.report.progress import StudyParts, parts
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import vehicle_file
-from rov_fmu.study.results.store import PAGE, STUDY, Part, is_description
+from rov_fmu.study.results.store import PAGE, STUDY, is_description
 from rov_fmu.study.run.run_study import do_study
 
 if TYPE_CHECKING:
@@ -51,7 +51,7 @@ def study_plan(
             scheduler,
             StudyParts(shown).update,
             lambda message: shown.print(f"warning: {message}"),
-            part=part and Part(*part),
+            part=part,
             force=force,
             **how,
         )

@@ -16,11 +16,9 @@ from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.fmus.variable import variables_of
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.model import vehicle_model
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.prepared import Prepared, prepare
-from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.child import simulation
 from rov_fmu.study.run.lanes import _Runs, simulated
 from rov_fmu.study.run.work import Progress
@@ -146,74 +144,49 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     for part in ("1/3", "3/3"):
         assert main([*given, "--part", part]) == 0
     assert not [*parted.glob("*.html")]
+    capsys.readouterr()
     assert main([*given, "--merge"]) == 2
-    line = (
-        f"rov-fmu: {parted}: of 3 parts, these are missing or not complete: 2. Run them with --part, as in --part 2/3\n"
-    )
-    assert without_progress(capsys.readouterr().err) == line
-    assert not (parted / "study.json").exists()
-    assert len(run_study(plan, parted, part=(2, 3), workers=2).runs) in (13, 14)
+    (line,) = without_progress(capsys.readouterr().err).splitlines()
+    lacking = f"rov-fmu: {parted}: of {whole.planned} runs, these are missing: {whole.planned // 3} to "
+    assert line.startswith(lacking)
+    assert line.endswith(": do them with --part, or copy their files into runs")
+    run_study(plan, tmp_path / "elsewhere", part=(2, 3), workers=2)
+    assert len(Results(tmp_path / "elsewhere").runs) in (13, 14)
+    shutil.copytree(tmp_path / "elsewhere" / "runs", parted / "runs", dirs_exist_ok=True)
     assert main([*given, "--merge"]) == 0
     _same(Results(parted), whole)
     assert (parted / "study.html").exists()
-    assert not (parted / "parts").exists()
+    assert main([*given, "--part", "1/2"]) == 0, "there is nothing left to do"
     assert main(given) == 0, "it is a study like any other"
-    capsys.readouterr()
-    assert main([*given, "--merge"]) == 0, "a merge that was killed before it wrote the page is done again"
-    capsys.readouterr()
-    for folder, more, reason in (
-        (parted, ["--part", "1/3"], "has runs that are no parts: choose another folder, or leave --part out"),
-        (tmp_path / "new", ["--merge"], "has no parts to merge: run each with --part, as in --part 1/8"),
-    ):
-        assert main(["study", str(plan), "-o", str(folder), *more]) == 2
-        assert capsys.readouterr().err.endswith(f"rov-fmu: {folder}: {reason}\n")
 
 
-def test_an_interrupted_merge_is_continued_and_what_does_not_belong_together_is_refused(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_parts_run_beside_each_other_and_what_does_not_belong_together_is_refused(tmp_path: Path) -> None:
     plan, folder = _plan(tmp_path), tmp_path / "results"
     whole = run_study(plan, tmp_path / "whole")
-    for number in (1, 2):
-        run_study(plan, folder, part=(number, 2))
+
+    def beside(_: Progress) -> None:
+        with pytest.raises(FileError, match="another study is writing there"):
+            run_study(plan, folder, part=(1, 2))
+        run_study(plan, folder, part=(2, 2))
+
+    run_study(plan, folder, part=(1, 2), on_progress=beside)
+    _same(run_study(plan, folder, merge=True), whole)
     for text, reason in (
-        (PLAN.replace("seed = 5", "seed = 6"), r"1-of-2: holds runs of another plan \(seed changed\): choose another"),
-        (
-            PLAN.replace("videoray", "videoray_refit"),
-            "1-of-2: holds runs of another FMU, for the vehicle videoray_refit",
-        ),
+        (PLAN.replace("seed = 5", "seed = 6"), r"results: holds runs of another plan \(seed changed\): choose another"),
+        (PLAN.replace("videoray", "videoray_refit"), "holds runs of another FMU, for the vehicle videoray_refit"),
     ):
         changed = _plan(tmp_path, text)
-        for how in ({"merge": True}, {"part": (1, 2)}):
+        for part in (None, (1, 2)):
             with pytest.raises(FileError, match=reason):
-                run_study(changed, folder, **how)
+                run_study(changed, folder, merge=part is None, part=part)
     _plan(tmp_path)
-    run_study(plan, folder, part=(1, 3))
-    with pytest.raises(FileError, match=r"1-of-2.* has runs that .*1-of-3.* has, too: remove one of them"):
+    run_study(plan, tmp_path / "other", part=(1, 3))
+    (file,) = (tmp_path / "other" / "runs").iterdir()
+    copied = Path(shutil.copy(file, folder / "runs"))
+    with pytest.raises(FileError, match=f"{file.name} has, too: remove one of them"):
         run_study(plan, folder, merge=True)
-    shutil.rmtree(folder / "parts" / "1-of-3")
-    write, written = Store.write, list[int]()
-
-    def full(self: Store, first: int, *rest: Any) -> None:
-        if written:
-            raise WriteError(28, "No space left on device", "results")
-        written.append(first)
-        write(self, first, *rest)
-
-    with monkeypatch.context() as patched:
-        patched.setattr(Store, "write", full)
-        with pytest.raises(WriteError):
-            run_study(plan, folder, merge=True)
-    assert len(Results(folder).runs) == 20
-    _same(run_study(plan, folder, merge=True), whole)
-    run_study(plan, folder / "new", part=(1, 2))
-    run_study(plan, folder / "new", part=(2, 2))
-    shutil.copytree(folder / "new" / "parts", folder / "parts")
-    first = min((folder / "runs").iterdir())
-    first.rename(first.with_name("part-000000003-000000009.parquet"))
-    with pytest.raises(
-        FileError, match=r"part-000000003-000000009\.parquet: has the runs 0 to 19, and not those of its name"
-    ):
+    copied.rename(copied.with_name("part-000000003-000000009.parquet"))
+    with pytest.raises(FileError, match=r"000000009\.parquet: has the runs 0 to 12, and not those of its name"):
         run_study(plan, folder, merge=True)
 
 

@@ -2,7 +2,7 @@
 
 A file is written whole, and says in its footer which study it belongs to and which runs it has. It counts only if that
 is true: if its rows are those of its name, with their trajectories, if no other file has them, and if the checksums of
-its pages are right. The part 3/64 of a study is such a folder of its own in it, parts/3-of-64. To merge is to copy.
+its pages are right. So parts of a study are files of one folder, wherever they were made: to merge is to copy.
 """
 
 import hashlib
@@ -10,8 +10,7 @@ import json
 import re
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,41 +28,17 @@ from rov_fmu.io.output import Output, WriteError, put_whole, write_whole
 from rov_fmu.io.reading import read_text
 from rov_fmu.study.plan.plan import RUN, TIME, TRAJECTORY
 
-PAGE, STUDY, RUNS, PARTS = "study.html", "study.json", "runs", "parts"
+PAGE, STUDY, RUNS = "study.html", "study.json", "runs"
 _FORMAT = 2
 _LOCK = ".lock"
 _ABOUT = "rov-fmu"
 """The key of what a file says of itself in its footer."""
 _FILE = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
-_PART = re.compile(r"([1-9]\d{0,7})-of-([1-9]\d{0,7})")
 _SHOWN = 10
-"""The number of parts that a message names."""
+"""The number of files, or of ranges of runs, that a message names."""
 
 Span = tuple[int, int]
 """The first of consecutive runs, and the one after the last."""
-
-
-@dataclass(frozen=True)
-class Part:
-    """One of several parts of a study, which may run on different machines at different times."""
-
-    number: int
-    """From 1 to the count."""
-    count: int
-
-    def runs(self, total: int) -> Span:
-        """Return the runs of this part. The sizes of parts differ by at most 1."""
-        return (self.number - 1) * total // self.count, self.number * total // self.count
-
-    @staticmethod
-    def numbers(first: int, end: int, total: int, count: int) -> range:
-        """Return the numbers of the parts that have runs from a first one to the one before the last one."""
-        one, last = (-(-(run + 1) * count // total) for run in (first, end - 1))
-        return range(one, last + 1)
-
-    def store(self, whole: Path, *, force: bool = False) -> "Store":
-        """Return the folder of this part in the folder of the whole study."""
-        return Store(whole / PARTS / f"{self.number}-of-{self.count}", force=force)
 
 
 def identity(study: Mapping[str, Any]) -> dict[str, Any]:
@@ -119,16 +94,18 @@ class Store:
         self.folder, self._force = folder, force
 
     @contextmanager
-    def held(self) -> Iterator[None]:
-        """Create and lock the folder. At the end, a new folder is removed if no run is done. Raises FileError,
-        WriteError."""
+    def held(self, part: str = "") -> Iterator[None]:
+        """Create the folder and lock it, or a part of it. At the end, a new folder is removed if no run is done.
+
+        Raises FileError, WriteError.
+        """
         import locket
 
         is_new = not self.folder.exists()
         try:
             for each in (self.folder, self.folder / RUNS):
-                each.mkdir(parents=each.parent.name == PARTS, exist_ok=True)
-            lock = locket.lock_file(str(self.folder / _LOCK), timeout=0)
+                each.mkdir(exist_ok=True)
+            lock = locket.lock_file(str(self.folder / f"{_LOCK}{part}"), timeout=0)
             try:
                 lock.acquire()
             except locket.LockError:
@@ -137,7 +114,7 @@ class Store:
             raise WriteError(error.errno, error.strerror, str(error.filename or self.folder)) from error
 
         def leave() -> None:
-            if is_new and not self.done():
+            if is_new and not self.done() and len([*self.folder.glob(f"{_LOCK}*")]) == 1:
                 shutil.rmtree(self.folder, ignore_errors=True)
             lock.release()
 
@@ -159,61 +136,35 @@ class Store:
                 wrong.append(str(error))
         if wrong:
             raise FileError(*first_of(wrong, _SHOWN))
-        check_apart(found)
+        for (path, (_, end)), (other, (first, _)) in pairwise(found.items()):
+            if first < end:
+                raise FileError(f"{other}: has runs that {path} has, too: remove one of them")
         return found
 
-    def describe(self, study: Mapping[str, Any]) -> None:
-        """Check that existing runs belong to a study, and write its description. Raises FileError, WriteError."""
+    def describe(self, study: Mapping[str, Any], runs: Span) -> None:
+        """Check that existing runs belong to a study, and write its description. Raises FileError, WriteError.
+
+        Unfinished files of these runs are removed, which a process that was killed has left.
+        """
         if (self.folder / STUDY).exists() and self.done() and self.description()["format"] != _FORMAT:
             raise FileError(f"{self.folder}: was written by an earlier version of this tool: choose another folder")
-        spans = [*self.checked(study).values()]
-        if spans and (end := spans[-1][1]) > study["runs"]:
-            raise FileError(
-                f"{self.folder}: has runs up to number {end - 1}, but the plan has only {study['runs']} runs"
-            )
-        for path in (self.folder / RUNS).glob(".part-*"):  # unfinished files of a process that was killed
-            path.unlink()
-        text = json.dumps(
-            {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", **study}, indent=2, ensure_ascii=False
-        )
+        if any(end > study["runs"] for _, end in self.checked(study).values()):
+            last = self.done()[-1][1] - 1
+            raise FileError(f"{self.folder}: has runs up to number {last}, but the plan has only {study['runs']} runs")
+        for path in (self.folder / RUNS).glob(".part-*"):
+            if (name := _FILE.match(path.name[1:])) and runs[0] <= int(name[1]) < runs[1]:
+                path.unlink()
+        about = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", **study}
+        text = json.dumps(about, indent=2, ensure_ascii=False)
         output = Output(self.folder / STUDY, f"{text}\n".encode())
         write_whole(output, force=self._force, is_ours=is_description)
 
-    def merge(self, study: Mapping[str, Any]) -> None:
-        """Copy the runs of all parts into this folder, once all of them are found to be whole, and remove the parts.
-
-        An interrupted call is continued by the next one. Raises FileError about parts that are missing, not complete,
-        damaged, or of another study; WriteError.
-        """
-        names = [_PART.fullmatch(path.name) for path in (self.folder / PARTS).glob("*")]
-        parts = [Part(int(name[1]), int(name[2])) for name in names if name]
-        runs, count = study["runs"], max((part.count for part in parts), default=0)
-        if not parts and self.missing(0, runs):
-            raise FileError(f"{self.folder}: has no parts to merge: run each with --part, as in --part 1/8")
-        with ExitStack() as locks:
-            own, files, wrong = self.checked(study, whole=True), dict[Path, Span](), list[str]()
-            for store in (part.store(self.folder) for part in parts):
-                locks.enter_context(store.held())
-                try:
-                    files |= store.checked(study, whole=True)
-                except FileError as error:
-                    wrong.append(str(error))
-            if wrong:
-                raise FileError(*"\n".join(wrong).splitlines())
-            files = {path: span for path, span in files.items() if span not in own.values()}
-            together = dict(sorted({**own, **files}.items(), key=lambda one: one[1]))
-            check_apart(together)
-            gaps = _gaps([*together.values()], 0, runs)
-            if lacking := sorted({n for gap in gaps for n in Part.numbers(*gap, runs, count)}):
-                named = listed(first_of([str(number) for number in lacking], _SHOWN))
-                raise FileError(
-                    f"{self.folder}: of {count} parts, these are missing or not complete: {named}. "
-                    f"Run them with --part, as in --part {lacking[0]}/{count}"
-                )
-            self.describe(study)
-            for path, span in files.items():
-                self.write(*span, path.read_bytes())
-        shutil.rmtree(self.folder / PARTS, ignore_errors=True)
+    def check_complete(self, study: Mapping[str, Any]) -> None:
+        """Check every page of every file, and that no run of a study is missing. Raises FileError."""
+        if gaps := _gaps([*self.checked(study, whole=True).values()], 0, study["runs"]):
+            named = listed(first_of([f"{first} to {end - 1}" for first, end in gaps], _SHOWN))
+            advice = f"do them with --part, or copy their files into {RUNS}"
+            raise FileError(f"{self.folder}: of {study['runs']} runs, these are missing: {named}: {advice}")
 
     def description(self) -> dict[str, Any]:
         """Return the description of the study. Raises FileError."""
@@ -294,13 +245,6 @@ def _reason(old: Mapping[str, Any], study: Mapping[str, Any], digest: str) -> st
     plans = old["plan"], new["plan"]
     changed = sorted(key for key in {*plans[0], *plans[1]} if plans[0].get(key) != plans[1].get(key))
     return f"holds runs of another plan ({', '.join(changed)} changed)"
-
-
-def check_apart(files: Mapping[Path, Span]) -> None:
-    """Raise FileError if two files, which are in the order of their runs, have the same run."""
-    for (path, (_, end)), (other, (first, _)) in pairwise(files.items()):
-        if first < end:
-            raise FileError(f"{other}: has runs that {path} has, too: remove one of them")
 
 
 def _gaps(done: list[Span], first: int, last: int) -> list[Span]:

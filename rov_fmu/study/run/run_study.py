@@ -13,7 +13,7 @@ from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_mod
 from rov_fmu.study.plan.plan import Plan, load_plan
 from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
 from rov_fmu.study.plan.system_model import SystemModel, read_system
-from rov_fmu.study.results.store import RUNS, Part, Store, identity
+from rov_fmu.study.results.store import Store, identity
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.system_simulator import half_step_words
 from rov_fmu.study.run.work import Progress, Spent, Work
@@ -43,8 +43,8 @@ def run_study(
     - `scheduler`: the address of a Dask scheduler that is used instead.
     - `engine`: "lanes" for a vehicle in this process, the default for a plan with `vehicle` and no scheduler; "fmu" for
       its FMU on Dask workers. The rows are equal within rounding.
-    - `part`: (3, 64) for the third of 64 parts, whose results are in `folder`/parts/3-of-64.
-    - `merge`: True to do no run, and copy those of all parts into `folder`.
+    - `part`: (3, 64) for the third of 64 parts, which may run beside each other.
+    - `merge`: True to do no run, and check that the files of all runs are in `folder`.
     - `on_progress`: called with the state of the runs.
 
         rov_fmu.run_study("plan.toml", "results", workers=2).runs  # a pandas data frame, a row for each run
@@ -65,7 +65,7 @@ def run_study(
         scheduler,
         on_progress,
         engine=engine,
-        part=part and Part(*part),
+        part=part,
         merge=merge,
     )
     return Results(store.folder)
@@ -80,7 +80,7 @@ def do_study(
     on_warning: Callable[[str], None] = lambda _: None,
     *,
     engine: Engine | None = None,
-    part: Part | None = None,
+    part: tuple[int, int] | None = None,
     merge: bool = False,
     force: bool = False,
 ) -> tuple[Spent, Store]:
@@ -95,18 +95,16 @@ def do_study(
     prepared = prepare(plan, path, model)
     for warning in prepared.warnings:
         on_warning(warning)
-    whole, runs = Store(folder, force=force), prepared.design.runs
-    store = part.store(folder, force=force) if part else whole
-    if part and (folder / RUNS).is_dir() and whole.done():
-        raise FileError(f"{folder}: has runs that are no parts: choose another folder, or leave --part out")
+    store, (number, parts) = Store(folder, force=force), part or (1, 1)
+    first, last = ((number - at) * prepared.design.runs // parts for at in (1, 0))
     description = _description(plan, prepared, model, engine)
-    with store.held():
+    with store.held(f"-{number}-of-{parts}" if part else ""):
+        store.describe(description, (first, last))
         if merge:
-            store.merge(description)
+            store.check_complete(description)
             return Spent(), store
-        store.describe(description)
         job = replace(prepared.job, study=identity(description))
-        work = Work(job, prepared.design, store, *(part.runs(runs) if part else (0, runs)), on_progress)
+        work = Work(job, prepared.design, store, first, last, on_progress)
         try:
             if not work.missing:
                 pass
