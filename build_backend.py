@@ -51,7 +51,7 @@ class Prebuilt(BuildHookInterface[Any]):
 
 def prebuild(folder: Path) -> None:
     """Compile everything into a folder."""
-    from rov_fmu.bridges.autopilot.law import FILES, law_sources
+    from rov_fmu.autopilot.law import FILES, law_sources
     from rov_fmu.build import build_fmu
     from rov_fmu.c.compile import HOSTS, compile_engine, compile_module
     from rov_fmu.c.library import engine_sources

@@ -29,6 +29,7 @@ PARTS = (
     "prove",
     "fmus",
     "fmu",
+    "autopilot",
     "identify",
     "tank",
     "c",

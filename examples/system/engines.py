@@ -15,9 +15,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.bridges.autopilot.gains import autopilot_of
-from rov_fmu.bridges.autopilot.law import AXES, SENSORS
-from rov_fmu.bridges.autopilot.pilot import Pilot
+from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.autopilot.law import AXES, SENSORS
+from rov_fmu.autopilot.pilot import Pilot
 from rov_fmu.bridges.system.ssp import PARAMETER_SET
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.vehicle.shipped import VIDEORAY

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from math import pi
 from pathlib import Path
 
+from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
-from rov_fmu.bridges.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.companion import companion
 from rov_fmu.bridges.system.companions.battery import Battery
 from rov_fmu.bridges.system.connections import Connection

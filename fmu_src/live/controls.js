@@ -4,8 +4,6 @@ const SPEEDS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50];
 const [SPAN, SPAN_REPLAYED] = [20, 30]; // s, of the charts
 const LONGEST_FRAME = 0.1; // s; a page that was hidden does not fly what it missed
 const DEAD_ZONE = 0.12;
-const HELD = "Depth, heading and attitude are held as by ArduSub.";
-const NOT_HELD = "It is not held level, because no thruster rolls or pitches it.";
 
 /** The axis that each arrow key drives, and the direction. @type {Record<string, [string, number]>} */
 const ARROWS = {
@@ -128,9 +126,9 @@ class Live {
     /** The time in ms at which the numbers were changed. */
     this.told = 0;
     this.connect();
-    const level = this.flight.isHeld ? `${HELD} ` : pilot.has("phi") ? `${NOT_HELD} ` : "";
+    const held = this.heldWords();
     this.say(
-      `${level}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
+      `${held ? `${held} ` : ""}Time starts with the first command: a slider, a stick, or a key such as ${this.vehicle.axes[0].keys[0]}.`,
     );
     this.arrange();
     this.follow(location.hash);
@@ -185,11 +183,12 @@ class Live {
       this.flight.ghostShown = ghost.checked;
       this.changed = true;
     });
-    const hold = /** @type {HTMLInputElement | null} */ (document.getElementById("live-hold"));
+    const hold = /** @type {HTMLSelectElement | null} */ (document.getElementById("live-hold"));
+    if (hold) hold.value = this.flight.held;
     hold?.addEventListener("change", () => {
       this.takeOver();
-      this.flight.isHeld = hold.checked;
-      this.say(hold.checked ? HELD : "Keys and sticks drive the thrusters alone; nothing is held.");
+      this.flight.held = hold.value;
+      this.say(this.heldWords() || "Keys and sticks drive the thrusters alone; nothing is held.");
       this.show();
     });
     stage.addEventListener("keydown", (event) => this.pressed(event));
@@ -244,6 +243,12 @@ class Live {
         this.fit();
         this.draw();
       });
+  }
+
+  /** Returns what the page says about the autopilot that holds the vehicle, or about one that cannot. */
+  heldWords() {
+    const { model } = this.flight.pilot;
+    return this.vehicle.laws.length ? (model.lawOf(this.flight.held)?.words ?? "") : this.vehicle.unheld;
   }
 
   /** @param {HTMLInputElement} slider */
@@ -593,7 +598,7 @@ class Live {
       if (demands.size === 0) return;
       this.takeOver();
     }
-    if (this.flight.isHeld && !this.flight.test) {
+    if (this.flight.held && !this.flight.test) {
       const { begun } = this.flight;
       this.flight.steer({ demands, added: this.held, most: this.most });
       if (begun !== this.flight.begun) this.say("");

@@ -31,6 +31,9 @@ function between(times, value, time) {
   return share ? value(n) + share * (value(n + 1) - value(n)) : value(n);
 }
 
+/** @param {number} x @param {number} most */
+const within = (x, most) => Math.max(-most, Math.min(most, x));
+
 /** Returns the variable of a signal, or null for the distance along its axis. @param {Axis} axis @param {boolean} isPosition */
 function variableOf({ velocity, position }, isPosition) {
   return isPosition ? position : velocity;
@@ -46,8 +49,8 @@ class Craft {
   /** @param {Model} model */
   constructor(model) {
     this.model = model;
-    /** What holds it level. @type {Hold | null} */
-    this.hold = null;
+    /** What holds it. @type {Helm | null} */
+    this.helm = null;
     /** @type {Float64Array[]} */
     this.states = [];
     /** The distance covered along each axis. */
@@ -62,14 +65,15 @@ class Craft {
   }
 
   /** Steps h seconds from a time on, under the commands that are set or by sticks. Returns false when the step fails.
-   * @param {number} time @param {number} h @param {Sticks | null} sticks */
-  step(time, h, sticks) {
+   * @param {number} time @param {number} h @param {Sticks | null} sticks @param {string} name Of the autopilot. */
+  step(time, h, sticks, name = "") {
     const { model, distances } = this;
     const { axes } = model.vehicle;
     const before = axes.map(({ velocity }) => model.get(velocity));
-    if (sticks && model.canLevel()) {
-      if (this.hold?.until !== time) this.hold = new Hold(model, time);
-      if (!this.hold.step(h, sticks)) return false;
+    const law = model.lawOf(name);
+    if (sticks && law) {
+      if (this.helm?.until !== time || this.helm.law !== law) this.helm = new Helm(model, law, time);
+      if (!this.helm.step(h, sticks)) return false;
     } else {
       if (sticks) model.give(commandsOf(model.vehicle, sticks.demands, sticks.most));
       if (!model.step(h)) return false;
@@ -162,8 +166,8 @@ class Flight {
     this.test = null;
     /** @type {Replay | null} */
     this.replay = null;
-    /** True while the sticks steer a vehicle that is held level. */
-    this.isHeld = pilot.canLevel();
+    /** The name of the autopilot that holds the vehicle while the sticks steer it; none at first where it keeps level by itself. */
+    this.held = pilot.vehicle.laws.find(({ held }) => held.includes("roll") || held.includes("pitch"))?.name ?? "";
     /** @type {Sticks} */
     this.sticks = { demands: new Map(), added: {} };
     /** The depth of the seabed, m, which recordings and step tests do not have, and whether it and the surface stop the vehicle. */
@@ -219,7 +223,7 @@ class Flight {
       !this.begun ||
       (this.test === null &&
         this.replay === null &&
-        !(this.isHeld && this.sticks.demands.size > 0) &&
+        !(this.held && this.sticks.demands.size > 0) &&
         variables.slice(0, inputs).every(([name, start]) => model.get(name) === start) &&
         axes.every(({ velocity }) => [velocity, `der(${velocity})`].every((name) => Math.abs(model.get(name)) < REST)))
     );
@@ -259,7 +263,7 @@ class Flight {
     return isPossible;
   }
 
-  /** Takes over the sticks of a vehicle that is held level. @param {Sticks} sticks */
+  /** Takes over the sticks of a vehicle that is held. @param {Sticks} sticks */
   steer(sticks) {
     this.sticks = sticks;
     this.begun ||= sticks.demands.size > 0 || Object.values(sticks.added).some((value) => value !== 0);
@@ -267,7 +271,7 @@ class Flight {
 
   /** Returns the sticks while they steer: not a recording or a step test, whose commands are those of the thrusters. */
   steering() {
-    return this.isHeld && !this.replay && !this.test ? this.sticks : null;
+    return this.held && !this.replay && !this.test ? this.sticks : null;
   }
 
   /** True while the ghost is shown with its track, which needs measurements of surge in a recording. */
@@ -286,7 +290,7 @@ class Flight {
     for (let left = h; left > 0; ) {
       const step = Math.min(left, LONGEST_STEP);
       const sticks = this.steering();
-      if (![this.pilot, this.ghost].every((craft) => craft.step(this.time, step, sticks))) {
+      if (![this.pilot, this.ghost].every((craft) => craft.step(this.time, step, sticks, this.held))) {
         this.reset();
         return false;
       }

@@ -6,6 +6,7 @@
 
 IMPORTED(sin) double sin(double x);
 IMPORTED(cos) double cos(double x);
+IMPORTED(tan) double tan(double x);
 IMPORTED(atan2) double atan2(double y, double x);
 IMPORTED(expm1) double expm1(double x);
 IMPORTED(atanh) double atanh(double x);
@@ -18,6 +19,7 @@ IMPORTED(pow) double pow(double x, double y);
 #define isfinite(x) __builtin_isfinite(x)
 #define floor(x) __builtin_floor(x)
 #define fabs(x) __builtin_fabs(x)
+#define copysign(x, y) __builtin_copysign(x, y)
 #define sqrt(x) __builtin_sqrt(x)
 
 /* If one argument is NaN, ISO C returns the other one. The instructions of WebAssembly would return NaN. */

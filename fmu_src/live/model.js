@@ -3,11 +3,10 @@
 
 /**
  * An axis: the names of its velocity, load and position, their units, the commands that drive it with their signs, and the letters
- * of the keys that drive it in its positive and in its negative direction, if any command does. `shares` are the commands by which the keys drive it, `held` those
- * by which Hold does.
+ * of the keys that drive it in its positive and in its negative direction, if any command does. `shares` are the commands by which the keys drive it.
  * `quantities` are those of its motion that a recording may have.
  * @typedef {{name: string, velocity: string, unit: string, external: string, position: string | null, positionUnit: string, quantities: Quantity[],
- *   signs: Record<string, number>, shares: Record<string, number>, held: Record<string, number>, keys: string}} Axis
+ *   signs: Record<string, number>, shares: Record<string, number>, keys: string}} Axis
  */
 /**
  * A quantity of rov_fmu/tank/catalogue.py: the names of its column, that in a recording of one axis, and those that need a known unit;
@@ -48,16 +47,23 @@
  * @typedef {{axis: number, command: number, V: number | null, Tau: number | null}} StepTest
  */
 /**
+ * An autopilot: its samples in a second, the rate of yaw by a full stick (rad/s, 0: the stick is a force), the axes that it holds, what the
+ * page says about it, and its numbers as fmu_src/live/module.c takes them.
+ * @typedef {{name: string, rate: number, turn: number, held: string[], words: string, numbers: number[]}} Law
+ */
+/**
  * The data of a vehicle in a page. Variables are listed by their places, with their start values. The module is deflated, in Base64.
  * Commands are fractions in the page; `tested` is the largest for which the model was identified, and `pulse` has the pulse widths of full reverse, neutral and full thrust if the model takes these.
+ * `sensors` are the places of what an autopilot measures.
  * @typedef {{identifier: string, name: string, module: string, variables: [string, number][], inputs: number, states: number, commands: string[],
  *   columns: CommandColumn[], csv: Rules, pulse: [number, number, number] | null, tested: number, axes: Axis[], thrusters: Thruster[], fins: {at: Vector, along: Vector}[],
- *   tests: StepTest[], size: number}} Vehicle
+ *   sensors: number[], laws: Law[], unheld: string, tests: StepTest[], size: number}} Vehicle
  */
 /**
  * The exports of fmu_src/live/module.c.
  * @typedef {{memory: WebAssembly.Memory, variables: () => number, marks: () => number, tune: () => number, begin: () => void,
- *   step: (h: number) => number, observe: () => void}} Exports
+ *   step: (h: number) => number, observe: () => void, law: () => number, room: () => number, asked: () => number, release: () => void,
+ *   hold: (h: number, samples: number) => number}} Exports
  */
 
 class Model {
@@ -67,11 +73,14 @@ class Model {
     this.vehicle = vehicle;
     this.module = module;
     this.exports = /** @type {Exports} */ (/** @type {unknown} */ (instance.exports));
-    const { memory, variables, marks } = this.exports;
+    const { memory, variables, marks, law, room, asked } = this.exports;
     /** The values of the variables, by their places. */
     this.values = new Float64Array(memory.buffer, variables(), vehicle.variables.length);
     /** V_ss and Tau of each axis. */
     this.marks = new Float64Array(memory.buffer, marks(), 2 * vehicle.axes.length);
+    this.law = new Float64Array(memory.buffer, law(), room());
+    /** For the autopilot: the places of the sensors, the modes and the aims of the axes, the largest output, and what is added to the commands. */
+    this.asked = new Float64Array(memory.buffer, asked(), vehicle.sensors.length + 13 + vehicle.commands.length);
     this.places = new Map(vehicle.variables.map(([name], place) => [name, place]));
     /** The commands as fractions, if the model takes pulse widths. @type {Map<string, number>} */
     this.fractions = new Map();
@@ -137,9 +146,31 @@ class Model {
     return isPossible;
   }
 
-  /** Returns true when commands roll or pitch the vehicle, so that it can be held level. */
-  canLevel() {
-    return this.vehicle.axes.some(({ name, held }) => ["roll", "pitch"].includes(name) && Object.keys(held).length > 0);
+  /** Returns the autopilot of a name, if the vehicle has it. @param {string} name */
+  lawOf(name) {
+    return this.vehicle.laws.find((law) => law.name === name);
+  }
+
+  /** Lets an autopilot begin. @param {Law} law */
+  take({ numbers }) {
+    this.law.set(numbers);
+    this.asked.set(this.vehicle.sensors);
+    this.exports.release();
+  }
+
+  /** Steps h seconds with the autopilot, which samples so many times. Returns false when a step fails. @param {number} h @param {number} samples
+   * @param {[number, number][]} modes Of the axes, with their aims. @param {number} most @param {Record<string, number>} added */
+  hold(h, samples, modes, most, added) {
+    const { sensors, commands, pulse } = this.vehicle;
+    const aims = [...modes.map(([mode]) => mode), ...modes.map(([, aim]) => aim)];
+    this.asked.set([...aims, most, ...commands.map((name) => added[name] ?? 0)], sensors.length);
+    const isDone = this.exports.hold(h, samples) !== 0;
+    const [low, neutral, high] = pulse ?? [0, 0, 0];
+    for (const name of pulse ? commands : []) {
+      const off = this.values[/** @type {number} */ (this.places.get(name))] - neutral;
+      this.fractions.set(name, off / (off > 0 ? high - neutral : neutral - low));
+    }
+    return isDone;
   }
 
   /** Sets all states to their start values. */

@@ -7,6 +7,7 @@ from functools import partial
 from types import MappingProxyType
 from uuid import UUID
 
+from rov_fmu.autopilot.law import LAW_FILE, law_sources
 from rov_fmu.c.compile import (
     C_SOURCES,
     INTERFACES,
@@ -142,9 +143,10 @@ def _fmi_license(fmi: int) -> bytes:
 
 
 def module_sources(layout: Layout) -> dict[str, str]:
-    """Return the C files of the module of a page by their names: those of the FMU's motion, and what the page calls."""
+    """Return the C files of the module of a page by their names: those of the FMU's motion, the autopilot's law, and
+    what the page calls."""
     page = {path.name: path.read_text(encoding="utf-8") for path in sorted(MODULE_SOURCES.glob("*.[ch]"))}
-    return page | motion_sources(layout)
+    return page | law_sources(LAW_FILE) | motion_sources(layout)
 
 
 def web_module(layout: Layout) -> bytes:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
-    from rov_fmu.bridges.autopilot.pilot import Pilot
+    from rov_fmu.autopilot.pilot import Pilot
     from rov_fmu.build import Built
     from rov_fmu.interface.arguments import Inputs
     from rov_fmu.interface.result import Result
@@ -263,8 +263,8 @@ class VehicleModel(Vehicle):
 
         Raises InputError if the thrusters cannot hold any axis, and BuildError where the law cannot be compiled.
         """
-        from rov_fmu.bridges.autopilot.gains import autopilot_of
-        from rov_fmu.bridges.autopilot.pilot import Pilot
+        from rov_fmu.autopilot.gains import autopilot_of
+        from rov_fmu.autopilot.pilot import Pilot
         from rov_fmu.interface.stepper import checked_length
 
         return Pilot(autopilot_of(self, checked_length(step), delay))

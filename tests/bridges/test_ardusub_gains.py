@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from rov_fmu.autopilot.ardusub import FIRMWARE, ROWS, Leg, fly
 from rov_fmu.bridges.ardusub.files import flight_table, gains_files
 from rov_fmu.bridges.ardusub.gains import Tuned, read_gains, tuned
-from rov_fmu.bridges.ardusub.law import FIRMWARE, ROWS, Leg, fly
 from rov_fmu.c.simulation import Array
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis

@@ -40,7 +40,7 @@ def said(page: Any) -> str:
 
 _FLY = """legs => {
     live.pause(true);
-    Object.assign(live.flight, { isHeld: false, isBounded: false });
+    Object.assign(live.flight, { held: "", isBounded: false });
     live.flight.reset();
     const { model } = live.flight.pilot;
     return legs.map(({ length, inputs, tuning }) => {

@@ -7,8 +7,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from rich.table import Table
 
+from rov_fmu.autopilot.ardusub import FIRMWARE, RATE
 from rov_fmu.bridges.ardusub.gains import FIGURES, HEAD, NEW_NAMES, RANGES, SHOWN, Tuned, figures
-from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE
 from rov_fmu.io.messages import one_line
 from rov_fmu.report.console import table, text
 from rov_fmu.report.plots.png import png_file

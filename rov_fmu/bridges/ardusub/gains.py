@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rov_fmu.bridges.ardusub.law import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
+from rov_fmu.autopilot.ardusub import FIRMWARE, RATE, ROWS, FlownLeg, Leg, Mixer, fly
 from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.io.messages import FileError, InputError, listed, shown
 from rov_fmu.io.reading import read_text

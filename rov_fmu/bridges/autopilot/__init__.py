@@ -1,1 +1,1 @@
-"""An autopilot for any vehicle that its thrusters can hold: its law in C, its gains, and flights."""
+"""The autopilot for other tools: its FMU, and its gains as a file."""

@@ -5,10 +5,10 @@ from math import inf, pi, radians
 
 import numpy as np
 
-from rov_fmu.bridges.autopilot.flights import Flights
+from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.gains import Autopilot, autopilot_of
+from rov_fmu.autopilot.law import AXES, PLACE, SENSORS, STICK
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
-from rov_fmu.bridges.autopilot.gains import Autopilot, autopilot_of
-from rov_fmu.bridges.autopilot.law import AXES, PLACE, SENSORS, STICK
 from rov_fmu.bridges.sdf import Array
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.io.messages import one_line

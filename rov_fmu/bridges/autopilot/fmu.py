@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-from rov_fmu.bridges.autopilot.gains import Autopilot
-from rov_fmu.bridges.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
+from rov_fmu.autopilot.gains import Autopilot
+from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
 from rov_fmu.build import chosen_platforms, with_binaries
 from rov_fmu.c.compile import compile_all
 from rov_fmu.equation.attitude import QUATERNION

@@ -12,8 +12,8 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from rov_fmu import __version__
+from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
-from rov_fmu.bridges.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.companion import AUTOPILOT, Rows, companion, lack, levels_of, slave_of, timed_rows
 from rov_fmu.bridges.system.connections import (
     DIFFERENCE,

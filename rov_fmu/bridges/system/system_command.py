@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
+from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.bridges.autopilot.fmu import autopilot_model
-from rov_fmu.bridges.autopilot.gains import autopilot_of
 from rov_fmu.bridges.system.companion import AUTOPILOT, COMPANIONS, lack, slave_of
 from rov_fmu.bridges.system.half_step import HalfStep, half_step
 from rov_fmu.bridges.system.master import Name

@@ -5,18 +5,24 @@ import json
 import zlib
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from math import floor, log10
 from typing import Any
 
 import numpy as np
 from markupsafe import Markup
 
+from rov_fmu.autopilot.ardusub import RATE, STICK_TIME, TURNING, Mixer, loops_of
+from rov_fmu.autopilot.gains import STEP, autopilot_of
+from rov_fmu.autopilot.law import AXES as LAW_AXES
+from rov_fmu.autopilot.law import SENSORS
 from rov_fmu.c.compile import MODULE_SOURCES
-from rov_fmu.equation.catalogue import PITCH, ROLL, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.fmu.variables import variables
+from rov_fmu.io.messages import InputError, listed
 from rov_fmu.report.plots.geometry import size_of, thruster_place
 from rov_fmu.report.plots.steps import held_commands, measured_step, tables_by_axis
 from rov_fmu.report.templates import inline_script, number, page, pretty_unit
@@ -31,12 +37,13 @@ _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
 _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
-_TILTING = (ROLL, PITCH)
+_HELD = {HEAVE: "depth", YAW: "heading", ROLL: "roll", PITCH: "pitch"}
+"""What an autopilot of the page holds."""
 _FARTHEST = 0.2
 """The farthest that a slider moves a centre of mass or buoyancy, m."""
 _SCRIPTS = (
     "model.js",
-    "hold.js",
+    "helm.js",
     "flight.js",
     "recording.js",
     "canvas.js",
@@ -87,8 +94,8 @@ class Live:
     """The inputs that are not commands: name, end of the slider, unit."""
     tunable: Mapping[str, Sequence[Slider]]
     """The tunable coefficients by the title of their group."""
-    can_level: bool
-    """True when commands roll or pitch the vehicle, so that it can be held level."""
+    laws: Sequence[Mapping[str, Any]]
+    """The autopilots that can hold the vehicle."""
     title: str
     """The name of the vehicle, or the names of both."""
     other: str | None
@@ -121,7 +128,7 @@ def live(flown: Sequence[FlyingVehicle], recording: Mapping[str, Any] | None = N
         start=start,
         loads=list(_loads(pilot, start)),
         tunable={title: sliders for title, sliders in tunable.items() if sliders},
-        can_level=any(data[0]["axes"][n]["held"] for n, form in enumerate(pilot.layout.axes) if form.axis in _TILTING),
+        laws=data[0]["laws"],
         title=" beside ".join(names),
         other=names[1] if len(flown) > 1 else None,
         recording=_json(recording) if recording else None,
@@ -184,6 +191,7 @@ def _data(flown: FlyingVehicle) -> dict[str, Any]:
         "axes": [_axis(vehicle, axis, keys) for axis, keys in _keys(layout)],
         "thrusters": [_thruster(vehicle, thruster, labels[thruster.name]) for thruster in layout.thrusters],
         "fins": [{"at": fin.place, "along": fin.direction.value} for fin in layout.fins],
+        **_autopilots(vehicle),
         "tests": list(_tests(vehicle)),
         "size": size_of(vehicle),
     }
@@ -226,8 +234,7 @@ def _axis(vehicle: Vehicle, axis: Axis, keys: str) -> dict[str, Any]:
         "positionUnit": axis.position_unit,
         "quantities": as_json(axis),
         "signs": vehicle.layout.signs(axis),
-        "shares": (shares := _shares(vehicle, axis)),
-        "held": _held(vehicle, axis, shares),
+        "shares": _shares(vehicle, axis),
         "keys": keys,
     }
 
@@ -254,15 +261,38 @@ def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     return {name: share for name, share in found.items() if share}
 
 
-def _held(vehicle: Vehicle, axis: Axis, shares: Mapping[str, float]) -> dict[str, float]:
-    """Return the commands by which the hold drives an axis of a vehicle that rolls or pitches.
+def _autopilots(vehicle: Vehicle) -> dict[str, Any]:
+    """Return the autopilots of a vehicle, as fmu_src/live/model.js declares them, and the sentence why it has none.
 
-    They leave alone the thrusters that only balance the others, as ArduSub's motor matrices do: the hold balances.
+    They hold depth, heading, roll and pitch, as far as the thrusters push along these axes; keys drive the others. That
+    of ArduSub, with its default gains, needs one of its frames.
     """
-    if not vehicle.layout.has_attitude:
-        return {}
-    signs = vehicle.layout.signs(axis)
-    return {name: share for name, share in shares.items() if name in signs} or dict(shares)
+    places = {variable.name: n for n, variable in enumerate(variables(vehicle))}
+    names = {axis: name for axis, name in _HELD.items() if vehicle.layout.has(axis)}
+    try:
+        own = autopilot_of(vehicle)
+    except InputError as error:
+        return {"sensors": [], "laws": [], "unheld": f"It is not held: {str(error).partition(': ')[2]}."}
+    steered = replace(
+        own.sharing, stick_time=STICK_TIME
+    )  # a jump to full thrust ahead would tilt a Heavy by 47 degrees
+    kinds = [("own", "Held by its own gains", round(1.0 / STEP), own.gain(YAW, "v_max"), own.loops, steered)]
+    with suppress(InputError):
+        sharing = Mixer(vehicle).sharing
+        kinds.append(("ardusub", "Held as by ArduSub", RATE, TURNING, loops_of({}, 1), sharing))
+    laws = []
+    for name, title, rate, turn, loops, sharing in kinds:
+        pushes = np.abs(sharing.of_axis).max(axis=0) > 0.0
+        held = [axis for axis in names if pushes[LAW_AXES.index(axis)]]
+        gains = "gains that are made for this vehicle" if name == "own" else "ArduSub's law and default gains"
+        words = f"{listed(names[axis] for axis in held).capitalize()} {'are' if held[1:] else 'is'} held with {gains}."
+        if lacking := [names[axis] for axis in names if axis not in held]:
+            words += f" Its thrusters cannot hold {listed(lacking)}."
+        numbers = [*loops.view("f8").ravel().tolist(), *sharing.numbers.tolist()]
+        law = {"name": name, "title": title, "rate": rate, "turn": turn, "held": [axis.name for axis in held]}
+        laws += [law | {"words": words, "numbers": numbers}] * bool(held)
+    unheld = "" if laws else f"It is not held: its thrusters do not push along {listed(a.name for a in names)}."
+    return {"sensors": [places.get(name, -1) for name in SENSORS], "laws": laws, "unheld": unheld}
 
 
 def _thruster(vehicle: Vehicle, thruster: Thruster, label: str) -> dict[str, Any]:

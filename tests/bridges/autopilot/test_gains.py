@@ -10,12 +10,12 @@ import yaml
 from fmpy.validation import validate_fmu
 
 import rov_fmu
+from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.gains import Autopilot, autopilot_of
+from rov_fmu.autopilot.law import AXES, PLACE, RATE, SENSORS, STICK
+from rov_fmu.autopilot.pilot import Pilot
 from rov_fmu.bridges.autopilot.files import flown
-from rov_fmu.bridges.autopilot.flights import Flights
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
-from rov_fmu.bridges.autopilot.gains import Autopilot, autopilot_of
-from rov_fmu.bridges.autopilot.law import AXES, PLACE, RATE, SENSORS, STICK
-from rov_fmu.bridges.autopilot.pilot import Pilot
 from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.c.simulation import Array
 from rov_fmu.c.stepper import Stepper

@@ -26,7 +26,7 @@ def test_a_flight_with_changes_from_10_s_on_is_the_rigid_body_restarted_there(pa
         """([inputs, changes]) => {
             live.pause(true);
             const { flight } = live;
-            Object.assign(flight, { isHeld: false, isBounded: false });
+            Object.assign(flight, { held: "", isBounded: false });
             flight.set(inputs);
             flight.advance(10);
             const done = flight.tune(changes);

@@ -1,20 +1,20 @@
-"""The page holds a vehicle level as ArduSub does: its law beside the one in Python, and what a pilot does with it."""
+"""The page holds a vehicle by its own gains or as ArduSub does, by the law in C, and what a pilot does with it."""
 
 from collections.abc import Callable
-from math import cos, degrees, sin
+from dataclasses import replace
+from math import degrees
 from typing import Any
 
+import numpy as np
 import pytest
 
-from rov_fmu.c.stepper import Stepper
+from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
+from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.autopilot.law import PLACE, SENSORS, STICK
 from tests.report.conftest import flown_vehicle, get, until
-from verification.references.autopilot.ardusub import STICK, Hold, Motion
 
 pytestmark = pytest.mark.interop
-
-RATE = 400
-"""The steps of ArduSub in a second."""
-NAMES = ("u", "v", "w", "p", "q", "r", "z", "phi", "theta", "psi", "x", "y", "der(u)", "der(v)", "der(w)")
 
 
 @pytest.fixture
@@ -23,51 +23,51 @@ def page(fly: Callable[..., Any]) -> Any:
     return fly("bluerov2_heavy")
 
 
-def by_the_law(seconds: float, ahead: float, aside: float) -> dict[str, float]:
-    """Return the motion of the Heavy after a flight from a depth of 2 m, with the law in Python and exact steps."""
-    vehicle = flown_vehicle("bluerov2_heavy")
-    stepper, hold = Stepper(vehicle, {"z": 2.0, "psi_0": 0.5}, NAMES), Hold(2.0, 0.5)
-    motion = dict.fromkeys(NAMES, 0.0) | vehicle.calculated(vehicle.layout.usual_inputs, vehicle.layout.at_rest)
-    motion |= {"z": 2.0, "psi": 0.5}
-    forward = lateral = 0.0
-    for _ in range(round(seconds * RATE)):
-        phi, theta = motion["phi"], motion["theta"]
-        down = (-sin(theta), sin(phi) * cos(theta), cos(phi) * cos(theta))
-        u, v, w, p, q, r = (motion[name] for name in NAMES[:6])
-        spun = (q * w - r * v, r * u - p * w, p * v - q * u)
-        fall = sum(d * (motion[f"der({name})"] + s) for d, name, s in zip(down, "uvw", spun, strict=True))
-        sinking = sum(d * x for d, x in zip(down, (u, v, w), strict=True))
-        now = Motion((phi, theta, motion["psi"]), (p, q, r), motion["z"], sinking, fall)
-        forward += (ahead - forward) / RATE / (1.0 / RATE + STICK)
-        lateral += (aside - lateral) / RATE / (1.0 / RATE + STICK)
-        outputs = hold.outputs(now, forward, lateral, 1.0 / RATE)
-        motion = dict(zip(NAMES, stepper.step(outputs, 1.0 / RATE)[-len(NAMES) :], strict=True))
-    return motion
-
-
-@pytest.mark.parametrize(("ahead", "aside"), [(1.0, 0.0), (-0.4, 0.6), (0.0, 0.0)])
-def test_the_law_of_the_page_is_that_of_the_stand_in(page: Any, ahead: float, aside: float) -> None:
+@pytest.mark.parametrize("kind", ["bluerov2_heavy", "videoray"])
+@pytest.mark.parametrize("law", ["own", "ardusub"])
+def test_the_page_flies_as_the_law_does_in_python(kind: str, law: str, fly: Callable[..., Any]) -> None:
+    """6 s ahead and aside by sticks, at a depth of 2 m and a heading of 0.5 rad, to which it has to turn."""
+    page, vehicle, ahead, aside = fly(kind), flown_vehicle(kind), 0.4, 0.6
     page.evaluate(
-        """([ahead, aside]) => {
+        """([law, ahead, aside]) => {
             live.pause(true);
             const { flight } = live;
             const { model } = flight.pilot;
+            Object.assign(flight, { held: law, isBounded: false });
             model.set("z", 2);
-            model.set("psi", 0.5);
             model.turn();
             flight.steer({ demands: new Map([["surge", ahead], ["sway", aside]]), added: {} });
-            flight.advance(6);
+            flight.advance(0.05);
+            Object.assign(flight.pilot.helm, { heading: 0.5, depth: 2.3 });
+            flight.advance(5.95);
         }""",
-        [ahead, aside],
+        [law, ahead, aside],
     )
-    expected = by_the_law(6.0, ahead, aside)
-    assert dict(zip(NAMES, get(page, *NAMES), strict=True)) == pytest.approx(expected, rel=1e-6, abs=1e-6)
+    own = autopilot_of(vehicle)
+    loops, sharing = (
+        (own.loops, replace(own.sharing, stick_time=0.8))
+        if law == "own"
+        else (loops_of({}, 1)[0], Mixer(vehicle).sharing)
+    )
+    rate = 60 if law == "own" else RATE  # the page steps 0.05 s, in which it samples three times
+    has = vehicle.layout.has_attitude
+    mode = [STICK, STICK, PLACE, *([PLACE, PLACE] if has else [STICK, STICK]), PLACE]
+    aims = np.tile([ahead, aside, 2.3, 0.0, 0.0, 0.5], (6 * rate + 1, 1))
+    aims[: rate // 20, [2, 5]] = 2.0, 0.0
+    flights = Flights(vehicle, sharing, [{"z": 2.0}])
+    flown = flights.fly(loops, np.tile(mode, (len(aims), 1)), aims, 1.0 / rate)
+    expected = dict(zip(SENSORS, flown.sensors[0, -1], strict=True))
+    names = [name for name in SENSORS if name in vehicle.layout.places]
+    assert abs(expected["psi"] - 0.5) < 0.1
+    assert get(page, *names) == pytest.approx([expected[name] for name in names], rel=1e-9, abs=1e-9)
 
 
-def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any) -> None:
-    """It goes on with the keys of a pilot: 20 s of W at 100 %, at ten times real time."""
-    assert page.is_checked("#live-hold")
-    assert "Depth, heading and attitude are held" in page.inner_text("#live-message")
+@pytest.mark.parametrize(("law", "most"), [("own", 45.0), ("ardusub", 35.0)])
+def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any, law: str, most: float) -> None:
+    """It goes on with the keys of a pilot: 20 s of W at 100 %, which leaves little thrust to level it."""
+    assert page.input_value("#live-hold") == "own"
+    assert "Depth, heading, roll and pitch are held with gains that are" in page.inner_text("#live-message")
+    page.select_option("#live-hold", law)
     page.evaluate("live.speed = 10")
     page.locator("#live-strength").fill("1")
     page.focus("#live-stage")
@@ -76,7 +76,7 @@ def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any) ->
     tilts = page.evaluate(
         "live.flight.times.map((_, n) => Math.hypot(live.flight.pilot.at(n, 'phi'), live.flight.pilot.at(n, 'theta')))"
     )
-    assert degrees(max(tilts)) < 35.0
+    assert degrees(max(tilts)) < most
     assert get(page, "x")[0] > 15.0
     page.keyboard.up("KeyW")
     time = page.evaluate("live.flight.time")
@@ -104,18 +104,48 @@ def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None
     assert get(page, "phi", "theta") == pytest.approx([0.0, 0.0], abs=0.05)
 
 
-@pytest.mark.parametrize(
-    ("kind", "words"),
-    [("videoray", "Time starts"), ("remus100", "It is not held level, because no thruster rolls or pitches it.")],
-)
-def test_a_vehicle_that_no_thruster_rolls_or_pitches_is_not_held(
-    kind: str, words: str, fly: Callable[..., Any]
-) -> None:
-    """The VideoRay cannot tilt. The REMUS 100 tilts by its fins, which need speed."""
-    page = fly(kind)
+def test_another_autopilot_takes_over_without_a_jump(page: Any) -> None:
+    page.evaluate("live.speed = 5")
+    page.focus("#live-stage")
+    page.keyboard.down("KeyF")
+    until(page, "live.flight.pilot.model.get('z') > 1")
+    page.keyboard.up("KeyF")
+    time = page.evaluate("live.flight.time")
+    until(page, f"live.flight.time > {time + 20}")
+    (before,) = get(page, "z")
+    page.select_option("#live-hold", "ardusub")
+    assert "ArduSub's law and default gains" in page.inner_text("#live-message")
+    until(page, f"live.flight.time > {time + 30}")
+    assert get(page, "z") == pytest.approx([before], abs=0.1)
+    page.select_option("#live-hold", "")
+    assert "nothing is held" in page.inner_text("#live-message")
+
+
+def test_a_vehicle_that_keeps_level_is_held_if_the_pilot_asks_for_it(fly: Callable[..., Any]) -> None:
+    page = fly("videoray")
+    assert page.input_value("#live-hold") == ""
+    page.select_option("#live-hold", "own")
+    assert "Depth and heading are held with gains that are made for this vehicle." in page.inner_text("#live-message")
+    page.evaluate("live.speed = 5")
+    page.focus("#live-stage")
+    for key, name in (("KeyF", "z"), ("KeyD", "psi")):
+        page.keyboard.down(key)
+        until(page, f"live.flight.pilot.model.get('{name}') > 1")
+        page.keyboard.up(key)
+        time = page.evaluate("live.flight.time")
+        until(page, f"live.flight.time > {time + 15}")
+        (before,) = get(page, name)
+        until(page, f"live.flight.time > {time + 20}")
+        assert get(page, name) == pytest.approx([before], abs=0.01)
+
+
+def test_a_vehicle_that_thrusters_alone_do_not_hold_says_so(fly: Callable[..., Any]) -> None:
+    """The REMUS 100 tilts by its fins, which need speed."""
+    page = fly("remus100")
     assert page.locator("#live-hold").count() == 0
+    words = "It is not held: the autopilot moves thrusters alone, and not the fins rudder and plane."
     assert page.inner_text("#live-message").startswith(words)
     page.focus("#live-stage")
     page.keyboard.down("KeyW")
     until(page, "live.flight.pilot.model.get('u') > 0.1")
-    assert page.evaluate("live.flight.pilot.hold") is None
+    assert page.evaluate("live.flight.pilot.helm") is None

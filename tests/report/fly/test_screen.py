@@ -20,7 +20,7 @@ FLOWN_FOR_6_S = """() => {
     live.frame = () => {};
     const { flight } = live;
     const demands = new Map([["surge", 0.5], ["yaw", 0.2]]);
-    if (flight.isHeld) flight.steer({ demands, added: {} });
+    if (flight.held) flight.steer({ demands, added: {} });
     else flight.set(commandsOf(live.vehicle, demands));
     flight.advance(6);
     live.show();

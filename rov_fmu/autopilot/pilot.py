@@ -6,8 +6,8 @@ from math import isfinite
 
 import numpy as np
 
-from rov_fmu.bridges.autopilot.gains import Autopilot
-from rov_fmu.bridges.autopilot.law import AXES, PLACE, RATE, SENSORS, STATE, STICK, load_law
+from rov_fmu.autopilot.gains import Autopilot
+from rov_fmu.autopilot.law import AXES, PLACE, RATE, SENSORS, STATE, STICK, load_law
 from rov_fmu.c.simulation import pointer
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.io.messages import InputError, listed, only, shown

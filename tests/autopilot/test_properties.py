@@ -7,11 +7,11 @@ from math import radians
 import numpy as np
 import pytest
 
-from rov_fmu.bridges.ardusub.law import RATE, Mixer, loops_of
-from rov_fmu.bridges.autopilot import flights, law
-from rov_fmu.bridges.autopilot.flights import Flights
-from rov_fmu.bridges.autopilot.gains import autopilot_of
-from rov_fmu.bridges.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
+from rov_fmu.autopilot import flights, law
+from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
+from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle

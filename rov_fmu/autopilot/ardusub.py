@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.bridges.autopilot.flights import Flights
-from rov_fmu.bridges.autopilot.law import AXES, LOOP, PLACE, SENSORS, STICK, Sharing, pulse_of
+from rov_fmu.autopilot.flights import Flights
+from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SENSORS, STICK, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW, Axis
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.tank.arrays import Array
@@ -52,8 +52,10 @@ of the throttle. `AC_PosControl` lets the integrator reach the hover throttle, w
 full demand, whatever PSC_ACCZ_IMAX is."""
 _SENSORS = 20.0
 """The filters of gyroscope and accelerometer (INS_GYRO_FILTER, INS_ACCEL_FILTER), Hz."""
-_STICK = 0.8
+STICK_TIME = 0.8
 """The time constant with which a stick moves, s."""
+TURNING = 3.375 * pi / 4.0
+"""The rate of yaw by a full stick, rad/s."""
 _PRIORITY = (1, 1, 0, 0, 0, 1)
 """The groups of motors, by AXES: those that lift, roll and pitch come before the others."""
 
@@ -116,7 +118,7 @@ class Mixer:
             *(of_axis, np.zeros((count, len(AXES))), np.eye(count), _PRIORITY),
             scales=scales,
             steps=400.0,
-            stick_time=_STICK,
+            stick_time=STICK_TIME,
             pulse=self._pulse,
         )
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.bridges.autopilot.law import AXES, SENSED, SENSORS, STATE, Sharing, load_law
-from rov_fmu.bridges.sdf import Array
+from rov_fmu.autopilot.law import AXES, SENSED, SENSORS, STATE, Sharing, load_law
 from rov_fmu.c.simulation import on_cores
 from rov_fmu.c.stepper import EngineMemory
+from rov_fmu.tank.arrays import Array
 from rov_fmu.vehicle.vehicle import Vehicle
 
 

@@ -1,7 +1,7 @@
 """The law of the autopilot (fmu_src/autopilot/autopilot.c): its numbers as arrays, and its library.
 
 For each axis, a place or an angle becomes a rate, and a rate a demand; the thrusters share the demands. ArduSub's loops
-are one set of numbers (`rov_fmu.bridges.ardusub.law`), and those in SI units another.
+are one set of numbers (`rov_fmu.autopilot.ardusub`), and those in SI units another.
 """
 
 import ctypes
@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rov_fmu.bridges.sdf import Array
 from rov_fmu.c.library import load_sources
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.io.paths import FMU_SRC
+from rov_fmu.tank.arrays import Array
 
 AXES = (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)
 """The axes in the order of the law."""

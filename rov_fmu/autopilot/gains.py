@@ -16,8 +16,8 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from rov_fmu.bridges.allocation import allocation_matrix, thrust_rows
-from rov_fmu.bridges.autopilot.law import AXES, LOOP, Sharing, pulse_of
+from rov_fmu.autopilot.allocation import allocation_matrix, thrust_rows
+from rov_fmu.autopilot.law import AXES, LOOP, Sharing, pulse_of
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.io.messages import InputError, listed
 from rov_fmu.tank.arrays import Array
