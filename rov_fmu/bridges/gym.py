@@ -2,9 +2,16 @@
 
 The task is to hold station: the vehicle starts at rest in a random place near the origin and should return there and
 stay, heading north. The action holds the commands from -1 to 1 (as fractions), the observation all states. The depth
-counts from the place to hold, which is deep under water, so that no surface acts.
+counts from the place to hold, which is deep under water, so that no surface acts. What a policy has to beat is the
+autopilot of the vehicle (`baseline`).
+
+Gymnasium knows the environment as ID, once this module is imported:
+
+    gymnasium.register_envs(rov_fmu.RovEnv)
+    env = gymnasium.make("rov_fmu/HoldStation-v0", vehicle="bluerov2", draws=False)
 """
 
+import warnings
 from typing import Any, Literal
 
 import gymnasium
@@ -14,9 +21,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from rov_fmu.autopilot.gains import autopilot_of
+from rov_fmu.autopilot.law import pulse_of
+from rov_fmu.autopilot.pilot import PLACES, Pilot
 from rov_fmu.c.stepper import LaneStepper
 from rov_fmu.io.messages import InputError, shown
-from rov_fmu.vehicle.vehicle import Vehicle, without_surface
+from rov_fmu.vehicle.shipped import find_vehicle
+from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle, without_surface
 
 Array = NDArray[np.float64]
 STEP = 0.1
@@ -26,6 +37,8 @@ STEPS = 300
 START = 2.0
 """The vehicle starts within this distance of the origin along each axis, m, and within this heading, rad."""
 Draws = Literal[True, False, "force"]
+ID = "rov_fmu/HoldStation-v0"
+"""The name for `gymnasium.make` and `gymnasium.make_vec`."""
 BOUND = 1000.0
 """The largest size of a state in an episode, in SI units."""
 
@@ -36,9 +49,10 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
     The reward is minus the sum of the squares of the position (m) and the heading (rad, of a vehicle without roll and
     pitch), and a tenth of that of the commands. An episode is truncated after `steps` steps of `step` seconds, and
     begins anew in the step after that. It is terminated when a state exceeds BOUND or the motion cannot be computed.
-    With `draws=False`, all vehicles have the coefficients of the file. An axis whose verdict is neither good nor usable
-    is an InputError, unless `draws="force"`. The processor's vectors step several vehicles at once, so that the states
-    differ from those of the FMU by rounding errors.
+    With `draws=False`, all vehicles have the coefficients of the file; where it has no uncertainty, a warning says that
+    none are drawn. An axis whose verdict is neither good nor usable is an InputError, unless `draws="force"`. The
+    processor's vectors step several vehicles at once, so that the states differ from those of the FMU by rounding
+    errors.
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012 - as Gymnasium declares it
@@ -55,6 +69,9 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         layout = vehicle.layout
         self.vehicle, self.num_envs, self.length, self.steps = vehicle, count, step, steps
         self.draws: Draws = draws if len(vehicle.uncertainty.names) else False
+        if draws and not self.draws:
+            reason = "its file has no uncertainty, so no coefficients are drawn: draws=False says that this is meant"
+            warnings.warn(f"{vehicle.identifier}: {reason}", stacklevel=2)
         self.states, self.commands = tuple(layout.state), tuple(layout.commands)
         self.targets = [n for n, name in enumerate(self.states) if name in ("x", "y", "z", "psi")]
         self.single_observation_space = Box(-BOUND, BOUND, (len(self.states),), np.float64)
@@ -65,6 +82,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         self._stepper = LaneStepper(vehicle, count)
         self.elapsed = np.zeros(count, int)
         self.over = np.zeros(count, bool)
+        self._pilots: dict[int, Pilot] = {}
 
     @property
     def state(self) -> Array:
@@ -93,7 +111,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
 
         - `actions`: the commands from -1 to 1, also of a vehicle whose commands are pulse widths.
 
-            many = RovVectorEnv(rov_fmu.load("videoray").with_(health_l=0.5), 16)
+            many = RovVectorEnv(rov_fmu.load("videoray").with_(health_l=0.5), 16, draws=False)
             many.reset(seed=1)
             states, reward, terminated, truncated, _ = many.step(np.zeros((16, 3)))
 
@@ -121,6 +139,32 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         self.over = failed | truncated
         return self.state.copy(), reward, failed, truncated, {}
 
+    def baseline(self) -> Array:
+        """Return the actions of the vehicles' autopilots now (vehicles x commands), once per step.
+
+        They hold the place to hold and north, as far as the thrusters push along these axes, with gains for the vehicle
+        of the file and the step. Those of a vehicle that cannot be held along surge and sway leave its place.
+
+            many = RovVectorEnv(rov_fmu.load("bluerov2"), 16, draws=False)
+            many.reset(seed=1)
+            states, reward, *_ = many.step(many.baseline())
+
+        Raises InputError if the thrusters cannot hold any axis.
+        """
+        layout = self.vehicle.layout
+        neutral, ahead, astern = pulse_of(layout)
+        actions = np.empty((self.num_envs, len(self.commands)))
+        for n in range(self.num_envs):
+            if n not in self._pilots:
+                made = autopilot_of(self.vehicle, self.length)
+                held = {name for name, axis in PLACES.items() if axis in made.axes}
+                held -= set() if {"north", "east"} <= held else {"north", "east"}
+                self._pilots[n] = Pilot(made).hold(**dict.fromkeys(held, 0.0))
+            now = dict(zip(layout.places, self._stepper.variables(n).tolist(), strict=True))
+            off = np.array([*self._pilots[n].step(now, self.length).values()]) - neutral
+            actions[n] = off / np.where(off > 0.0, ahead, astern)
+        return actions
+
     def _begin(self, which: NDArray[np.bool_]) -> None:
         """Start new episodes, with no command on its way."""
         numbers = np.flatnonzero(which)
@@ -131,6 +175,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         own = {name: column[numbers] for name, column in self.coefficients.items()}
         self._stepper.begin(own | dict(zip(self.states, start.T[:, :, np.newaxis], strict=True)), numbers.tolist())
         self.elapsed[which], self.over[which] = 0, False
+        self._pilots = {n: pilot for n, pilot in self._pilots.items() if not which[n]}
 
 
 class RovEnv(gymnasium.Env[Array, Array]):
@@ -147,7 +192,7 @@ class RovEnv(gymnasium.Env[Array, Array]):
 
         - `seed`, `options`: those of `RovVectorEnv.reset`.
 
-            state, _ = RovEnv(rov_fmu.load("videoray")).reset(seed=1)
+            state, _ = RovEnv(rov_fmu.load("videoray"), draws=False).reset(seed=1)
         """
         super().reset(seed=seed)
         state, info = self.many.reset(seed=seed, options=options)
@@ -158,7 +203,7 @@ class RovEnv(gymnasium.Env[Array, Array]):
 
         - `action`: the commands from -1 to 1.
 
-            one = RovEnv(rov_fmu.load("videoray"))
+            one = RovEnv(rov_fmu.load("videoray"), draws=False)
             one.reset(seed=1)
             state, reward, terminated, truncated, _ = one.step(np.zeros(3))
         """
@@ -166,3 +211,33 @@ class RovEnv(gymnasium.Env[Array, Array]):
             raise InputError(f"action: must have the shape {self.action_space.shape}, and has {np.shape(action)}")
         state, reward, terminated, truncated, info = self.many.step(np.asarray(action)[np.newaxis])
         return state[0], float(reward[0]), bool(terminated[0]), bool(truncated[0]), info
+
+    def baseline(self) -> Array:
+        """Return the action of the vehicle's autopilot now, once per step (`RovVectorEnv.baseline`).
+
+        one = RovEnv(rov_fmu.load("bluerov2"), draws=False)
+        one.reset(seed=1)
+        state, reward, *_ = one.step(one.baseline())
+        """
+        return self.many.baseline()[0]
+
+
+def _named(vehicle: Vehicle | str) -> Vehicle:
+    return vehicle if isinstance(vehicle, Vehicle) else load_vehicle(find_vehicle(vehicle))
+
+
+def one_environment(vehicle: Vehicle | str = "bluerov2", **options: Any) -> RovEnv:
+    """Return a RovEnv of a vehicle, or of the name or the file of one. The options are those of RovEnv."""
+    return RovEnv(_named(vehicle), **options)
+
+
+def many_environments(num_envs: int = 1, vehicle: Vehicle | str = "bluerov2", **options: Any) -> RovVectorEnv:
+    """Return a RovVectorEnv of a vehicle, or of the name or the file of one. The options are those of RovVectorEnv."""
+    return RovVectorEnv(_named(vehicle), num_envs, **options)
+
+
+gymnasium.register(
+    ID,
+    entry_point=f"{__name__}:{one_environment.__name__}",
+    vector_entry_point=f"{__name__}:{many_environments.__name__}",
+)

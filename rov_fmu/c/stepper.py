@@ -65,6 +65,12 @@ class EngineMemory:
         for n, vehicle in enumerate(which):
             library.single_begin(addresses[vehicle], pointer(tables), ctypes.c_ssize_t(n))
 
+    def variables(self, vehicle: int = 0) -> NDArray[np.float64]:
+        """Return all variables of a vehicle now, in the order of `layout.places`."""
+        library, addresses = self._c
+        library.single_calculate(addresses[vehicle])
+        return self._variables[vehicle]
+
 
 class Stepper(EngineMemory):
     """One vehicle that is stepped from time 0 on, with the bits of the FMU. Each step is exact."""
@@ -100,9 +106,7 @@ class Stepper(EngineMemory):
 
     def recorded(self) -> list[float]:
         """Return the recorded variables now."""
-        library, (address,) = self._c
-        library.single_calculate(address)
-        results: list[float] = self._variables[0].take(self._recorded).tolist()
+        results: list[float] = self.variables().take(self._recorded).tolist()
         return results
 
 

@@ -5,12 +5,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
 import rov_fmu
-from rov_fmu.bridges.gym import RovEnv, RovVectorEnv
+from rov_fmu.bridges.gym import ID, RovEnv, RovVectorEnv
 from rov_fmu.io.messages import InputError
 from tests.commands import BARE
 
@@ -34,13 +35,46 @@ def test_the_environment_checker_passes() -> None:
     assert environment.many.steps == 300
 
 
+def test_a_vehicle_has_a_registered_environment_of_one_and_of_many() -> None:
+    one = gymnasium.make(ID, vehicle="bluerov2", draws=False, steps=20, max_episode_steps=10)
+    check_env(one.unwrapped, skip_render_check=True)
+    one.reset(seed=1)
+    assert [one.step(np.zeros(6))[3] for _ in range(10)] == [False] * 9 + [True]
+    many = gymnasium.make_vec(ID, 3, vehicle="videoray_refit", step=0.2)
+    assert isinstance(many.unwrapped, RovVectorEnv)
+    assert many.reset(seed=1)[0].shape == (3, 7)
+    assert many.unwrapped.length == 0.2
+
+
+@pytest.mark.parametrize("name", ["bluerov2", "bluerov2_heavy"])
+def test_the_autopilot_is_a_baseline_that_holds_the_place(name: str) -> None:
+    """After 30 s of an episode, the vehicles are within 2 cm, and a new episode begins with a new autopilot."""
+    many = RovVectorEnv(rov_fmu.load(name), 3, draws=False)
+    many.reset(seed=3)
+    there = [many.states.index(axis) for axis in "xyz"]
+    for _ in range(299):
+        states, *_ = many.step(many.baseline())
+    assert np.abs(states[:, there]).max() < 0.02
+    for _ in range(2):
+        states, *_ = many.step(many.baseline())
+    one = RovEnv(rov_fmu.load(name), draws=False)
+    one.reset(seed=3)
+    one.many.state[:] = states[1]
+    np.testing.assert_allclose(one.baseline(), many.baseline()[1], rtol=1e-12, atol=1e-12)
+
+
+def test_a_vehicle_without_uncertainty_says_that_it_draws_none() -> None:
+    with pytest.warns(UserWarning, match="bluerov2: its file has no uncertainty, so no coefficients are drawn"):
+        RovVectorEnv(rov_fmu.load("bluerov2"), 2)
+
+
 @pytest.mark.parametrize(("name", "drawn_values"), [("videoray_refit", 3), ("bluerov2_heavy", 0)])
 def test_the_vector_moves_its_vehicles_as_simulate_does_and_as_a_single_environment(
     name: str, drawn_values: int
 ) -> None:
     """The file of the Heavy contains no uncertainty, so its coefficients are not drawn. It moves as 50 m deep."""
     vehicle = rov_fmu.load(name)
-    many = RovVectorEnv(vehicle, 3, steps=5)
+    many = RovVectorEnv(vehicle, 3, steps=5, draws=drawn_values > 0)
     start, _ = many.reset(seed=1)
     task = [name in ("x", "y", "z", "psi") for name in many.states]
     assert 1.0 < np.abs(start[:, task]).max() <= 2.0
@@ -112,7 +146,7 @@ def test_commands_that_wait_for_the_dead_time_arrive_in_later_steps(dead_time: f
     """A new episode begins with no command on its way. A copy of the environment goes on like the environment."""
     (tmp_path / "late.toml").write_text(BARE.read_text(encoding="utf-8") + _LATE.format(dead_time), encoding="utf-8")
     vehicle = rov_fmu.load(tmp_path / "late.toml")
-    env = RovVectorEnv(vehicle, 3, steps=8)
+    env = RovVectorEnv(vehicle, 3, steps=8, draws=False)
     actions = np.random.default_rng(1).uniform(-1.0, 1.0, (3, 10, len(env.commands)))
 
     def expected(start: Any, steps: int, at: float = 0.0) -> Any:
@@ -159,4 +193,4 @@ def test_wrong_arguments_give_one_line() -> None:
     with pytest.raises(InputError, match=r"^step = 0: must be above 0"):
         RovEnv(rov_fmu.load(vehicle), step=0)
     with pytest.raises(InputError, match=r"^action: must have the shape \(3,\), and has \(2,\)"):
-        RovEnv(rov_fmu.load(vehicle)).step(np.zeros(2))
+        RovEnv(rov_fmu.load(vehicle), draws=False).step(np.zeros(2))

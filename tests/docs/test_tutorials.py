@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from examples import hold_station
 from examples.dive_log import CURRENT, LAG, bluerov2, dive, write_log
 from examples.tank_tests import DELAY, OTTER, bollard_pull, write_tests
 from rov_fmu import Results
@@ -160,3 +161,13 @@ def test_the_stopping_distance_is_as_uncertain_as_told(stopped: dict[str, Result
     assert float(told) - 0.1 < stopped["wall"].runs.stopping_distance.quantile(0.95) < float(told)
     assert [len(stopped[name].warnings) for name in ("stop", "wall")] == [0, 1]
     assert stopped["stop"].trajectories([0]).set_index("t").u[30.0] < 1e-3, "it has stopped"
+
+
+@pytest.mark.long
+def test_a_learned_policy_and_the_autopilot_hold_station_as_the_page_says(capsys: pytest.CaptureFixture[str]) -> None:
+    hold_station.main()
+    policy, autopilot = map(float, re.findall(r"-\d+\.\d", capsys.readouterr().out))
+    assert (policy, autopilot) == pytest.approx((-30.3, -101.8), abs=0.5)
+    page = (ROOT / "docs" / "python.md").read_text("utf-8")
+    assert f"its mean return is −{-autopilot:.0f}" in page
+    assert f"learns in 20 s is −{-policy:.0f}." in page
