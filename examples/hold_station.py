@@ -7,6 +7,8 @@ frame) and per velocity (m/s, rad/s). The cross-entropy method (Rubinstein and K
 from the same eight starts, and goes on from the best ones.
 """
 
+from typing import Any
+
 import gymnasium
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +45,7 @@ def main() -> None:
     """Learn, and print the mean returns over starts that were not flown before."""
     gymnasium.register_envs(rov_fmu.RovEnv)
     random = np.random.default_rng(0)
-    options = {"vehicle": "bluerov2", "draws": False}
+    options: dict[str, Any] = {"vehicle": "bluerov2", "draws": False}
     many = gymnasium.make_vec("rov_fmu/HoldStation-v0", DRAWS * STARTS, **options).unwrapped
     assert isinstance(many, rov_fmu.RovVectorEnv)
     layout = many.vehicle.layout
