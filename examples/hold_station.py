@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import rov_fmu
+from rov_fmu.bridges import gym
 
 Array = NDArray[np.float64]
 DRAWS, STARTS, BEST, ROUNDS = 32, 8, 6, 12
@@ -43,7 +44,7 @@ def returns(env: rov_fmu.RovVectorEnv, policies: Array | None, seed: int, mix: A
 
 def main() -> None:
     """Learn, and print the mean returns over starts that were not flown before."""
-    gymnasium.register_envs(rov_fmu.RovEnv)
+    gymnasium.register_envs(gym)
     random = np.random.default_rng(0)
     options: dict[str, Any] = {"vehicle": "bluerov2", "draws": False}
     many = gymnasium.make_vec("rov_fmu/HoldStation-v0", DRAWS * STARTS, **options).unwrapped

@@ -7,7 +7,7 @@ autopilot of the vehicle (`baseline`).
 
 Gymnasium knows the environment as ID, once this module is imported:
 
-    gymnasium.register_envs(rov_fmu.RovEnv)
+    gymnasium.register_envs(rov_fmu.bridges.gym)
     env = gymnasium.make("rov_fmu/HoldStation-v0", vehicle="bluerov2", draws=False)
 """
 
@@ -219,7 +219,8 @@ class RovEnv(gymnasium.Env[Array, Array]):
         one.reset(seed=1)
         state, reward, *_ = one.step(one.baseline())
         """
-        return self.many.baseline()[0]
+        action: Array = self.many.baseline()[0]
+        return action
 
 
 def _named(vehicle: Vehicle | str) -> Vehicle:
