@@ -4,9 +4,9 @@
  * @typedef {{kind: "own" | "ghost" | "measured", times: number[], value: (n: number) => number, band?: (n: number) => number}} Trace */
 /** What a chart shows: its place in the page, its title, the unit and the digits of its readings, its lines, the axis whose V_ss and Tau
  * it marks, the number of the recording's signal that the second line is, and the commands that act on it, if any.
- * `more` follows where it fits.
+ * `more` follows where it fits; `factor` is how many of the unit one SI unit is.
  * @typedef {{id: string, title: string, unit: string, digits: number, traces: Trace[], axis?: number, signal?: number, commands?: string[],
- *   more?: string}} Graph */
+ *   more?: string, factor?: number}} Graph */
 
 /** The choices of charts, which are empty without what they show, by the words of the list. @type {Record<string, (flight: Flight) => Graph[]>} */
 const PANELS = {
@@ -28,7 +28,8 @@ const PANELS = {
   error: ({ replay, pilot }) =>
     (replay?.recording.signals ?? []).map(({ axis, isPosition, times, band }, s) => {
       const own = pilot.model.vehicle.axes[axis];
-      return banded(own.name, "error", unitOf(own, isPosition), 3, { times, values: replay?.errors[s] ?? [], band });
+      const line = { times, values: replay?.errors[s] ?? [], band };
+      return banded(own.name, "error", unitOf(own, isPosition), 3, line, factorOf(own));
     }),
   force: ({ replay, pilot }) =>
     (replay?.recording.forces ?? []).map((force) => {
@@ -38,11 +39,12 @@ const PANELS = {
 };
 
 /** Returns a chart of one line of a recording, and of its band, if there is one. @param {string} id The name of the axis.
- * @param {string} what @param {string} unit @param {number} digits @param {Band & {band?: Band}} line @returns {Graph} */
-function banded(id, what, unit, digits, { times, values, band }) {
+ * @param {string} what @param {string} unit @param {number} digits @param {Band & {band?: Band}} line @param {number} factor How many of
+ * the unit one SI unit is. @returns {Graph} */
+function banded(id, what, unit, digits, { times, values, band }, factor = 1) {
   /** @type {Trace} */
-  const trace = { kind: "own", times, value: (n) => values[n] ?? 0 };
-  if (band) trace.band = (n) => between(band.times, (k) => band.values[k], times[n]);
+  const trace = { kind: "own", times, value: (n) => factor * (values[n] ?? 0) };
+  if (band) trace.band = (n) => factor * between(band.times, (k) => band.values[k], times[n]);
   return { id, title: `${id}: ${what}`, unit, digits, traces: [trace] };
 }
 
@@ -51,21 +53,23 @@ function banded(id, what, unit, digits, { times, values, band }) {
 function axisPanels({ pilot, ghost, times, replay }, ofPosition) {
   return pilot.model.vehicle.axes.map((axis, a) => {
     const [id, isPosition] = [axis.name, ofPosition(a)];
+    const factor = factorOf(axis);
     /** @type {Trace[]} */
-    const traces = [{ kind: "own", times, value: (n) => pilot.along(a, isPosition, n) }];
+    const traces = [{ kind: "own", times, value: (n) => factor * pilot.along(a, isPosition, n) }];
     const other = ghost.axis(id);
     const signal = replay?.recording.signals.findIndex((one) => one.axis === a) ?? -1;
     const measured = replay?.recording.signals[signal];
     const isMeasured = measured?.isPosition === isPosition;
-    if (isMeasured) traces.push({ kind: "measured", times: measured.times, value: (n) => measured.values[n] });
+    if (isMeasured) traces.push({ kind: "measured", times: measured.times, value: (n) => factor * measured.values[n] });
     else if (other >= 0 && (!replay || measured))
-      traces.push({ kind: "ghost", times, value: (n) => ghost.along(other, isPosition, n) });
+      traces.push({ kind: "ghost", times, value: (n) => factor * ghost.along(other, isPosition, n) });
     const title = `${id}: ${variableOf(axis, isPosition) ?? "distance"}`;
     const graph = {
       id,
       title,
       unit: unitOf(axis, isPosition),
-      digits: isPosition ? 2 : 3,
+      factor,
+      digits: factor > 1 ? 1 : isPosition ? 2 : 3,
       traces,
       commands: Object.keys(axis.signs),
     };
@@ -175,10 +179,12 @@ class Chart {
     const isSecondLine = board.width < 300 && (marked || flight.replay !== null || pointed !== null);
     this.plot.top = isSecondLine ? 34 : 22;
     const { left, right, top, bottom } = this.plot;
-    const [V, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
+    const { factor = 1 } = this.panel;
+    const [steady, Tau] = marked ? flight.pilot.model.marks.subarray(2 * axis, 2 * axis + 2) : [0, 0];
+    const V = marked && flight.floats(axis, steady) ? 0 : factor * steady;
     const published =
       marked && test?.axis === axis && test.V !== null
-        ? { V: test.command < 0 ? -test.V : test.V, Tau: test.Tau }
+        ? { V: factor * (test.command < 0 ? -test.V : test.V), Tau: test.Tau }
         : null;
     const windows = traces.map(({ times }) => [placeOf(times, start), placeOf(times, time)]);
     const levels = axis === undefined ? [] : [0, V, published?.V ?? 0];
@@ -193,7 +199,7 @@ class Chart {
     if (this.panel.commands) this.untested(flight, this.panel.commands, start, px);
     for (let n = traces.length - 1; n >= 0; n--) this.trace(traces[n], windows[n], px, py);
     const since = flight.since[axis ?? 0];
-    const fromRest = marked && V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(V) && Number.isFinite(Tau);
+    const fromRest = marked && V !== 0 && Math.abs(since.velocity) < 0.02 * Math.abs(steady) && Number.isFinite(Tau);
     const hasSteady = marked && V !== 0 && Number.isFinite(V);
     const level = (/** @type {number} */ x, /** @type {number} */ v) => [
       [x, py(v)],
@@ -242,16 +248,16 @@ class Chart {
   /** Returns the words beside the title. @param {Flight} flight @param {Trace[]} traces @param {number} at The time. @param {boolean} isPointed
    * @param {number | null} V @param {number | null} Tau */
   marks({ time, replay }, [mine, other], at, isPointed, V, Tau) {
-    const { signal, digits } = this.panel;
+    const { signal, digits, factor = 1 } = this.panel;
     const words = [];
     if (signal !== undefined && replay && other) {
       const half = replay.recording.signals[signal].band;
-      const error = shown(replay.errors[signal][placeOf(other.times, Math.min(at, time))] ?? 0, digits);
+      const error = shown(factor * (replay.errors[signal][placeOf(other.times, Math.min(at, time))] ?? 0), digits);
       words.push(
         `error ${error}${
           half
             ? ` ± ${shown(
-                between(half.times, (k) => half.values[k], at),
+                factor * between(half.times, (k) => half.values[k], at),
                 digits,
               )}`
             : ""
@@ -260,7 +266,7 @@ class Chart {
     } else if (isPointed && other) words.push(`ghost ${this.reading(other, at, time)}`);
     else if (isPointed && mine.band) words.push(`± ${shown(mine.band(placeOf(mine.times, at)), digits)}`);
     else if (V !== null && !isPointed)
-      words.push(`V_ss ${shown(V, 3)}`, ...(Tau !== null ? [`Tau ${shown(Tau, 2)} s`] : []));
+      words.push(`V_ss ${shown(V, digits)}`, ...(Tau !== null ? [`Tau ${shown(Tau, 2)} s`] : []));
     if (isPointed) words.push(`at ${shown(at, 2)} s`);
     return words;
   }

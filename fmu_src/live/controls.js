@@ -449,7 +449,8 @@ class Live {
   /** Runs the step test that is chosen in the list. */
   run() {
     const test = this.vehicle.tests[Number(/** @type {HTMLSelectElement} */ (part("test")).value)];
-    const { signs, name, unit } = this.vehicle.axes[test.axis];
+    const axis = this.vehicle.axes[test.axis];
+    const { signs, name } = axis;
     this.takeOver();
     for (const slider of this.sliders) if (slider.dataset.kind === "load") slider.value = String(slider.dataset.start);
     this.flight.run(test);
@@ -457,7 +458,7 @@ class Live {
     this.slideCommands(Object.fromEntries(Object.entries(signs).map(([input, sign]) => [input, sign * test.command])));
     this.paused = false;
     this.say(
-      `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${test.V} ${unit}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
+      `${name} ${Math.round(test.command * 100)} % from rest${test.V === null ? "" : `; measured: V_ss ${Number((factorOf(axis) * test.V).toPrecision(3))} ${unitOf(axis, false)}${test.Tau === null ? "" : `, Tau ${test.Tau} s`}`}.`,
     );
     this.show();
   }

@@ -3,6 +3,7 @@
 const LONGEST_STEP = 0.05; // s, so that curves and the track are smooth at any speed
 const MOST_KEPT = 20000;
 const RESTING = 0.55; // of the vehicle's size: the height of its middle above the seabed on which it rests
+const SHALLOW = 0.02; // m; a vehicle that bobs at the surface is not deeper
 const NO_SURFACE = 1e30; // m; over such a height, nothing of buoyancy and thrust fades out
 const REST = 1e-3; // m/s, rad/s, m/s2, rad/s2; a vehicle that moves less is at rest
 
@@ -39,9 +40,14 @@ function variableOf({ velocity, position }, isPosition) {
   return isPosition ? position : velocity;
 }
 
-/** @param {Axis} axis @param {boolean} isPosition */
+/** Returns the unit in which the page shows a signal: degrees for angles. @param {Axis} axis @param {boolean} isPosition */
 function unitOf({ unit, positionUnit }, isPosition) {
-  return isPosition ? positionUnit : unit;
+  return (isPosition ? positionUnit : unit).replace("rad", "°");
+}
+
+/** Returns how many of this unit one SI unit is. @param {Axis} axis */
+function factorOf({ unit }) {
+  return unit.startsWith("rad") ? 180 / Math.PI : 1;
 }
 
 /** A vehicle with its history: the values of all variables, and then the distances along the axes, at the times of the flight. */
@@ -207,6 +213,13 @@ class Flight {
       const height = acts ? model.start("height") : NO_SURFACE;
       if (model.has("height") && model.get("height") !== height) model.tune({ height });
     }
+  }
+
+  /** Returns true if the surface keeps the vehicle from moving along an axis. @param {number} a @param {number} velocity Along it. */
+  floats(a, velocity) {
+    const { model } = this.pilot;
+    const acts = this.isBounded && !this.test && !this.replay;
+    return acts && model.vehicle.axes[a].position === "z" && velocity < 0 && model.get("z") <= SHALLOW;
   }
 
   /** Returns the commands that act. */
@@ -437,9 +450,10 @@ class Replay {
   /** Returns a sentence about the deviations (root mean square) of the prediction. @param {Vehicle} vehicle */
   verdict(vehicle) {
     const deviations = this.recording.signals.map(({ axis, isPosition }, n) => {
-      const { name } = vehicle.axes[axis];
+      const own = vehicle.axes[axis];
       const squares = this.errors[n].reduce((sum, error) => sum + error ** 2, 0);
-      return `${name} ${Math.sqrt(squares / Math.max(1, this.errors[n].length)).toPrecision(2)} ${unitOf(vehicle.axes[axis], isPosition)}`;
+      const error = factorOf(own) * Math.sqrt(squares / Math.max(1, this.errors[n].length));
+      return `${own.name} ${error.toPrecision(2)} ${unitOf(own, isPosition)}`;
     });
     const left = this.recording.left;
     return `The end of the recording. The prediction is off by (root mean square): ${deviations.join(", ")}.${left ? ` Rows that could not be used: ${left}.` : ""}`;

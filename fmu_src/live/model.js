@@ -11,7 +11,7 @@
 /**
  * A quantity of rov_fmu/tank/catalogue.py: the names of its column, that in a recording of one axis, and those that need a known unit;
  * how many of each unit make one SI unit; and the largest number.
- * @typedef {{name: string, short: string, also: string[], units: Record<string, number>, isPressure: boolean, isPosition: boolean, wraps: boolean,
+ * @typedef {{name: string, short: string[], also: string[], units: Record<string, number>, isPressure: boolean, isPosition: boolean, wraps: boolean,
  *   largest: number}} Quantity
  */
 /**

@@ -539,8 +539,9 @@ function columnOf(header, file, vehicle) {
   }
   for (const [axis, { quantities }] of axes.entries()) {
     for (const [rank, quantity] of quantities.entries()) {
-      const isFull = title === quantity.name || (axis === alone && title === quantity.short);
-      if (!isFull && !quantity.also.includes(title)) continue;
+      const [short, ...others] = axis === alone ? quantity.short : [];
+      const isFull = title === quantity.name || title === short;
+      if (!isFull && !quantity.also.includes(title) && !others.includes(title)) continue;
       const convert = converter(header, quantity.units, unit, !isFull);
       if (convert) return { ...none, quantity, axis, rank, convert };
     }

@@ -14,6 +14,9 @@ from rov_fmu.report.plots.svg import in_both_widths, inline_svg, with_even_text
 from rov_fmu.report.templates import inline_script, page
 from rov_fmu.tank.inspection.inspection import Inspection
 
+_WHOLE = 13.0
+"""The width of a plot as broad as the page, inches."""
+
 
 def inspection_page(inspected: Inspected, steps: Sequence[str] = ()) -> str:
     """Return the page as HTML. `steps` are what to do next, each in words or as a command line."""
@@ -28,7 +31,7 @@ def inspection_page(inspected: Inspected, steps: Sequence[str] = ()) -> str:
             label = f"{inspection.name} over time"
             return inline_svg(label, draw, size, salt=f"{salt}{inspection.path}", marked=True)
 
-        return in_both_widths(drawn, height_of(log))
+        return in_both_widths(drawn, height_of(log), _WHOLE)
 
     description = inspected.description
     return page(

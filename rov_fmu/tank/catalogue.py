@@ -329,6 +329,13 @@ def words_of(name: str) -> set[str]:
     return {word.casefold() for word in _WORD.findall(name)}
 
 
+def shorts(quantity: MeasuredQuantity) -> tuple[str, ...]:
+    """Return the short names of a quantity in a log of its axis, the first one first; none for a condition."""
+    if not quantity.axis:
+        return ()
+    return ("velocity",) if quantity.is_velocity else (quantity.axis.position, "position")
+
+
 def as_json(axis: Axis) -> list[dict[str, Any]]:
     """Return the quantities of an axis for the page that flies, those that are preferred first.
 
@@ -339,7 +346,7 @@ def as_json(axis: Axis) -> list[dict[str, Any]]:
     return [
         {
             "name": quantity.name,
-            "short": "velocity" if quantity.is_velocity else axis.position if quantity.axis else quantity.name,
+            "short": shorts(quantity) or (quantity.name,),
             "also": quantity.also,
             "units": quantity.units,
             "isPressure": not quantity.axis,

@@ -30,7 +30,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.io.messages import shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.tank.arrays import Array
-from rov_fmu.tank.catalogue import FORCE, QUANTITIES, TIMES, TORQUE, MeasuredQuantity
+from rov_fmu.tank.catalogue import FORCE, QUANTITIES, TIMES, TORQUE, MeasuredQuantity, shorts
 from rov_fmu.tank.commands import NO_KEYS, LogKeys
 from rov_fmu.tank.description import RovTables
 
@@ -164,12 +164,8 @@ def columns_of_log(layout: Layout, axis: Axis | None, keys: LogKeys = NO_KEYS) -
     for name in layout.commands if layout.mix else ():
         columns[name] = LogColumn.of(command, name, INPUTS)
     for name, quantity in QUANTITIES.items():
-        short = name
-        if axis and quantity.axis == axis:
-            short = "velocity" if quantity.is_velocity else axis.position
-        also = (name,) if short != name else ()
-        if axis and quantity.axis == axis and not quantity.is_velocity:
-            also = (*also, "position")
+        short, *also = shorts(quantity) if axis and quantity.axis == axis else (name,)
+        also += [name] if short != name else []
         # `read_log` checks the bounds after the marks of no measurement are left out.
         column = LogColumn(quantity.units, True, True, also=(*quantity.also, *also), name=name, quantity=quantity)
         columns.setdefault(short, column)  # the distance along the axis comes first

@@ -62,12 +62,13 @@ def test_signs_and_units_of_messages(kind: str, field: str, number: float, quant
 
 def test_the_page_that_flies_gets_the_quantities_of_an_axis() -> None:
     keys = "name", "short", "isPressure", "isPosition", "largest", "wraps"
-    rows = (" ".join(str(one[key]) for key in keys) for axis in (HEAVE, YAW) for one in as_json(axis))
+    quantities = (one | {"short": "/".join(one["short"])} for axis in (HEAVE, YAW) for one in as_json(axis))
+    rows = (" ".join(str(one[key]) for key in keys) for one in quantities)
     assert [*rows] == [
-        "depth depth False True 10000000.0 False",
+        "depth depth/position False True 10000000.0 False",
         "pressure pressure True True 1000000000.0 False",
         "heave velocity velocity False False 1000.0 False",
-        "heading heading False True 10000000.0 True",
+        "heading heading/position False True 10000000.0 True",
         "yaw velocity velocity False False 1000.0 False",
     ]
     assert rules_of_page()["pressures"]["least"] == pytest.approx(1013.25)

@@ -1,6 +1,7 @@
-"""SystemRun a system from its start to its end, in a child process, as a table and as a plot."""
+"""Run a system from its start to its end, in a child process, as a table and as a plot."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, closing
 from pathlib import Path
 from time import perf_counter
@@ -19,8 +20,12 @@ from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.messages import FileError, Progress, silent
-from rov_fmu.report.plots.svg import name_axes, svg_file
+from rov_fmu.report.plots.svg import LIGHT, LINES, name_axes, svg_file
 
+_COLORS = (*LINES, "grey")
+"""The colours of the lines of a panel."""
+_QUANTITIES = {"N": "force", "m": "place", "rad": "angle", "m/s": "velocity", "rad/s": "rate"}
+"""The words for what a panel shows, by its unit."""
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
@@ -62,7 +67,7 @@ def run_system(
     on_progress: Progress = silent,
     parts: int = 1,
 ) -> SystemRun:
-    """SystemRun a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
+    """Run a system. Each step is made of some `parts`, between which the FMUs exchange values, too.
 
     Raises FileError about the path.
     """
@@ -103,22 +108,49 @@ def system_csv(read: Sequence[Name], step: float, rows: Array, half: HalfStep | 
 
 
 def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[str], step: float, rows: Array) -> str:
-    """Return the plot of some variables, or of those that change and pass between the components: one panel a unit."""
+    """Return the plot of some variables, or of those that change and pass between the components, and of tensions.
+
+    Each quantity has a panel: what a component, or one end or point of it, has in one unit.
+    """
     columns = {".".join(name): n for n, name in enumerate(read)}
     passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns
+    passed |= {name: None for name in columns if ".tension_" in name}
     chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
-    units = {name: structure.parts[read[columns[name]][0]].variables[read[columns[name]][1]].unit for name in chosen}
-    panels = grouped((unit, name) for name, unit in units.items())
+    panels = [*_panels(structure, [read[columns[name]] for name in chosen], is_chosen=bool(names))]
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots(max(1, len(panels)), sharex=True, squeeze=False)[:, 0]
-        for panel, (unit, some) in zip(axes, panels.items(), strict=False):
-            factor, printed = in_degrees(unit)
-            for name in some:
-                values = factor * rows[:, columns[name]]
-                panel.plot(step * np.arange(len(rows)), values, linewidth=1.2, label=name)
-            name_axes(panel, "", printed)
+        for panel, (unit, title, some) in zip(axes, panels, strict=False):
+            factor, printed = (100.0, "%") if unit == "1" else in_degrees(unit)
+            for color, (component, name) in zip(_COLORS, some, strict=False):
+                values = factor * rows[:, columns[f"{component}.{name}"]]
+                panel.plot(step * np.arange(len(rows)), values, linewidth=1.2, label=name, color=LIGHT[color])
+            name_axes(panel, title, printed)
             panel.legend(loc="center left", bbox_to_anchor=(1.1, 0.5))
         axes[-1].set_xlabel("time (s)")
 
     return svg_file(draw, (8.6, 1.0 + 1.9 * max(1, len(panels))), salt="system")
+
+
+def _panels(
+    structure: SystemStructure, names: Sequence[Name], *, is_chosen: bool
+) -> Iterator[tuple[str, str, Sequence[Name]]]:
+    """Yield the unit, the title and the variables of each panel, at most as many as there are colours.
+
+    The levels of a profile are left out unless somebody chose the variables: `V_N_3` is beside `V_N`.
+    """
+    parts = structure.parts
+    of = {name: (parts[name[0]].variables[name[1]].unit, name[0], _end(name[1])) for name in names}
+    for (unit, component, end), own in grouped((key, name) for name, key in of.items()).items():
+        plain = [name for name in own if not re.search(r"_[0-9]+$", name[1])]
+        shown = own if is_chosen or not plain else plain
+        owner = ", ".join(filter(None, [component, end]))
+        title = f"{_QUANTITIES[unit]} of {owner}" if unit in _QUANTITIES else owner
+        for some in np.array_split(np.arange(len(shown)), -(-len(shown) // len(_COLORS))):
+            yield unit, title, [shown[n] for n in some]
+
+
+def _end(name: str) -> str:
+    """Return the end or the point that a variable is of: `bottom` of F_N_bottom."""
+    match = re.search(r"_([a-z]{2}\w*)$", name)
+    return match[1] if match else ""

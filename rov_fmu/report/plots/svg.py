@@ -84,10 +84,10 @@ def inline_svg(label: str, draw: Draw, size: tuple[float, float], *, salt: str =
     return Markup(svg)
 
 
-def in_both_widths(plot: Callable[..., Markup], height: float) -> Markup:
+def in_both_widths(plot: Callable[..., Markup], height: float, broad: float = BROAD) -> Markup:
     """Return a picture twice, broad and for phones, of which the page shows one. `plot` draws it, given its size in
     inches and a salt."""
-    sizes = {"broad": (BROAD, height), "narrow": (NARROW, height)}
+    sizes = {"broad": (broad, height), "narrow": (NARROW, height)}
     return Markup("").join(
         Markup('<div class="{}">{}</div>').format(key, plot(size=size, salt=key)) for key, size in sizes.items()
     )

@@ -1,5 +1,6 @@
 """What the companions compute, and a system that is run, against what is known in closed form."""
 
+import re
 import shutil
 import sys
 import zipfile
@@ -20,7 +21,7 @@ from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import Part
-from rov_fmu.bridges.system.run import run_system
+from rov_fmu.bridges.system.run import picture, recorded_names, run_system
 from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
@@ -309,12 +310,36 @@ def test_a_run_writes_the_motion_and_a_plot(tmp_path: Path, capsys: pytest.Captu
     motion = np.genfromtxt(tmp_path / "my.csv", delimiter=",", names=True, deletechars="")
     assert motion["time"].tolist() == [0.0, 0.5, 1.0, 1.5, 2.0]
     assert motion["water.V_N"] == pytest.approx(0.4 * 0.75 ** (1 / 7) * cos(0.5) * motion["time"] / 4.0)
-    assert "water.V_N" in (tmp_path / "my.svg").read_text(encoding="utf-8")
+    drawn = (tmp_path / "my.svg").read_text(encoding="utf-8")
+    assert "Velocity of water (m/s)" in drawn
+    assert ">V_N<" in drawn
     assert main(line) == 0, "a second run replaces what the first one wrote"
     with (tmp_path / "my.csv").open("a") as file:
         file.write("9,9\n")
     assert main(line) == 2
     assert "my.csv: cannot be written: the file there has no mark" in capsys.readouterr().err
+
+
+def test_a_plot_has_a_panel_for_each_quantity_and_few_lines_in_it() -> None:
+    """Eight lines are two panels, a tension is shown although nothing is connected to it, and levels are left out."""
+    parts = {
+        name: Part.open(Path(name), companion(kind), is_ours=True)
+        for name, kind in {"water": "current", "rope": "tether"}.items()
+    }
+    start = ("water", "V_N")
+    structure = SystemStructure(
+        parts, {}, [Connection(start, ("rope", "V_N_1")), Connection(("water", "V_N_1"), start)]
+    )
+    read = [name for name in recorded_names(structure) if name[1].startswith(("V_N", "tension_", "F_"))]
+    rows = np.arange(4.0)[:, None] + np.arange(len(read))
+    drawn = picture(structure, read, [], 1.0, rows)
+    titles = re.findall(r"font-weight:700[^>]*>([^<]+)<", drawn)
+    assert titles == ["Velocity of water (m/s)", "Force of rope, top (N)", "Force of rope, bottom (N)"]
+    assert ">V_N_1<" not in drawn
+    chosen = [".".join(name) for name in read if name[1].startswith("V_N")][:8]
+    drawn = picture(structure, read, chosen, 1.0, rows)
+    assert re.findall(r"font-weight:700[^>]*>([^<]+)<", drawn) == ["Velocity of water (m/s)"] * 2
+    assert all(f">{name.partition('.')[2]}<" in drawn for name in chosen)
 
 
 def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

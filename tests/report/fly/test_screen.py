@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import rov_fmu
-from tests.report.conftest import flown_vehicle, get, write_page
+from tests.report.conftest import chart, flown_vehicle, get, write_page
 from tests.report.fly.boxes import SCREENS, WIDTHS, drawn_problems, problems, record_drawn_texts
 from tests.report.pages import UNFOLD
 from tests.report.test_live import BOX
@@ -42,6 +42,16 @@ def test_a_vehicle_neither_flies_through_air_nor_enters_the_seabed(page: Any) ->
     assert get(page, "z") == pytest.approx([2.0 - 0.55 * page.evaluate("live.vehicle.size")])
     assert "(on the seabed)" in page.inner_text("#live-readings")
     assert page.evaluate("live.picture.isBedded")
+
+
+def test_at_the_surface_no_steady_rise_is_marked_and_angles_are_in_degrees(fly: Callable[..., Any]) -> None:
+    """A BlueROV2 is lighter than water: deep it rises steadily, and at the surface it bobs."""
+    page = fly("bluerov2")
+    page.evaluate("() => { live.pause(true); live.draw(); }")
+    assert "V_ss" not in chart(page, "heave")["words"]
+    page.evaluate("() => { live.flight.pilot.model.set('z', 2); live.draw(); }")
+    assert chart(page, "heave")["words"].startswith("V_ss \N{MINUS SIGN}0.173")
+    assert chart(page, "yaw")["title"].endswith(" °/s")
 
 
 def test_a_step_test_that_leaves_the_water_says_that_the_surface_is_off(fly: Callable[..., Any]) -> None:
