@@ -5,16 +5,20 @@ The dives are drawn here by an equation of their own: thrust c|c|, drag, a load,
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from rov_fmu.equation.catalogue import HEAVE, SURGE
 from rov_fmu.tank.arrays import Array, Flags
+from rov_fmu.tank.folder import read_folder
 from rov_fmu.tank.log import Log
 from rov_fmu.tank.rest import without_rests
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
+from tests.identify.scenarios.catalogue import USUAL
+from tests.identify.scenarios.tank import Logs, Tank
 from tests.tank.logs import channel, commands, log, used
 
 LAYOUT = load_vehicle(SHIPPED["bluerov2"]).layout
@@ -156,6 +160,12 @@ def test_a_dive_that_touches_nothing_is_left_as_it_is(load: float) -> None:
         for command in (nothing, holds_depth):
             dive = drawn(10 + seed, command, load=load)
             assert without_rests(dive, LAYOUT) == [dive]
+
+
+def test_a_dive_from_depth_0_in_a_tank_without_a_surface_is_left_as_it_is(tmp_path: Path) -> None:
+    for seed in range(3):
+        Tank("videoray", Logs("pilot", count=2, seconds=20.0), USUAL).write(seed, tmp_path / str(seed))
+        assert not [one for one in read_folder(tmp_path / str(seed)).findings if one.kind == "rests"]
 
 
 def test_a_log_of_a_single_axis_and_one_that_only_rests_stay_as_they_are() -> None:
