@@ -15,7 +15,7 @@ from tests.conftest import Made
 from verification.interoperability.__main__ import main
 from verification.interoperability.importers import EXACT, HERE, IMPORTERS, RUNNERS, Importer, pinned
 from verification.interoperability.manoeuvre import MANOEUVRES
-from verification.interoperability.run import Verdict, build_fmu, run
+from verification.interoperability.run import Verdict, fmu_for_host, run
 
 TOOLS = HERE / ".tools"
 SIMPLE = MANOEUVRES["videoray"]
@@ -141,7 +141,7 @@ def fmu(made_once: Made) -> Callable[[str, int], Path]:
     """Return a function that builds the FMU of a vehicle for a version of FMI, once in a run."""
 
     def built(vehicle: str, fmi: int) -> Path:
-        folder = made_once(f"{vehicle} für FMI {fmi}", partial(build_fmu, vehicle, fmi))
+        folder = made_once(f"{vehicle} für FMI {fmi}", partial(fmu_for_host, vehicle, fmi))
         return folder / f"{vehicle}{fmi}.fmu"
 
     return built

@@ -220,7 +220,7 @@ def test_a_tether_feels_the_load_of_morison(direction: float, tmp_path: Path) ->
             V_q, A_q = (one @ along * along for one in (V, A))
             V_p, A_p = V - V_q, A - A_q
             drag = 1.2 * 0.03 * np.linalg.norm(V_p) * V_p + 0.02 * pi * 0.03 * np.linalg.norm(V_q) * V_q
-            total += 10.0 * weight * (1025.0 * area * (A_q + 2.0 * A_p) + 0.5 * 1025.0 * drag)
+            total = total + 10.0 * weight * (1025.0 * area * (A_q + 2.0 * A_p) + 0.5 * 1025.0 * drag)
         load.append(total)
     expected = np.array(load)
     of_line = late[::10, 1:4] - [0.0, 0.0, (0.5 - 1025.0 * area) * G * 19.9]
