@@ -1,11 +1,8 @@
 """Complete studies: the rows are those of the closed form, also after workers, FMUs or the study itself have died."""
 
-import json
 import os
-import shutil
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError
@@ -30,7 +27,7 @@ from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.study.results.store import Part, Store, identity, parquet
+from rov_fmu.study.results.store import Store, identity, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import do_study
 from rov_fmu.study.run.work import Progress, Spent, Work
@@ -206,7 +203,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     results = do(runs=24).folder
     progress: list[Progress] = []
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
-    draft = results / "runs" / ".part-000000090-000000099.parquet.abc.part"
+    draft = results / "runs" / ".part-000000030-000000039.parquet.abc.part"
     draft.write_bytes(b"of a process that was killed")
     _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
@@ -253,7 +250,7 @@ def _filled(folder: Path, *spans: tuple[int, int], **change: Any) -> Store:
 def test_runs_of_another_study_are_refused_and_those_that_are_missing_are_told(tmp_path: Path) -> None:
     store = _filled(tmp_path / "results", (2, 4))
     with store.held():
-        store.describe(STUDY)
+        store.describe(STUDY, (0, 9))
         assert (store.missing(0, 9), store.missing(0, 4)) == ([(0, 2), (4, 9)], [(0, 2)])
         assert (store.missing(1, 3), store.missing(2, 4), store.missing(3, 6)) == ([(1, 2)], [], [(4, 6)])
         for change, reason in (
@@ -262,9 +259,9 @@ def test_runs_of_another_study_are_refused_and_those_that_are_missing_are_told(t
             ({"plan": {"seed": 2}}, r"results: holds runs of another plan \(seed changed\): choose another folder"),
         ):
             with pytest.raises(FileError, match=reason):
-                store.describe({**STUDY, **change})
+                store.describe({**STUDY, **change}, (0, 9))
         (store.folder / "study.json").unlink()
-        store.describe(STUDY)
+        store.describe(STUDY, (0, 9))
     for text in ("{", "[1]", '{"format": 0}', '{"format": 3}'):
         (store.folder / "study.json").write_text(text)
         with pytest.raises(FileError, match="or was written by another version of this tool"):
@@ -284,14 +281,11 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
         lambda path: path.write_bytes(_rows(0, 4)),
         "has the runs 0 to 3, and not those of its name",
     ),
-    "rows of another part beside": (
-        lambda path: path.with_name("part-000000000-000000003.parquet").write_bytes(_rows(0, 4)),
-        "has runs that .*1-of-2.* has, too",
-    ),
     "overlap": (
         lambda path: path.with_name("part-000000003-000000005.parquet").write_bytes(_rows(3, 6)),
         "has runs that .*, too",
     ),
+    "gone": (Path.unlink, "of 9 runs, these are missing: 4 to 8: do them with --part"),
     "no trajectories": (
         lambda path: path.write_bytes(_rows(4, 9, without="trajectory")),
         "lacks trajectory.t and trajectory.y",
@@ -314,22 +308,14 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
 
 
 @pytest.mark.parametrize("kind", DAMAGE)
-def test_a_part_that_is_not_whole_is_refused_by_its_name_before_anything_moves(kind: str, tmp_path: Path) -> None:
-    store = Store(tmp_path / "results")
-    stores = [_filled(tmp_path / "results" / "parts" / f"{n}-of-2", span) for n, span in ((1, (0, 4)), (2, (4, 9)))]
+def test_a_file_that_does_not_count_is_refused_by_its_name(kind: str, tmp_path: Path) -> None:
+    store = _filled(tmp_path, (0, 4), (4, 9))
+    store.check_complete(STUDY)
     damage, reason = DAMAGE[kind]
-    (path,) = (stores[1].folder / "runs").iterdir()
+    path = tmp_path / "runs" / "part-000000004-000000008.parquet"
     damage(path)
-    before = {path: path.read_bytes() for path in store.folder.rglob("part-*")}
-    with store.held(), pytest.raises(FileError, match=f"2-of-2.*{reason}"):
-        store.merge(STUDY)
-    assert {path: path.read_bytes() for path in store.folder.rglob("part-*")} == before
-    shutil.rmtree(stores[1].folder)
-    _filled(stores[1].folder, (4, 9))
-    with store.held():
-        store.merge(STUDY)
-    assert store.done() == [(0, 4), (4, 9)]
-    assert not (store.folder / "parts").exists()
+    with pytest.raises(FileError, match=reason):
+        store.check_complete(STUDY)
 
 
 def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
@@ -346,42 +332,6 @@ def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
         else:
             assert pq.read_table(path).equals(rows)
     assert refused > 60
-
-
-@posix
-@pytest.mark.parametrize("at", [pytest.param(n, marks=[] if n == 3 else pytest.mark.long) for n in range(8)])
-def test_a_merge_that_is_killed_loses_nothing(at: int, tmp_path: Path) -> None:
-    """It is killed before it puts a file into its place for the n-th time, or, for the last n, while it removes the
-    parts."""
-    folder = tmp_path / "results"
-    for n in range(1, 5):
-        _filled(folder / "parts" / f"{n}-of-4", Part(n, 4).runs(9))
-    program = """
-import json, os, signal, sys, pathlib, shutil
-from rov_fmu.study.results.store import Part, Store, identity, parquet
-left, replace, unlink = [int(sys.argv[3])], pathlib.Path.replace, os.unlink
-def count(then):
-    def counted(*given, **how):
-        if left[0] == 0:
-            os.kill(os.getpid(), signal.SIGKILL)
-        left[0] -= 1
-        return then(*given, **how)
-    return counted
-pathlib.Path.replace, os.unlink = count(replace), count(unlink)
-store = Store(pathlib.Path(sys.argv[1]))
-with store.held():
-    store.merge(json.loads(sys.argv[2]))
-"""
-    words = [sys.executable, "-c", program, str(folder), json.dumps(STUDY), str(at)]
-    assert subprocess.run(words, check=False).returncode == -signal.SIGKILL
-    there = {int(name[5:14]) for name in (path.name for path in folder.rglob("part-*.parquet"))}
-    assert there == {Part(n, 4).runs(9)[0] for n in range(1, 5)}, "every run is there"
-    store = Store(folder)
-    with store.held():
-        store.merge(STUDY)
-    assert store.done() == [(0, 2), (2, 4), (4, 6), (6, 9)]
-    assert pd.read_parquet(folder / "runs").run.tolist() == [*range(9)]
-    assert not (folder / "parts").exists()
 
 
 def test_results_that_are_not_there_are_a_line(foreign: Foreign, tmp_path: Path, scheduler: str) -> None:
