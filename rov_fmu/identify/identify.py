@@ -101,7 +101,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         vehicle=with_own_inputs(vehicle, tests),
         against=against,
         axes=(),
-        curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in known.curves},
+        curves={curve.name: _those_of(coefficients, by_name[curve.name]) for curve in fit.known.curves},
         forces=tuple(p for p in points if p.quantity == "force"),
         effects=tuple(optional_effects(fit)),
         disturbances=slow,

@@ -12,10 +12,10 @@ from math import exp, inf, pi, radians
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import COUPLED_AXES, SURGE, SWAY, YAW
+from rov_fmu.equation.catalogue import COUPLED_AXES, CURVE, REVERSE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import KINDS, LAG, PRIORS, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OWN_BANDS, OWN_CURVE, PRIORS, TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
@@ -84,6 +84,8 @@ class Hypothesis:
     """True if it leaves out velocities, which makes any model better: it has to explain the errors of the others."""
     is_contrast: bool = False
     """True if it is about single thrusters. It is tried only where the data tell these apart from the others."""
+    frees: tuple[str, ...] = ()
+    """The kinds of other rows that it frees."""
 
 
 # ---- The changes of what the filter reads ----------------------------------------------------------------------------
@@ -148,6 +150,41 @@ def _with_rotors(layout: Layout, _: Of) -> Layout:
 
 def _coupled(layout: Layout, _: Of) -> Layout:
     return replace(layout, coupled=all(map(layout.has, COUPLED_AXES)))
+
+
+def _name_of_own(layout: Layout, thruster: str) -> str:
+    return f"{layout.curve_of[thruster].name}_{thruster}"
+
+
+def _with_own_curve(layout: Layout, of: Of) -> Layout:
+    """Return the layout in which one thruster has a curve of its own, with a thrust and a dead band astern."""
+    (name,) = of
+    if name not in layout.curve_of:
+        return layout
+    shared, own = layout.curve_of[name], _name_of_own(layout, name)
+    wanted = {*shared.keys, *(f"{key}{end}" for key in ("a_t", "b_t", "c_0") for end in ("", REVERSE))}
+    current = shared.electric_current and replace(shared.electric_current, name=own)
+    keys = tuple(key for key in CURVE if key in wanted)
+    curve = replace(shared, name=own, keys=keys, electric_current=current)
+    thrusters = (replace(one, curve=own) if one.name == name else one for one in layout.thrusters)
+    return replace(layout, curves=(*layout.curves, curve), thrusters=tuple(thrusters))
+
+
+def _differing(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
+    (name,), shared = of, known.layout.curve_of[of[0]]
+    own = _name_of_own(known.layout, name)
+    known, logs = _of_layout(_with_own_curve)(known, logs, of, start)
+    curve = known.layout.curves_by_name[own]
+    values = {curve.name_of(key): known.coefficients.get(shared.coefficient(key), 0.0) for key in curve.keys}
+    exact = {curve.name_of(key) for key in (*shared.keys, "c_0") if shared.coefficient(key) in known.exact}
+    own_keys = {curve.name_of(f"{key}{end}") for key, end in (("a_t", REVERSE), ("b_t", REVERSE), ("c_0", ""))}
+    return replace(
+        known,
+        coefficients={**known.coefficients, **values},
+        curves=[*known.curves, curve],
+        exact=known.exact | (exact - own_keys),
+        own_curves={**known.own_curves, own: (shared.name, name)},
+    ), logs
 
 
 def _slewing(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
@@ -245,6 +282,15 @@ def _ill(known: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each thruster that may have lost force. A commanded force along an axis of the body is not one of them."""
     if not known.layout.has_wrench:
         yield from _thrusters(known, logs)
+
+
+def _sharing(known: Prior, logs: Logs) -> Iterator[Of]:
+    """Yield each thruster that shares a curve with another one."""
+    curve_of, names = known.layout.curve_of, known.layout.curves_by_name
+    for (name,) in _ill(known, logs):
+        is_shared = sum(curve is curve_of[name] for curve in curve_of.values()) > 1
+        if is_shared and not curve_of[name].tables and _name_of_own(known.layout, name) not in names:
+            yield (name,)
 
 
 def thrusters_alike(layout: Layout, commands: Sequence[Mapping[str, Array]]) -> list[Of]:
@@ -421,6 +467,16 @@ HYPOTHESES = {
         ends=(0.0,),  # dead
         is_contrast=True,
     ),
+    OWN_CURVE: Hypothesis(
+        0.004,
+        _sharing,
+        _differing,
+        (-0.4,),
+        "thruster {of}: it has a curve of its own, with {value} of the thrust astern, relative to ahead, that others "
+        "have{odds}. Check its propeller, its speed controller and the neutral of this",
+        frees=("health", *OWN_BANDS),
+        is_contrast=True,
+    ),
     "command limit": Hypothesis(
         0.03,
         _commanded,
@@ -466,8 +522,13 @@ def applied(plain: Objective, starts: Starts, *, thinned: bool = False) -> Objec
     known, logs = plain.table.known, plain.logs
     for kind, of in in_order(starts):
         known, logs = HYPOTHESES[kind].change(known, logs, of, starts[kind, of])
-    freed = ((kind, of[0] if of else "") for kind, of in starts if HYPOTHESES[kind].starts)
+    freed = ((row, of[0] if of else "") for kind, of in starts if HYPOTHESES[kind].starts for row in kinds_freed(kind))
     return Objective.of_known(replace(known, freed=known.freed.union(freed)), logs, plain.rows, thinned=thinned)
+
+
+def kinds_freed(kind: str) -> frozenset[str]:
+    """Return the kinds of the rows that a hypothesis frees, if it frees any: its own, and those beside it."""
+    return frozenset((kind, *HYPOTHESES[kind].frees))
 
 
 def row_of(objective: Objective, suspect: Suspect) -> int | None:

@@ -29,6 +29,7 @@ INERTIA, LAG, OFFSET, WIDTH, WHITE = "inertia", "lag", "logging offset", "loggin
 QUADRATIC, LINEAR, WANDER = "quadratic drag", "linear drag", "wander"
 POWER, POWER_ASTERN = "power of drag", "power of drag astern"
 TURN = "turned velocity sensor"
+OWN_CURVE, OWN_BANDS = "curve of its own", ("dead band of its own", "dead band of its own astern")
 SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
 EXACT_BAND = 0.01
@@ -151,6 +152,8 @@ class Kind(Coordinate):
     what differs by log."""
     is_of_structure: bool = False
     """True for the number of a hypothesis about the structure: it is in the model because the hypothesis won."""
+    of_thruster: bool = False
+    """True if each thruster has one."""
     differs_by_log: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
@@ -520,12 +523,26 @@ KINDS = {
         "force of the thruster relative to a whole one",
         keys=("health",),
         is_coefficient=True,
+        of_thruster=True,
         mean=0.75,
         deviation=0.5,
         low=0.0,
         high=1.0,
         null=1.0,
     ),
+    OWN_CURVE: _of_structure(
+        "thrust of the thruster astern relative to ahead, as a multiple of that of the others",
+        is_ratio=True,
+        deviation=0.5,
+        null=0.0,
+        of_thruster=True,
+    ),
+    **{
+        kind: _of_structure(
+            f"{kind}, beyond that of the others", deviation=0.1, low=0.0, high=0.4, null=0.0, of_thruster=True
+        )
+        for kind in OWN_BANDS
+    },
     "command limit": _of_structure(
         "command beyond which the thrusters push no more",
         ". The vehicle file does not have it",

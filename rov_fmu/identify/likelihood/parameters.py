@@ -22,6 +22,8 @@ from rov_fmu.identify.likelihood.kinds import (
     LAG,
     LEAST_LAG,
     OFFSET,
+    OWN_BANDS,
+    OWN_CURVE,
     PLACED,
     POWER,
     POWER_ASTERN,
@@ -184,7 +186,24 @@ class Table:
             self._curve(values, z, curve)
         self._astern(values, z, "drag astern", ("a_d", "b_d"), self.layout.by_name)
         self._astern(values, z, "dead band astern", ("c_0",), self.layout.curves_by_name)
+        for name, (source, thruster) in self._own_curves.items():
+            curve, shared = (self.layout.curves_by_name[one] for one in (name, source))
+            factors = {f"{key}{REVERSE}": np.exp(self.get(z, OWN_CURVE, thruster)) for key in ("a_t", "b_t", "d")}
+            bands = {
+                f"c_0{end}": self.get(z, kind, thruster) for end, kind in zip(("", REVERSE), OWN_BANDS, strict=True)
+            }
+            for key in curve.keys:
+                value = values.get(shared.coefficient(key), 0.0)
+                values[curve.coefficient(key)] = value * factors.get(key, 1.0) + bands.get(key, 0.0)
         return values | {name: self.base[name] for name in self.exact}
+
+    @property
+    def _own_curves(self) -> Mapping[str, tuple[str, str]]:
+        return self.prior.own_curves if self.prior else {}
+
+    def _shared(self, curve: str) -> str:
+        """Return the name of the curve that has the parameters of a curve."""
+        return self._own_curves.get(curve, (curve, ""))[0]
 
     def _astern(
         self, values: dict[str, Any], z: Array, kind: str, keys: Sequence[str], parts: Mapping[str, Part]
@@ -239,7 +258,7 @@ class Table:
         deviations, bands = {}, {}
         for curve in self.layout.curves:
             is_exact = {curve.coefficient("a_t"), curve.coefficient("b_t")} <= self.exact
-            if (first := self.index("thrust shape", curve.name, "1")) is not None and not is_exact:
+            if (first := self.index("thrust shape", self._shared(curve.name), "1")) is not None and not is_exact:
                 deviations[curve.name] = self.parameters[first].number(z[first : first + COUNT])
                 ahead, astern = (coefficients.get(curve.coefficient(f"c_0{end}"), 0.0) for end in ("", REVERSE))
                 bands[curve.name] = (ahead, astern)
@@ -301,7 +320,7 @@ class Table:
         axes = layout.bare_axes
         units = {axis.name: self.force_unit(z, axis) for axis in axes}
         for thruster, curve in ((t, c) for t, c in layout.curve_of.items() if not c.has_rotors):
-            units[curve.lagging(thruster)] = self.get(z, "thrust scale", curve.name, default=1.0)
+            units[curve.lagging(thruster)] = self.get(z, "thrust scale", self._shared(curve.name), default=1.0)
 
         def slow(kind: str, of: str = "", unit: Any = 1.0) -> Slow:
             process = KINDS[kind].slow
@@ -486,7 +505,7 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
 
 
 def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
-    for curve in known.curves:
+    for curve in (one for one in known.curves if one.name not in known.own_curves):
         name = curve.name
         is_measured = name in known.measured_curves
         yield make("thrust scale", name, deviation=1.0 if is_measured else known.thrust_errors.get(name))
@@ -522,7 +541,7 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
 
 def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
-    for curve in known.layout.curves:
+    for curve in (one for one in known.layout.curves if one.name not in known.own_curves):
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
             yield make("advance", curve.name, mean=_lost(curve, known.coefficients))
             if f"d{REVERSE}" in curve.keys:
@@ -552,9 +571,9 @@ def _fixed(p: Parameter, z: float = 0.0) -> Parameter:
 def _of_structure(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield what hypotheses about the structure may free. It stays at what is known, or where it changes nothing."""
     for kind in (kind for kind, one in KINDS.items() if one.is_of_structure):
-        for of, name in known.layout.health.items() if KINDS[kind].is_coefficient else [("", "")]:
-            row = make(kind, of, sets=(name,) if name else ())
-            absent = known.coefficients.get(name, row.null or 0.0)
+        for of, name in known.layout.health.items() if KINDS[kind].of_thruster else [("", "")]:
+            row = make(kind, of, sets=(name,) if KINDS[kind].is_coefficient else ())
+            absent = known.coefficients.get(name, 0.0) if row.sets else row.null or 0.0
             if {*row.sets} <= {*known.layout.coefficients}:
                 yield row if (kind, of) in known.freed else _fixed(row, absent)
 

@@ -28,6 +28,7 @@ from rov_fmu.identify.likelihood.hypotheses import (
     apart,
     applied,
     dive_commands,
+    kinds_freed,
     row_of,
     thrusters_alike,
 )
@@ -752,7 +753,9 @@ class StructureSearch:
             if suspect in self.refuted or (filtered if hypothesis.changes_thrust else predicted) <= hypothesis.alarm:
                 continue
             for some in self._smaller:
-                excludes = any(kind == other and (not of or {*of} & {*own}) for other, own in some)
+                excludes = any(
+                    kinds_freed(kind) & kinds_freed(other) and (not of or {*of} & {*own}) for other, own in some
+                )
                 if len(some) < _MOST and not excludes:
                     sets = [{**some, suspect: start} for start in self.suspects[suspect]]
                     (shown if hypothesis.changes_thrust else others).extend(sets)

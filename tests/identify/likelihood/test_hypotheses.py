@@ -27,9 +27,10 @@ from rov_fmu.identify.likelihood.hypotheses import (
     applied,
     contrasts,
     in_order,
+    kinds_freed,
     twins,
 )
-from rov_fmu.identify.likelihood.kinds import KINDS, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, OWN_BANDS, OWN_CURVE, TURN
 from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import SampledChannel, SampledLog, beside_lines, lost_between_rows
@@ -111,6 +112,9 @@ def faults(names: list[str]) -> dict[str, Fault]:
         "reversed": Fault("reversed commands", second, acting=lambda u: {**u, second: -u[second]}),
         "swapped": Fault(
             "swapped commands", f"{first} and {second}", acting=lambda u: {**u, first: u[second], second: u[first]}
+        ),
+        "astern": Fault(
+            OWN_CURVE, second, 0.9, acting=lambda u: {**u, second: np.where(u[second] < 0.0, 0.8, 1.0) * u[second]}
         ),
         "limited": Fault("command limit", acting=lambda u: {n: np.clip(c, -0.4, 0.4) for n, c in u.items()}, value=0.4),
         "rotors": Fault("rotor lag", rotor_lag=0.15),
@@ -204,9 +208,9 @@ def test_each_hypothesis_changes_what_acts(four_axes: Objective) -> None:
         for of in hypothesis.suspects(four_axes.table.known, four_axes.logs):
             acting = ((sampled.record.told[-1], np.inf),) * len(of) if kind == "idle commands" else None
             changed = applied(four_axes, {(kind, of): acting})
-            rows = [*zip(changed.table.parameters, plain, strict=True)]
-            assert all(one.key == other.key for one, other in rows)
-            freed = {one.key for one, other in rows if one.is_fixed < other.is_fixed}
+            pairs = [*zip(changed.table.parameters, plain, strict=True)]
+            assert all(one.key == other.key for one, other in pairs)
+            freed = {one.key for one, other in pairs if one.is_fixed < other.is_fixed}
             if kind == "rotor lag":
                 assert all(one.has_rotors for one in changed.logs[0].layout.curves)
                 assert not freed
@@ -215,9 +219,40 @@ def test_each_hypothesis_changes_what_acts(four_axes: Objective) -> None:
             if kind == "momentary commands":
                 assert {key[0] for key in freed} == {"short force"}
                 continue
-            assert freed == ({(kind, of[0] if of else "", "")} if hypothesis.starts else set())
+            rows = kinds_freed(kind) if hypothesis.starts else ()
+            assert freed == {(row, of[0] if of else "", "") for row in rows}
             assert freed or is_other
     assert sum(one.probability for one in HYPOTHESES.values()) < 0.65
+
+
+def test_a_thruster_with_a_curve_of_its_own_differs_astern_and_in_its_dead_bands(model: Objective) -> None:
+    """All else is that of the other one: the numbers of both curves are written out here."""
+    changed = applied(model, {(OWN_CURVE, ("r",)): 0.0})
+    table, shared = changed.table, changed.table.layout.curve_of["l"].name
+    z = table.each("mean")
+    for kind, of, value in (
+        ("reverse thrust", shared, 0.1),
+        ("dead band", shared, 0.03),
+        ("thrust scale", shared, 0.2),
+        ("advance", shared, 0.05),
+        (OWN_CURVE, "r", np.log(0.6)),
+        *((kind, "r", 0.02 * (n + 1)) for n, kind in enumerate(OWN_BANDS)),
+    ):
+        index = table.index(kind, of)
+        assert index is not None
+        z[index] = value
+    for some in (z, np.array([z, z]).T):
+        c = table.coefficients(some)
+        left, right = (table.layout.curve_of[name] for name in ("l", "r"))
+        for key, factor, more in (
+            *((key, 1.0, 0.0) for key in ("a_t", "b_t", "d", "T")),
+            *((key, 0.6, 0.0) for key in ("a_t_reverse", "b_t_reverse")),
+            ("c_0", 1.0, 0.02),
+            ("c_0_reverse", 1.0, 0.04),
+        ):
+            expected = factor * np.asarray(c[left.coefficient(key)]) + more
+            assert np.asarray(c[right.coefficient(key)]) == pytest.approx(expected, rel=1e-12)
+    assert c[left.coefficient("c_0")] == pytest.approx(0.03)
 
 
 def uncoupled(objective: Objective) -> Objective:
@@ -364,9 +399,9 @@ def test_a_hypothesis_that_is_absent_is_the_model_without_it(
     values = []
     for some in (plain, absent):
         objective = applied(some, {}, thinned=True)
-        indices = [n for n, p in enumerate(objective.table.parameters) if p.kind == kind]
+        indices = [n for n, p in enumerate(objective.table.parameters) if p.kind in kinds_freed(kind)]
         sets = np.repeat(np.array([p.mean for p in objective.table.parameters])[:, None], 2, axis=1)
-        sets[indices] = null
+        sets[indices] = np.reshape([objective.table.parameters[n].null for n in indices], (-1, 1))
         runs = objective.runs(sets[:, 0])
         values.append(objective.value(sets[:, 0], runs) - objective.prior(sets[:, 0]))
         sets[indices, 1] += objective.free[indices] * np.where(
@@ -993,6 +1028,12 @@ def check(path: Path, vehicle: str, fault: Fault, seed: int, dives: int) -> None
 @pytest.mark.long
 def test_a_dead_thruster_is_named(tmp_path: Path) -> None:
     check(tmp_path, "videoray", faults(["l", "r"])["dead"], 1, 1)
+
+
+@pytest.mark.long
+def test_a_thruster_with_a_curve_of_its_own_is_named(tmp_path: Path) -> None:
+    """Commands astern act at 0.8 of what they are."""
+    check(tmp_path, "videoray", faults(["l", "r"])["astern"], 1, 1)
 
 
 @pytest.mark.long

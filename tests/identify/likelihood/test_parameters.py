@@ -97,6 +97,15 @@ row noise forces of top: ln 0.03 ± 1, 0.001 to inf
 health l: 1 ± 0.5, 1 to 1, absent at 1
 health r: 1 ± 0.5, 1 to 1, absent at 1
 health t: 1 ± 0.5, 1 to 1, absent at 1
+curve of its own l: 0 ± 0.5, 0 to 0, absent at 0
+dead band of its own l: 0 ± 0.1, 0 to 0, absent at 0
+dead band of its own astern l: 0 ± 0.1, 0 to 0, absent at 0
+curve of its own r: 0 ± 0.5, 0 to 0, absent at 0
+dead band of its own r: 0 ± 0.1, 0 to 0, absent at 0
+dead band of its own astern r: 0 ± 0.1, 0 to 0, absent at 0
+curve of its own t: 0 ± 0.5, 0 to 0, absent at 0
+dead band of its own t: 0 ± 0.1, 0 to 0, absent at 0
+dead band of its own astern t: 0 ± 0.1, 0 to 0, absent at 0
 command limit: 1 ± 0.3, 1 to 1, absent at 1
 slew limit: 0 ± 0.5, 0 to 0, absent at 0
 voltage drop: 0 ± 0.15, 0 to 0, absent at 0
