@@ -31,10 +31,11 @@ _SOURCES = (".py", ".c", ".h", ".js", ".j2")
 """The kinds of files that the program consists of."""
 
 
-def meta_data(vehicle: "Vehicle", files: Mapping[str, bytes], before: bytes) -> bytes:
+def meta_data(vehicle: "Vehicle", files: Mapping[str, bytes], before: bytes, summary: str = "") -> bytes:
     """Return the document for an FMU that has these other files.
 
-    `before` are the bytes of the archive that precede the document. The same files give the same bytes.
+    `summary` says in words what it is of, if this is not the vehicle itself. `before` are the bytes of the archive that
+    precede the document. The same files give the same bytes.
     """
     made, generator = vehicle.provenance, f"rov-fmu {__version__}"
     hashes = [(name, sha3_256(content).hexdigest()) for name, content in sorted(files.items())]
@@ -44,7 +45,12 @@ def meta_data(vehicle: "Vehicle", files: Mapping[str, bytes], before: bytes) -> 
         GENERATOR: [(generator, generator_hash())],
         ARCHIVE: [(BEFORE, sha3_256(before).hexdigest())],
     }
-    given = {"vehicle": vehicle, "generator": generator, "classifications": classifications}
+    given = {
+        "vehicle": vehicle,
+        "summary": summary or vehicle.summary,
+        "generator": generator,
+        "classifications": classifications,
+    }
     document = render("resourceMetaData.srmd.j2", **given).encode()
     return _with_own_hash(document, own_hash(document))
 

@@ -15,8 +15,9 @@ from math import hypot, isfinite, sqrt
 from rov_fmu.equation.attitude import QUATERNION, start_formulas
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis, Declaration
 from rov_fmu.equation.expression import compiled
+from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import FOLDER, MANIFEST
-from rov_fmu.fmu.related import Related, ends_of_intervals, manifest, origin
+from rov_fmu.fmu.related import Related, documents, ends_of_intervals, manifest, origin
 from rov_fmu.io.messages import listed
 from rov_fmu.io.templates import render
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -53,8 +54,8 @@ _Row = tuple[float, Values]
 
 
 @dataclass(frozen=True)
-class _Experiment:
-    """A motion during phases, in each of which the inputs are held."""
+class ExpectedRun:
+    """An experiment with phases, in each of which the inputs are held: a motion of a vehicle."""
 
     name: str
     description: str
@@ -106,7 +107,18 @@ class _Experiment:
 def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
     """Return the files of the standard's folder by their path in the FMU. Raises FileError."""
     proofs = [*map(_deep, (*_steps(vehicle), _manoeuvre(vehicle)))]
-    variants = _at_ends_of_intervals(vehicle, proofs[-1])
+    files, related = expected_files(vehicle.name, proofs, _at_ends_of_intervals(vehicle, proofs[-1]))
+    of_origin, roles = origin(vehicle)
+    return {**files, **of_origin, MANIFEST: manifest([*related, *roles, *documents(vehicle)])}
+
+
+def expected_files(
+    name_of: str, proofs: Sequence[ExpectedRun], variants: Sequence[ExpectedRun] = ()
+) -> tuple[dict[str, bytes], list[Related]]:
+    """Return the files of experiments by their path in the FMU, and as the manifest lists them.
+
+    `name_of` is the name of what the FMU is of. Those of `variants` have no expected results.
+    """
     sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
     text = {
         f"{name}.ssv": render(
@@ -135,17 +147,13 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
                 tolerance=f"{TOLERANCE:g}",
                 steps=_STEPS,
                 seconds=_text,
-                description=f"{vehicle.name}: {words}",
+                description=f"{name_of}: {words}",
             )
             related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
-    files = {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}
-    of_origin, roles = origin(vehicle)
-    return {**files, **of_origin, MANIFEST: manifest(vehicle, [*related, *roles])}
+    return {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}, related
 
 
-_EXPECTED = (
-    f"velocities and pose that the FMU must reproduce, within {TOLERANCE:g} of the largest value of each variable"
-)
+_EXPECTED = f"what the FMU must reproduce, within {TOLERANCE:g} of the largest value of each variable"
 _UNCERTAIN = (
     "the manoeuvre with each coefficient at an end of its 95 % interval, and the others where its correlations put them"
 )
@@ -158,7 +166,7 @@ _SETS = {
 """The parameter sets of the experiments with expected results, in words."""
 
 
-def _deep(experiment: _Experiment) -> _Experiment:
+def _deep(experiment: ExpectedRun) -> ExpectedRun:
     """Let an experiment of a vehicle with a surface begin deep under water."""
     if not experiment.vehicle.layout.surface:
         return experiment
@@ -166,7 +174,7 @@ def _deep(experiment: _Experiment) -> _Experiment:
     return replace(experiment, parameters=(name, {**given, **_DEEP}))
 
 
-def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: _Experiment) -> list[_Experiment]:
+def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: ExpectedRun) -> list[ExpectedRun]:
     """Return the manoeuvre with each identified coefficient at each end of its interval."""
     _, started = manoeuvre.parameters or ("", {})
     return [
@@ -184,7 +192,7 @@ def _at_ends_of_intervals(vehicle: Vehicle, manoeuvre: _Experiment) -> list[_Exp
 # ---- Steps from rest -------------------------------------------------------------------------------------------------
 
 
-def _steps(vehicle: Vehicle) -> Iterator[_Experiment]:
+def _steps(vehicle: Vehicle) -> Iterator[ExpectedRun]:
     """Yield the experiments in which one axis steps to its largest command from rest.
 
     A vehicle that is tuned takes each step with its tuning and without, so that the tunable parameters have an effect.
@@ -201,7 +209,7 @@ def _strongest(vehicle: Vehicle, axis: Axis) -> float:
     return vehicle.tested_along(axis)[1] or vehicle.command_range[1]
 
 
-def _step(vehicle: Vehicle, axis: Axis, percent: float, tuning: str) -> _Experiment:
+def _step(vehicle: Vehicle, axis: Axis, percent: float, tuning: str) -> ExpectedRun:
     """Return a step to a command in %, with its V_ss and Tau in words."""
     layout, inputs = vehicle.layout, vehicle.held_inputs(axis, percent / 100.0)
     V_ss, Tau = vehicle.response(axis, percent / 100.0)
@@ -215,14 +223,14 @@ def _step(vehicle: Vehicle, axis: Axis, percent: float, tuning: str) -> _Experim
         f"V_ss = {V_ss:.4g} {axis.unit}, Tau = {Tau:.4g} s{', without ' * bool(neglected)}{listed(neglected)}"
     )
     tunable = {name: vehicle[name] for name in layout.tuning}
-    return _Experiment(
+    return ExpectedRun(
         f"{axis.name}_{percent:g}{'_' * bool(tuning)}{tuning}",
         description,
         vehicle,
         unit,
         [(inputs, [n * unit for n in _MULTIPLES])],
         layout.commands,
-        layout.velocities | layout.pose,
+        layout.velocities | _pose(layout),
         (tuning, tunable) if tuning else None,
     )
 
@@ -258,7 +266,7 @@ def _fastest_rate(vehicle: Vehicle, inputs: Values) -> float:
 # ---- A manoeuvre -----------------------------------------------------------------------------------------------------
 
 
-def _manoeuvre(vehicle: Vehicle) -> _Experiment:
+def _manoeuvre(vehicle: Vehicle) -> ExpectedRun:
     """Return an experiment in which all axes move, with loads, a current and reversals, until all inputs are zero."""
     layout = vehicle.layout
     phases = []
@@ -275,30 +283,32 @@ def _manoeuvre(vehicle: Vehicle) -> _Experiment:
         )
     length = float(f"{min(_PHASE, *(_HORIZON / _fastest_rate(vehicle, inputs) for inputs in phases)):.1g}")
     tilted = layout.has_attitude
-    return _Experiment(
+    return ExpectedRun(
         "manoeuvre",
         f"All axes at once{', tilted at the start' * tilted}, with loads, a current and reversals, then all off",
         vehicle,
         length,
         [(inputs, [(n + 0.5) * length, (n + 1.0) * length]) for n, inputs in enumerate(phases)],
         layout.inputs,
-        layout.velocities | layout.pose | layout.lagging | layout.angles,
+        layout.velocities | _pose(layout) | layout.lagging | layout.angles,
         ("attitude", _ATTITUDE) if tilted else None,
     )
+
+
+def _pose(layout: Layout) -> dict[str, Declaration]:
+    """Return the pose without the quaternion, both of whose signs mean the same attitude."""
+    return {name: declaration for name, declaration in layout.pose.items() if name not in QUATERNION}
 
 
 # ---- Files -----------------------------------------------------------------------------------------------------------
 
 
 def _csv(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> str:
-    """Return a table of the variables that move. The others are 0 except for rounding.
-
-    A quaternion is left out, because both of its signs mean the same attitude.
-    """
+    """Return a table of the variables that move. The others are 0 except for rounding."""
     names = [
         name
         for name, declaration in variables.items()
-        if name not in QUATERNION and max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * declaration.nominal
+        if max(abs(values[name]) for _, values in rows) > _NEGLIGIBLE * declaration.nominal
     ]
     lines = [["time", *names], *([_text(t), *(_text(values[name]) for name in names)] for t, values in rows)]
     return "".join(",".join(line) + "\n" for line in lines)
@@ -306,3 +316,8 @@ def _csv(rows: Sequence[_Row], variables: Mapping[str, Declaration]) -> str:
 
 def _text(value: float) -> str:
     return format(value, ".11g")
+
+
+def as_written(value: float) -> float:
+    """Return a number with the digits that stand in the files."""
+    return float(_text(value))

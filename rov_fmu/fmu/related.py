@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from rov_fmu.fmu.archive import FOLDER, META_DATA
+from rov_fmu.fmu.archive import CARD, FOLDER, META_DATA
 from rov_fmu.io.paths import name_of
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.io.templates import render
@@ -37,9 +37,19 @@ class Related:
     description: str
 
 
-def manifest(vehicle: Vehicle, related: Iterable[Related]) -> bytes:
-    """Return fmi-ls-manifest.xml, which names these files, the documentation and the meta-data."""
-    return render("fmi-ls-manifest.xml.j2", vehicle=vehicle, related=related, meta_data=META_DATA).encode()
+def manifest(related: Iterable[Related]) -> bytes:
+    """Return fmi-ls-manifest.xml, which names these files, the model card and the meta-data."""
+    card = Related(f"../../{CARD}", "report", "text/plain", "Model card")
+    words = "Hashes of the files, of what they were made from, and of the program"
+    hashes = Related(f"../../{META_DATA}", "meta-data", "application/x-srmd-meta-data", words)
+    return render("fmi-ls-manifest.xml.j2", related=[*related, card, hashes]).encode()
+
+
+def documents(vehicle: Vehicle) -> Iterator[Related]:
+    """Yield the pages of the FMU of a vehicle."""
+    if vehicle.provenance and vehicle.provenance.report:
+        yield Related("../../documentation/identification.html", "report", "text/html", "Report of the identification")
+    yield Related("../../documentation/index.html", "document", "text/html", "Documentation")
 
 
 def origin(vehicle: Vehicle) -> tuple[dict[str, bytes], list[Related]]:

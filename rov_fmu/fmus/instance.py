@@ -6,10 +6,10 @@ arrays for each call, which takes 6.2 µs for a step with inputs and outputs in 
 
 import ctypes
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -89,8 +89,23 @@ class Instance:
             raise LoadError(brief(f"{unpacked.without_folder(error)}{last_message()}", 240)) from error
         finally:
             os.chdir(here)  # FMPy changes the folder, and may not change it back
+        self._kept, self.time = cache(self.tables), 0.0
         self.do_step: Callable[[float, float], int] = self._stepping()
         """Takes a step from a time over a length, s, and returns the status. Raises CallError if the run ends."""
+
+    def read(self, names: Iterable[str]) -> list[Any]:
+        """Return the values of variables. Raises CallError."""
+        found: dict[str, Any] = {}
+        for table in self._kept(tuple(names)):
+            check(table.get(0), "reading values", self.time)
+            found |= zip(table.names, table.values[0].tolist(), strict=True)
+        return [found[name] for name in names]
+
+    def set(self, values: Mapping[str, Any]) -> None:
+        """Set variables. Raises CallError."""
+        for table in self._kept(tuple(values)):
+            table.values[0] = [values[name] for name in table.names]
+            check(table.set(0), "setting values", self.time)
 
     def tables(self, names: Iterable[str], rows: int = 1) -> list[Table]:
         """Return tables of variables, one for each of their types, whose values are 0 or None at first."""
@@ -135,19 +150,18 @@ class Instance:
         start: float,
         stop: float | None,
         tolerance: float | None = None,
-        values: Iterable[Table] = (),
+        values: Callable[[], object] = lambda: None,
         inputs: Callable[[], object] = lambda: None,
     ) -> None:
-        """Initialize the instance with start values. Raises CallError.
+        """Initialize the instance. Raises CallError.
 
-        `inputs` is called in the initialization mode.
+        `values` is called before the initialization, and `inputs` in it.
         """
         from fmpy.fmi1 import FMICallException
 
         try:
             enter = self.set_up(start, stop, tolerance)
-            for table in values:
-                check(table.set(0), "setting the start values")
+            values()
             enter()
             inputs()
             self.fmu.exitInitializationMode()
@@ -159,6 +173,7 @@ class Instance:
 
         FMI 2.0 has the times before the start values, and 3.0 as the initialization begins.
         """
+        self.time = start
         times = {"tolerance": tolerance, "startTime": start, "stopTime": stop}
         if self._version == "3":
             return partial(self.fmu.enterInitializationMode, **times)
@@ -169,6 +184,7 @@ class Instance:
     def step(self, time: float, length: float) -> None:
         """Take a step. Raises CallError."""
         check(self.do_step(time, length), "the step", time)
+        self.time = time + length
 
     def free(self) -> None:
         """Free the instance. The library stays loaded, because loading one again has crashed processes."""

@@ -85,7 +85,7 @@ class Simulation:
             self._places[name][0] = value
         times, step, changes, do_step = self._times, self._step, self._changes, self._instance.do_step
         reads = [table.get for table in self._reads]
-        self._instance.begin(times[0], times[-1], self._tolerance, self._start, self._set_first)
+        self._instance.begin(times[0], times[-1], self._tolerance, self._set_start, self._set_first)
         for get in reads:
             check(get(0), "reading", times[0])
         for n in range(len(times) - 1):
@@ -97,6 +97,10 @@ class Simulation:
             for get in reads:
                 if (status := get(n + 1)) > WARNING:
                     check(status, "reading", times[n + 1])
+
+    def _set_start(self) -> None:
+        for table in self._start:
+            check(table.set(0), "setting the start values")
 
     def _set_first(self) -> None:
         for put, row in self._changes.get(0, ()):

@@ -61,6 +61,12 @@ _SECOND_SOLVER = (
     "Python, run when the FMU was built, and not the Taylor series in C that the FMU runs. So they test the "
     "integration and the compiled code, and not the physics."
 )
+_SAME_LAW = (
+    " They come from the same law in C, compiled for a program that flew the vehicle when the FMU was built. So they "
+    "test the interface and the compiled code, and not the law."
+)
+_ORIGINS = {"equation.h": _SECOND_SOLVER, "autopilot.c": _SAME_LAW}
+"""Where the expected results of an FMU of ours come from, by a file among its sources."""
 
 
 def expected(subject: Subject) -> Evidence:
@@ -72,9 +78,11 @@ def expected(subject: Subject) -> Evidence:
     worst = [max(own, key=lambda f: f.deviation / f.tolerance) for own in of_each]
     wrong = [f for f in findings if not f.passed]
     tolerances, deviations = [f.tolerance for f in worst], [f.deviation for f in worst]
-    words = f"{len(findings) - len(wrong)} of {len(findings)} results of {len(worst)} experiments are as expected"
+    count = f"{len(worst)} experiment{'s' * (len(worst) > 1)}"
+    words = f"{len(findings) - len(wrong)} of {len(findings)} results of {count} are as expected"
     words += f", within {max(tolerances):.0e} of the largest value of each variable."
-    words += _SECOND_SOLVER * (subject.is_ours and Path(subject.folder, "sources", "step.c").exists())
+    for name, origin in _ORIGINS.items():
+        words += origin * (subject.is_ours and Path(subject.folder, "sources", name).exists())
     if wrong:
         f = wrong[0]
         words += f" Experiment {f.experiment}: {f.error or f'{f.variable} deviates by {in_short(f.deviation)}'}."
@@ -98,6 +106,8 @@ def step_size(subject: Subject) -> Evidence:
         return does_not_apply(subject.obstacle)
     if not subject.description.coSimulation.canHandleVariableCommunicationStepSize:
         return does_not_apply("the FMU says that it needs communication steps of one size")
+    if sampled := [v.name for v in map(subject.variables.get, subject.plan.outputs) if v and v.is_sampled]:
+        return does_not_apply(f"the FMU makes {listed(sampled)} anew at each communication step (they are discrete)")
     plan, refused = subject.plan, ""
     ends = dict[int, Array]()
     with subject.runs() as child:

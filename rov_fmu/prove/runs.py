@@ -16,7 +16,6 @@ from rov_fmu.fmus.instance import (
     LoadError,
     RunError,
     Unpacked,
-    check,
     forget_message,
     last_message,
     status_word,
@@ -69,8 +68,8 @@ class Runs(Unpacked):
         Every run has an instance of its own. Raises RunError.
         """
         with self._instance(plan) as fmu:
-            rows = [self._read(fmu, plan.outputs)]
-            rows += (self._read(fmu, plan.outputs) for _ in self._durations(fmu, plan, steps))
+            rows = [fmu.read(plan.outputs)]
+            rows += (fmu.read(plan.outputs) for _ in self._durations(fmu, plan, steps))
         return np.array(rows, dtype=np.float64)
 
     def durations(self, plan: Plan, steps: int, most: float) -> list[float]:
@@ -89,7 +88,7 @@ class Runs(Unpacked):
         """Take the steps of a plan, with the inputs of each piece, and yield the duration of each step, s."""
         start = plan.start
         for end, inputs in plan.pieces:
-            self._set(fmu, inputs)
+            fmu.set(inputs)
             for t, after in pairwise(np.linspace(start, end, steps + 1).tolist()):
                 begin = perf_counter()
                 fmu.step(t, after - t)
@@ -100,7 +99,7 @@ class Runs(Unpacked):
         """Set impossible values of inputs after the initialization, or of parameters during it, one after another."""
         is_input = self.variables[values[0][0]].causality == "input"
         with self._instance(plan, initialized=is_input, logging=True) as fmu:
-            answers = [self._asked(fmu, [name], partial(self._set, fmu, {name: value})) for name, value in values]
+            answers = [self._asked(fmu, [name], partial(fmu.set, {name: value})) for name, value in values]
         refusals = [answer for answer in answers if answer.refused]
         kept = sum(answer.kept for answer in refusals)
         return Answer(len(values), len(refusals), kept, (refusals or answers)[-1].words)
@@ -115,7 +114,7 @@ class Runs(Unpacked):
 
         After an error, FMI lets an FMU refuse to be read.
         """
-        before = now = self._read(fmu, names)
+        before = now = fmu.read(names)
         forget_message()
         words = ""
         try:
@@ -126,7 +125,7 @@ class Runs(Unpacked):
             return Answer(1, 0, 0, status_word(0))
         forget_message()
         with suppress(CallError):
-            now = self._read(fmu, names)
+            now = fmu.read(names)
         return Answer(1, 1, int(np.array_equal(now, before, equal_nan=True)), words)
 
     @contextmanager
@@ -141,7 +140,7 @@ class Runs(Unpacked):
             begin_initialization = instance.set_up(plan.start, plan.stop)
             apply_start_values(instance.fmu, self.description, dict(plan.parameters))
             begin_initialization()
-            self._set(instance, plan.pieces[0][1])
+            instance.set(plan.pieces[0][1])
             if initialized:
                 instance.fmu.exitInitializationMode()
             yield instance
@@ -153,16 +152,3 @@ class Runs(Unpacked):
         finally:
             if instance is not None:
                 instance.end() if initialized else instance.free()
-
-    def _read(self, fmu: Instance, names: Sequence[str]) -> list[float]:
-        found = dict[str, float]()
-        for table in fmu.tables(names):
-            check(table.get(0), "reading")
-            found |= dict(zip(table.names, table.values[0].tolist(), strict=True))
-        return [float(found[name]) for name in names]
-
-    def _set(self, fmu: Instance, values: Mapping[str, float]) -> None:
-        for name, value in values.items():
-            (table,) = fmu.tables([name])
-            table.values[0] = value
-            check(table.set(0), f"setting {name}")

@@ -7,10 +7,12 @@ parameters, the tables of the thrusters constants of the code.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 from rov_fmu.autopilot.gains import Autopilot
 from rov_fmu.autopilot.law import AXES, GAINS, LAW_FILE, SENSORS, STATE, STEP_FILE, law_sources
+from rov_fmu.bridges.autopilot.expected import expected_of_autopilot
 from rov_fmu.build import chosen_platforms, with_binaries
 from rov_fmu.c.compile import compile_all
 from rov_fmu.equation.attitude import QUATERNION
@@ -18,6 +20,7 @@ from rov_fmu.equation.catalogue import PITCH, ROLL, Axis, Declaration
 from rov_fmu.equation.layout import Layout
 from rov_fmu.fmu.archive import archive
 from rov_fmu.fmu.content import native_content
+from rov_fmu.fmu.meta_data import meta_data
 from rov_fmu.fmu.terminals import Terminal, terminals, terminals_document
 from rov_fmu.fmu.variables import FmuModel, Variable
 from rov_fmu.io.templates import render
@@ -119,8 +122,9 @@ def autopilot_model(autopilot: Autopilot) -> FmuModel:
     told = ", ".join(f"{name} {lag:.3g} s" for name, lag in names.items())
     summary = f"Autopilot of {vehicle.name}: holds {', '.join(names)} by its thrusters"
     card = (
-        f"{summary}.\nThe gains are for a step of {autopilot.step:g} s, {autopilot.delay:g} s from sensor to thrust, "
-        f"and the lags {told}.\nFor each axis: {_MODES}. It samples once per step."
+        f"What it is\n- {summary}.\n- For each axis: {_MODES}. It samples once per step.\n"
+        f"Where it holds\n- The gains are for a step of {autopilot.step:g} s, {autopilot.delay:g} s from sensor to "
+        f"thrust, and the lags {told}.\n"
     )
     return FmuModel(
         *(f"{vehicle.identifier}_autopilot", vehicle.version, vehicle.source, summary, card),
@@ -153,6 +157,8 @@ def autopilot_fmu(autopilot: Autopilot, platforms: Sequence[str] | None = None, 
     Raises BuildError.
     """
     chosen = chosen_platforms(platforms, fmi)
-    content = native_content(autopilot_model(autopilot), fmi=fmi, interface="cs", platforms=chosen)
-    binaries = compile_all(chosen, content.sources, content.identifier, fmi=fmi)
-    return archive(with_binaries(content, binaries, fmi))
+    model = autopilot_model(autopilot)
+    expected = expected_of_autopilot(autopilot, model)
+    content = native_content(model, expected, fmi=fmi, interface="cs", platforms=chosen)
+    files = with_binaries(content, compile_all(chosen, content.sources, content.identifier, fmi=fmi), fmi)
+    return archive(files, partial(meta_data, autopilot.vehicle, files, summary=model.summary))

@@ -6,6 +6,7 @@ and the result does not depend on the order of the FMUs. Ecos and libcosim do th
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import partial
 from math import isnan
 from pathlib import Path
 from types import MappingProxyType
@@ -14,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.bridges.system.connections import Connection
-from rov_fmu.fmus.instance import Array, Instance, RunError, Table, Unpacked, check, forget_message, last_message
+from rov_fmu.fmus.instance import Array, Instance, RunError, Unpacked, forget_message, last_message
 from rov_fmu.fmus.variable import Value
 from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import brief
@@ -51,7 +52,7 @@ class Master:
         self._numbers = {name: n for n, name in enumerate(components)}
         self._busy = np.memmap(Path(folder, _BUSY), np.int32, "w+", shape=1)
         self._busy[0] = -1
-        self._wanted = {*read, *(c.start for c in connections)}
+        self._wanted = grouped({*read, *(c.start for c in connections)})
         self._fmus: dict[str, Instance] = {}
         self._warnings: dict[str, float] = {}
 
@@ -76,12 +77,8 @@ class Master:
         for name, unpacked in self._parts.items():
             with self._calling(name):
                 fmu = self._fmus[name] = Instance(unpacked, logging=True)
-                tables = fmu.tables(own := values.get(name, {}))
-                for table in tables:
-                    table.values[0] = [own[variable] for variable in table.names]
-                fmu.begin(start, stop, values=tables)
-        self._gets, self._sets, self._given = map(self._tables, (self._wanted, self._sources, inputs))
-        self._inputs = inputs
+                fmu.begin(start, stop, values=partial(fmu.set, values.get(name, {})))
+        self._inputs, self._sets = inputs, grouped([*inputs, *self._sources])
         self._now = self._outputs()
         return self._row()
 
@@ -89,10 +86,9 @@ class Master:
         """Take some steps, and return the variables after each one. Raises RunError."""
         rows = []
         for _ in range(count):
-            for name, ends, table in self._given:
-                self._set(name, table, [self._inputs[end][self._done] for end in ends])
-            for name, ends, table in self._sets:
-                self._set(name, table, [self._passed(end) for end in ends])
+            for component, names in self._sets.items():
+                with self._calling(component):
+                    self._fmus[component].set({name: self._passed((component, name)) for name in names})
             for name, fmu in self._fmus.items():
                 with self._calling(name):
                     fmu.step(self._time, self._step)
@@ -107,33 +103,22 @@ class Master:
             fmu.end()
         self._fmus = {}
 
-    def _tables(self, names: Iterable[Name]) -> list[tuple[str, list[Name], Table]]:
-        """Return a table for the variables of each type of a component, with their names."""
-        return [
-            (component, [(component, name) for name in table.names], table)
-            for component, own in grouped(names).items()
-            for table in self._fmus[component].tables(own)
-        ]
-
-    def _set(self, name: str, table: Table, values: Sequence[Any]) -> None:
-        with self._calling(name):
-            table.values[0] = values
-            check(table.set(0), "setting the inputs", self._time)
-
     def _passed(self, end: Name) -> Any:
-        """Return the value that an input gets from the output that is connected to it, in the unit of the input."""
+        """Return what an input gets: a given value, or that of the connected output in the unit of the input."""
+        if end not in self._sources:
+            return self._inputs[end][self._done]
         start, factor = self._sources[end]
         return self._now[start] if factor == 1.0 else factor * self._now[start]
 
     def _outputs(self) -> dict[Name, Any]:
         now: dict[Name, Any] = {}
-        for component, names, table in self._gets:
+        for component, names in self._wanted.items():
             with self._calling(component):
-                check(table.get(0), "reading the outputs", self._time)
-                for name, value in zip(names, table.values[0].tolist(), strict=True):
+                values = self._fmus[component].read(names)
+                for name, value in zip(names, values, strict=True):
                     if isinstance(value, float) and isnan(value):
-                        raise RunError(f"reading the outputs at {self._time:.6g} s: {name[1]} is no number (NaN)")
-                    now[name] = value
+                        raise RunError(f"reading values at {self._time:.6g} s: {name} is no number (NaN)")
+                    now[component, name] = value
         return now
 
     def _row(self) -> list[float]:

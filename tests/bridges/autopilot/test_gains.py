@@ -1,7 +1,9 @@
 """Gains in SI units: calm in all corners, and the same flight in Python, in C, and by the FMU."""
 
 import shutil
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import fmpy
 import numpy as np
@@ -14,16 +16,19 @@ from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import Autopilot, autopilot_of
 from rov_fmu.autopilot.law import AXES, PLACE, RATE, SENSORS, STICK
 from rov_fmu.autopilot.pilot import Pilot
+from rov_fmu.bridges.autopilot.expected import expected_of_autopilot
 from rov_fmu.bridges.autopilot.files import flown
-from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
+from rov_fmu.bridges.autopilot.fmu import autopilot_fmu, autopilot_model
 from rov_fmu.c.compile import PLATFORMS
 from rov_fmu.c.simulation import Array
 from rov_fmu.c.stepper import Stepper
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW
+from rov_fmu.fmu.archive import META_DATA, archive
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from rov_fmu.vehicle.writer import vehicle_text
 from tests.often import spread
 from tests.vehicles import FINNED
 
@@ -126,12 +131,29 @@ AIMS = {"depth": 11.0, "heading": 1.0, "surge": 0.3}
 STEPS = 400
 
 
-def by_flights(made: Autopilot) -> Array:
-    pilot = Pilot(made).hold(**AIMS)
+HOLD = {"mode_w": 2.0, "ref_z": 11.0, "mode_r": 2.0, "ref_psi": 1.0}
+
+
+def by_flights(made: Autopilot, delay: int = 0, **aims_of: float) -> Array:
+    pilot = Pilot(made).hold(**(aims_of or AIMS))
     modes, aims = np.tile(pilot.modes, (STEPS, 1)), np.tile(pilot.aims, (STEPS, 1))
-    flight = Flights(made.vehicle, made.sharing, [{"z": 10.0}]).fly(made.loops, modes, aims, 0.02)
+    flight = Flights(made.vehicle, made.sharing, [{"z": 10.0}], [delay]).fly(made.loops, modes, aims, 0.02)
     seen: Array = flight.sensors[0]
     return seen
+
+
+def begun(path: Path, fmi: int, values: dict[str, float]) -> tuple[Any, dict[str, int]]:
+    """Return an instance of FMPy that is initialized with values, and the references of its variables."""
+    description = fmpy.read_model_description(str(path))
+    reference = {v.name: v.valueReference for v in description.modelVariables}
+    folder = fmpy.extract(str(path), unzipdir=str(path.with_suffix("").absolute()))
+    fmu = fmpy.instantiate_fmu(folder, description, "CoSimulation")
+    if fmi == 2:
+        fmu.setupExperiment(startTime=0.0)
+    fmu.enterInitializationMode()
+    (fmu.setReal if fmi == 2 else fmu.setFloat64)([reference[name] for name in values], [*values.values()])
+    fmu.exitInitializationMode()
+    return fmu, reference
 
 
 @pytest.mark.parametrize("name", ["videoray", "bluerov2_heavy"])
@@ -149,17 +171,8 @@ def test_the_fmu_flies_as_flights_in_c_and_restores_its_state(vehicle: Vehicle, 
     path = tmp_path / "autopilot.fmu"
     path.write_bytes(autopilot_fmu(made, ["host"], fmi))
     assert validate_fmu(str(path)) == []
-    description = fmpy.read_model_description(str(path))
-    reference = {v.name: v.valueReference for v in description.modelVariables}
-    folder = fmpy.extract(str(path), unzipdir=str(tmp_path / "fmu"))
-    pilot = fmpy.instantiate_fmu(folder, description, "CoSimulation")
+    pilot, reference = begun(path, fmi, HOLD | {"mode_u": 1.0, "ref_u": 0.3})
     get, put = (pilot.getReal, pilot.setReal) if fmi == 2 else (pilot.getFloat64, pilot.setFloat64)
-    if fmi == 2:
-        pilot.setupExperiment(startTime=0.0)
-    pilot.enterInitializationMode()
-    aims = {"mode_w": 2.0, "ref_z": 11.0, "mode_r": 2.0, "ref_psi": 1.0, "mode_u": 1.0, "ref_u": 0.3}
-    put([reference[name] for name in aims], [*aims.values()])
-    pilot.exitInitializationMode()
     layout = vehicle.layout
     sensors = [*layout.pose, *layout.velocities, *layout.over_ground]
     rov = Stepper(vehicle, {"z": 10.0}, [*sensors, *(("phi", "theta", "psi") if layout.has_attitude else ())])
@@ -180,6 +193,91 @@ def test_the_fmu_flies_as_flights_in_c_and_restores_its_state(vehicle: Vehicle, 
         now = rov.step(get(commands), 0.02)
     pilot.terminate()
     pilot.freeInstance()
+
+
+def _drawn(vehicle: Vehicle, seed: int) -> Vehicle:
+    """Return a vehicle with other masses, inertias, drag, loads and lags; with seed 0 the same one."""
+    random = np.random.default_rng(seed)
+    changed = [name for name in vehicle.coefficients if name.startswith(("m_a_", "I_", "a_d_", "b_d_", "F_0_", "T_"))]
+    return vehicle.with_(**{name: vehicle[name] * random.uniform(0.8, 1.3) for name in changed if seed})
+
+
+FIVE = [("videoray", 0), ("bluerov2", 0), ("bluerov2_heavy", 0), ("bluerov2", 95), ("bluerov2_heavy", 96)]
+PLAN = """
+step = 0.02
+stop_time = 8.0
+connect = [
+  ["rov.pose", "autopilot.pose"], ["rov.velocity", "autopilot.velocity"],
+  ["rov.body_velocity", "autopilot.body_velocity"], ["autopilot.thrusters", "rov.thrusters"],
+]
+[component.rov]
+vehicle = "own.toml"
+start = { z = 10.0 }
+[component.autopilot]
+companion = "autopilot"
+for = "rov"
+start = { mode_w = 2.0, ref_z = 11.0, mode_r = 2.0, ref_psi = 1.0 }
+"""
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "seed"), FIVE)
+def test_five_vehicles_step_alike_by_a_pair_of_fmus_in_a_system_and_in_python(
+    name: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Steps of depth and heading. In a system, whose members exchange at once, commands arrive a step later."""
+    copy = Path(shutil.copytree(SHIPPED[name].parent, tmp_path / "models"))
+    monkeypatch.chdir(copy)
+    drawn = _drawn(load_vehicle(copy / SHIPPED[name].name), seed)
+    Path("own.toml").write_text(vehicle_text(drawn, copy), encoding="utf-8")
+    vehicle = load_vehicle(Path("own.toml"))
+    made, layout, aims = autopilot_of(vehicle), vehicle.layout, {"depth": 11.0, "heading": 1.0}
+    python = rov_fmu.load("own.toml").hold(STEPS * 0.02, {}, start={"z": 10.0}, step=0.02, **aims)
+    rov_fmu.build_fmu(vehicle, "rov.fmu", platforms="host")
+    Path("autopilot.fmu").write_bytes(autopilot_fmu(made, ["host"]))
+    Path("plan.toml").write_text(PLAN, encoding="utf-8")
+    assert main(["system", "plan.toml", "-o", "my.ssp", "--run"]) == 0
+    system = np.genfromtxt("my.csv", delimiter=",", names=True, deletechars="")
+    rov, of_rov = begun(Path("rov.fmu"), 2, {"z": 10.0})
+    pilot, of_pilot = begun(Path("autopilot.fmu"), 2, HOLD)
+    sensors, pair = [*layout.pose, *layout.velocities, *layout.over_ground], []
+    for n in range(STEPS):
+        pair.append(rov.getReal([of_rov["z"], of_rov["psi"]]))
+        pilot.setReal([of_pilot[one] for one in sensors], rov.getReal([of_rov[one] for one in sensors]))
+        pilot.doStep(n * 0.02, 0.02)
+        rov.setReal([of_rov[one] for one in layout.commands], pilot.getReal([of_pilot[one] for one in layout.commands]))
+        rov.doStep(n * 0.02, 0.02)
+    now, later = by_flights(made, 0, **aims), by_flights(made, 1, **aims)
+    for n, variable in enumerate(("z", "psi")):
+        own, delayed = (seen[:, SENSORS.index(variable)] for seen in (now, later))
+        assert python[variable][:STEPS] == pytest.approx(own, abs=1e-9)
+        assert np.array(pair)[:, n] == pytest.approx(own, abs=1e-9)
+        assert system[f"rov.{variable}"][:STEPS] == pytest.approx(delayed, abs=1e-9)
+        assert own[-1] == pytest.approx((11.0, 1.0)[n], abs=0.05)
+
+
+def test_prove_finds_the_expected_results_of_the_autopilot_and_a_gain_that_was_changed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """They are those of Python's calls of the law; the page says so, and does not ask for other steps."""
+    made = autopilot_of(VIDEORAY)
+    for fmi in (2, 3):
+        path = tmp_path / f"autopilot{fmi}.fmu"
+        path.write_bytes(autopilot_fmu(made, ["host"], fmi))
+        assert main(["prove", str(path)]) == 0
+        assert "3 of 3 pass" in capsys.readouterr().out
+    assert main(["prove", str(path), "--report", str(tmp_path / "proof.html")]) == 0
+    page = (tmp_path / "proof.html").read_text(encoding="utf-8")
+    assert "They come from the same law in C" in page
+    assert "DOP853" not in page
+    assert "makes u_l, u_r and u_t anew at each communication step" in page
+    made.loops["k_p"][AXES.index(HEAVE)] *= 1.0 + 1e-6
+    with zipfile.ZipFile(path) as old:
+        files = {name: old.read(name) for name in old.namelist() if name != META_DATA}
+    expected = expected_of_autopilot(made, autopilot_model(made))
+    path.write_bytes(archive(files | expected))
+    assert main(["prove", str(path)]) == 1
+    assert "u_t" in capsys.readouterr().out
 
 
 @pytest.mark.long

@@ -395,7 +395,7 @@ def test_the_command_tells_what_half_the_step_changes(tmp_path: Path, capsys: py
 STRANGE = {
     1: ("a: the step at 0.5 s: discard; the FMU: the rope is cut", 2),
     2: ("a: the step at 0.5 s: fatal; the FMU: Fatal py exception", 2),
-    3: ("a: reading the outputs at 1 s: y is no number (NaN)", 2),
+    3: ("a: reading values at 1 s: y is no number (NaN)", 2),
     4: ("warning: a: the rope is thin (at 0.5 s)", 0),
     5: ("the system cannot be run: a needs more than 2 s", 2),
     6: ("the system cannot be run: a ended its process: SIGABRT", 2),
