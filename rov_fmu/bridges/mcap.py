@@ -21,6 +21,7 @@ from scipy.spatial.transform import Rotation
 
 from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.equation.catalogue import UPWARD
 from rov_fmu.io.messages import InputError
 from rov_fmu.report.plots.geometry import thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -36,7 +37,7 @@ BODY = "base_link"
 MISSING = "MCAP needs foxglove-sdk: pip install 'rov-fmu[ros]'"
 _TO_ENU = Rotation.from_matrix([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """The rotation from north-east-down to east-north-up."""
-_TO_FRD = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
+_TO_FRD = Rotation.from_matrix(np.diag(UPWARD[:3]))
 """The rotation from forward-left-up to forward-starboard-down, which is its own inverse."""
 _SCENE_INTERVAL = 0.04
 """The least time between two pictures of the vehicle, s: 25 pictures a second look smooth."""

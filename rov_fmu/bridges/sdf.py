@@ -20,7 +20,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import AXES, BODY, HEAVE, REVERSE, cross_name
+from rov_fmu.equation.catalogue import AXES, BODY, HEAVE, REVERSE, UPWARD, cross_name
 from rov_fmu.equation.forces import (
     COUPLING,
     DEAD_BAND,
@@ -44,7 +44,7 @@ DENSITY = 1000.0
 """The density of the water, kg/m3, the default of the Buoyancy plugin."""
 _GRAVITY = 9.8
 """Gravity where a vehicle file has no weight, m/s2, the default of SDFormat."""
-_SIGNS = np.array([1.0, -1.0, -1.0, 1.0, -1.0, -1.0])
+_SIGNS = np.array(UPWARD)
 """The signs of the components along and about the axes in Gazebo's frame, by those in the vehicle's frame."""
 _VELOCITIES, _FORCES = "uvwpqr", "xyzkmn"
 """The letters of the axes: of velocities, and of forces in the Hydrodynamics plugin."""

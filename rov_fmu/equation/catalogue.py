@@ -256,7 +256,11 @@ SURFACE = {
     "height": Declaration("m", "Height H above the surface over which buoyancy and thrust fade out", 1e-3, 100.0),
 }
 GRAVITY = 9.80665
-"""The standard acceleration of gravity, m/s2."""
+"""The standard acceleration of gravity, m/s2. SDFormat has a default of its own, and a companion of a system has this
+number itself, because its FMU contains it alone."""
+UPWARD = (1.0, -1.0, -1.0, 1.0, -1.0, -1.0)
+"""The signs along and about the axes (surge, sway, heave, roll, pitch, yaw) in forward-port-up, as in Gazebo, MuJoCo
+and ROS, by those in forward-starboard-down: between both lies half a turn about the x axis."""
 OUT_OF_WATER = "z_out"
 """The state z + H of the table of terms, which is negative while a vehicle is out of the water."""
 BELOW_SURFACE = "z_below"

@@ -16,7 +16,7 @@ from unicodedata import combining, normalize
 
 import numpy as np
 
-from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, YAW, Axis
+from rov_fmu.equation.catalogue import AXES, GRAVITY, HEAVE, PITCH, ROLL, YAW, Axis
 from rov_fmu.tank.arrays import Array, Flags
 
 LENGTHS = {"m": 1.0, "cm": 100.0, "mm": 1000.0, "ft": 1.0 / 0.3048}
@@ -26,7 +26,7 @@ TIMES = {"s": 1.0, "ms": 1e3, "us": 1e6, "µs": 1e6, "ns": 1e9}
 VOLTAGES = {"V": 1.0, "mV": 1000.0}
 PRESSURES = {"Pa": 1.0, "hPa": 0.01, "mbar": 0.01, "kPa": 1e-3, "bar": 1e-5}
 """The units that a file may use, and how many of each make one SI unit."""
-ATMOSPHERE, PRESSURE_GRADIENT = 101325.0, 1000.0 * 9.80665
+ATMOSPHERE, PRESSURE_GRADIENT = 101325.0, 1000.0 * GRAVITY
 """The pressure above the water, Pa, and its gradient in fresh water, Pa/m."""
 HULL = 0.02, 0.05
 """A barometer is inside the hull if the depth that follows from it changes by less than the first number, m, and if its

@@ -8,7 +8,7 @@ from itertools import chain, combinations, pairwise
 from math import hypot, sqrt
 from typing import Any
 
-from rov_fmu.equation.catalogue import PITCH, ROLL, SWAY, YAW, Axis, cross_name
+from rov_fmu.equation.catalogue import GRAVITY, PITCH, ROLL, SWAY, YAW, Axis, cross_name
 from rov_fmu.equation.expression import compiled
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Thruster
@@ -133,9 +133,8 @@ def _unit(row: Sequence[float]) -> list[float]:
 
 # ---- Mass, damping, weight -------------------------------------------------------------------------------------------
 
-_GRAVITY = 9.81
 _TOLERANCE = 0.03
-"""The largest relative difference between W and 9.81 m_rov that gives no warning."""
+"""The largest relative difference between W and the weight of m_rov that gives no warning."""
 _FAR_ABOVE = 1.5
 """The largest ratio of the battery's voltage to V_0 that gives no warning."""
 _LEAST = 1e-9
@@ -253,8 +252,8 @@ def _doubts_of_weight(k: Mapping[str, float]) -> Iterator[str]:
     """Yield a line if the weight does not fit the mass, and one if the buoyancy turns the vehicle upside down."""
     if "W" not in k:
         return
-    if (mass := k.get("m_rov")) and abs(k["W"] / (_GRAVITY * mass) - 1.0) > _TOLERANCE:
-        weighs = f"m_rov = {mass:g} kg weighs {_GRAVITY * mass:.4g} N: one of the two is probably wrong"
+    if (mass := k.get("m_rov")) and abs(k["W"] / (GRAVITY * mass) - 1.0) > _TOLERANCE:
+        weighs = f"m_rov = {mass:g} kg weighs {GRAVITY * mass:.4g} N: one of the two is probably wrong"
         yield key_line("body.W.value", weighs, k["W"])
     z_G, z_B = (k.get(name, 0.0) for name in ("z_G", "z_B"))
     if k["W"] * z_G < k["B"] * z_B:

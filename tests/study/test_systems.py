@@ -1,5 +1,6 @@
 """Studies of systems: component.variable names what varies, what is kept, and what a figure is of."""
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from rov_fmu.bridges.system.companion import companion
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.ssp import Component, System, ssp_content
 from rov_fmu.cli import main
+from rov_fmu.fmu.archive import archive
 from rov_fmu.io.messages import FileError
+from rov_fmu.study.plan.system_model import read_system
 from tests.commands import without_progress
 from tests.often import spread
 
@@ -88,3 +91,19 @@ def test_a_damaged_system_is_one_line(folder: Path) -> None:
         (folder / "my.ssp").write_bytes(damaged)
         with pytest.raises(FileError, match="is not a system"):
             run_study(folder / "plan.toml", folder / "results")
+
+
+def test_the_name_of_a_component_leads_out_of_no_folder(folder: Path) -> None:
+    """A stranger's system may have any names; the FMUs are unpacked into folders with numbers."""
+    with zipfile.ZipFile(folder / "my.ssp") as packed:
+        files = {name: packed.read(name) for name in packed.namelist()}
+    structure = "SystemStructure.ssd"
+    files[structure] = files[structure].replace(b'name="a"', b'name="../../a"').replace(b'"a"', b'"../../a"')
+    (folder / "my.ssp").write_bytes(archive(files))
+    before = {*folder.rglob("*")}
+    model = read_system(folder / "my.ssp")
+    assert "../../a.V_N" in model.variables
+    model.unpack(folder / "in" / "own")
+    new = {*folder.rglob("*")} - before
+    assert all(path.is_relative_to(folder / "in") for path in new)
+    assert {path.name for path in (folder / "in" / "own").iterdir()} == {"0", "1"}

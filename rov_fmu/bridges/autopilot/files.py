@@ -10,11 +10,11 @@ from rov_fmu.autopilot.gains import Autopilot, autopilot_of
 from rov_fmu.autopilot.law import AXES, PLACE, SENSORS, STICK
 from rov_fmu.bridges.autopilot.fmu import autopilot_fmu
 from rov_fmu.bridges.sdf import Array
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, UPWARD, YAW, Axis
 from rov_fmu.io.messages import one_line
 from rov_fmu.vehicle.vehicle import Vehicle
 
-_UP = {SURGE, ROLL}
+_UP = {axis for axis, sign in zip(AXES, UPWARD, strict=True) if sign > 0.0}
 """The axes whose sign is the same with y to port and z up."""
 _SECONDS = 15.0
 _STEPS = {HEAVE: (1.0, 0.02), YAW: (0.5 * pi, radians(2.0))}

@@ -29,7 +29,7 @@ from rov_fmu.c.compile import (
     processor,
 )
 from rov_fmu.c.library import load_sources
-from rov_fmu.equation.catalogue import AXES
+from rov_fmu.equation.catalogue import AXES, UPWARD
 from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
@@ -70,7 +70,7 @@ show(load(), *map(Path, sys.argv[1:2]))
 '''
 _LEAST_WAITING = 64
 """The fewest changes of commands that may wait for the dead time. There may be one in each millisecond of it."""
-_FLIP = np.array([1.0, -1.0, -1.0])
+_FLIP = np.array(UPWARD[:3])
 """The signs of components in MuJoCo's frame of the body, relative to forward, starboard, down."""
 _PROPELLER = 0.05
 """The radius, and half the length, of what is drawn for a thruster, relative to the size of the vehicle."""
