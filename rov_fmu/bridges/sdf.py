@@ -145,7 +145,7 @@ def gazebo_model(vehicle: Vehicle, *, in_world: bool = False, explicit: bool = F
 
 
 def rendered_model(template: str, vehicle: Vehicle, notes: tuple[str, ...], **content: object) -> str:
-    """Return a model of a vehicle with notes, from its template."""
+    """Render the template of a vehicle's model, with what the model lacks as comments."""
     common = {"number": _number, "vector": _vector, "comment": _comment, "version": __version__, "density": DENSITY}
     folder = Path(__file__).parent / "templates"
     return render(template, folder, vehicle=vehicle, notes=notes, **common, **content)

@@ -344,7 +344,7 @@ AXIS = {
     ),
     "F_0": Declaration("{load}", "Constant load F_0 in {axis}, positive {positive}", -1e6, 1e6, needed=False),
 }
-"""The end of the description of β for the axes whose β may be 0."""
+"""What each axis declares in the vehicle file, by key: unit, words and bounds."""
 LEAST_BETA = 1e-3
 """The least β of coupled axes, whose effective inertia m/β must be finite."""
 COUPLED_TUNING = {

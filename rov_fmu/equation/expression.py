@@ -79,7 +79,7 @@ class Name(Expression):
 
 @dataclass(frozen=True)
 class Operation(Expression):
-    """An operator, a choice or a function of expressions. A function that is not in FUNCTIONS is a thrust table."""
+    """An operator, a choice, or a function of expressions: one of the language, or a table of thrust by its name."""
 
     op: str
     args: tuple[Expression, ...]

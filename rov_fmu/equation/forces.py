@@ -309,9 +309,9 @@ def advance(
 
 
 def above(layout: Layout) -> dict[str, int]:
-    """Return the states that are negative above the surface, with the sign of the force that each adds there.
+    """Return the signs of what is added above the surface, by state.
 
-    The force is that below the surface, times the size of the state / H.
+    While the state s is negative, each force below the surface adds sign · force · s/H.
 
     The share of buoyancy and thrust that is left is 1 below, 1 + z/H up to the height H, and 0 above it. Where the
     surface moves, z counts from it.

@@ -483,7 +483,7 @@ class Layout:
 
     @cached_property
     def added(self) -> dict[str, Declaration]:
-        """The calculated variables that came later than others: they are the last of all, so that no place changed."""
+        """The calculated variables that were added after the first release: last, so that no value reference moves."""
         return self.over_ground | self.electric
 
     @cached_property

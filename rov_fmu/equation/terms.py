@@ -105,43 +105,9 @@ class Equation:
     """The names of the quantities of the equation."""
 
     @cached_property
-    def measured(self) -> dict[str, Callable[[float], float]]:
-        """The functions of all tables, from a command to the force (N) or the current (A), by their names."""
-        return {name: table.value for name, table in self.tables.items()}
-
-    @property
-    def thrust_tables(self) -> dict[str, CommandTable]:
-        """The tables of thrust. Those of electric current are for `outputs` alone."""
-        return {name: table for name, table in self.tables.items() if table.kind == "thrust"}
-
-    @cached_property
     def states(self) -> tuple[str, ...]:
         """The states of the table."""
         return tuple(self.rows)
-
-    @cached_property
-    def unloaded(self) -> "Equation":
-        """The equation while all inputs in the earth frame are 0. Fewer of its states depend on each other."""
-        earth = POINTS, WAVES
-        rows = {name: tuple(term for term in terms if term.effect not in earth) for name, terms in self.rows.items()}
-        return replace(self, rows=rows)
-
-    @cached_property
-    def lagging(self) -> dict[str, tuple[Expression, Expression]]:
-        """For each force or speed that lags: the formulas of its rate, and of its value after a piece of a step."""
-        return {
-            force: (
-                lag.rate * (Name(steady) - Name(force)),
-                Name(force) + (Name(steady) - Name(force)) * Name(lag.arrived),
-            )
-            for lag in self.lags
-            for force, steady in lag.steady.items()
-        }
-
-    @property
-    def has_rotors(self) -> bool:
-        """True when the speeds of rotors lag, which may reverse."""
-        return any(lag.reversals for lag in self.lags)
 
     @cached_property
     def states_in_rate(self) -> dict[str, frozenset[str]]:
@@ -151,12 +117,42 @@ class Equation:
         }
 
     @cached_property
+    def shifted(self) -> dict[str, Expression]:
+        """The formulas of the states that follow from the depth of a vehicle with a surface."""
+        return {name: self.starts[name] for name in (BELOW_SURFACE, OUT_OF_WATER) if name in self.starts}
+
+    @cached_property
+    def orientation(self) -> dict[str, Expression]:
+        """Formulas for the orientation in the table.
+
+        It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
+        """
+        return {
+            name: formula for name, formula in self.starts.items() if name not in formula.names | self.shifted.keys()
+        }
+
+    @cached_property
     def used(self) -> frozenset[str]:
         """The states that a term contains, and the orientation. The other states are integrals of these.
 
         In `rows`, the used states come first, so that C needs one number, N_USED, to tell states from integrals.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
+
+    @cached_property
+    def _reach(self) -> dict[str, set[str]]:
+        """For each state, the states on which it depends, directly or through others."""
+        reach = {name: set(states) for name, states in self.states_in_rate.items()}
+        for middle in self.states:
+            for name in self.states:
+                if middle in reach[name]:
+                    reach[name] |= reach[middle]
+        return reach
+
+    @cached_property
+    def _settling(self) -> frozenset[str]:
+        """The used states that may settle."""
+        return self.used - self.orientation.keys()
 
     @cached_property
     def components(self) -> tuple[tuple[str, ...], ...]:
@@ -178,40 +174,36 @@ class Equation:
         return tuple(sorted(done, key=settling.isdisjoint))
 
     @cached_property
-    def _reach(self) -> dict[str, set[str]]:
-        """For each state, the states on which it depends, directly or through others."""
-        reach = {name: set(states) for name, states in self.states_in_rate.items()}
-        for middle in self.states:
-            for name in self.states:
-                if middle in reach[name]:
-                    reach[name] |= reach[middle]
-        return reach
-
-    @cached_property
-    def _settling(self) -> frozenset[str]:
-        """The used states that may settle."""
-        return self.used - self.orientation.keys()
-
-    @cached_property
     def dynamic(self) -> tuple[tuple[str, ...], ...]:
         """The components that may settle. The others are kinematic: only the heading and integrals."""
         last = max(n for n, group in enumerate(self.components) if not self._settling.isdisjoint(group))
         return self.components[: last + 1]
 
     @cached_property
-    def orientation(self) -> dict[str, Expression]:
-        """Formulas for the orientation in the table.
+    def monitored(self) -> tuple[str, ...]:
+        """The velocities whose reversals end a piece of a step."""
+        return tuple(name for name in self.states if any(Name(name) == x.args[0] for x in self.directed.values()))
 
-        It is the cosine and the sine of the heading, or the rotation matrix with its helper `square_length`.
-        """
-        return {
-            name: formula for name, formula in self.starts.items() if name not in formula.names | self.shifted.keys()
-        }
+    @property
+    def has_rotors(self) -> bool:
+        """True when the speeds of rotors lag, which may reverse."""
+        return any(lag.reversals for lag in self.lags)
 
     @cached_property
-    def shifted(self) -> dict[str, Expression]:
-        """The formulas of the states that follow from the depth of a vehicle with a surface."""
-        return {name: self.starts[name] for name in (BELOW_SURFACE, OUT_OF_WATER) if name in self.starts}
+    def lagging(self) -> dict[str, tuple[Expression, Expression]]:
+        """For each force or speed that lags: the formulas of its rate, and of its value after a piece of a step."""
+        return {
+            force: (
+                lag.rate * (Name(steady) - Name(force)),
+                Name(force) + (Name(steady) - Name(force)) * Name(lag.arrived),
+            )
+            for lag in self.lags
+            for force, steady in lag.steady.items()
+        }
+
+    def _is_lag(self, term: Term) -> bool:
+        """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
+        return any(lag.arrived in term.factors for lag in self.lags)
 
     @cached_property
     def program(self) -> dict[str, Expression]:
@@ -232,14 +224,22 @@ class Equation:
             rates |= quaternion_rates(frozenset(self.states))
         return rates
 
-    def _is_lag(self, term: Term) -> bool:
-        """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
-        return any(lag.arrived in term.factors for lag in self.lags)
+    @cached_property
+    def unloaded(self) -> "Equation":
+        """The equation while all inputs in the earth frame are 0. Fewer of its states depend on each other."""
+        earth = POINTS, WAVES
+        rows = {name: tuple(term for term in terms if term.effect not in earth) for name, terms in self.rows.items()}
+        return replace(self, rows=rows)
 
     @cached_property
-    def monitored(self) -> tuple[str, ...]:
-        """The velocities whose reversals end a piece of a step."""
-        return tuple(name for name in self.states if any(Name(name) == x.args[0] for x in self.directed.values()))
+    def measured(self) -> dict[str, Callable[[float], float]]:
+        """The functions of all tables, from a command to the force (N) or the current (A), by their names."""
+        return {name: table.value for name, table in self.tables.items()}
+
+    @property
+    def thrust_tables(self) -> dict[str, CommandTable]:
+        """The tables of thrust. Those of electric current are for `outputs` alone."""
+        return {name: table for name, table in self.tables.items() if table.kind == "thrust"}
 
 
 def rate_formula(terms: Iterable[Term]) -> Expression:

@@ -63,7 +63,7 @@ UNITS = {  # the elements in the order of the schema of OSP-IS
 
 @cache
 def parsed_unit(text: str) -> Unit:
-    """Return what follows from a unit."""
+    """Return the `Unit` of a symbol such as N.s/m, from UNITS or from its parts."""
     unit, exponents = UNITS.get(text, Unit()), Counter[str]()
     if unit.exponents:
         return unit

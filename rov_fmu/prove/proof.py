@@ -128,7 +128,7 @@ class _Experiments(Runs):
         return findings
 
     def _result(self, experiment: Experiment, interface: str, names: Sequence[str]) -> Any:
-        """Return what FMPy returns for an experiment."""
+        """Run an experiment with FMPy, Model Exchange with a tighter tolerance, and return its table."""
         import fmpy
 
         share = _TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0
