@@ -109,6 +109,10 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "change of thrust": "{what} in {files}{since}. A log of the voltage, or of each thruster, may tell why",
         "structure": "the model lacks something along {axes}: its errors are {ratio} times what noise explains",
+        "search ended": (
+            "no cause that was tried explains the errors along any axis, so the search ended before all were tried. "
+            "Check units, signs and the order of the columns, and log one axis alone"
+        ),
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
             "moment), and is the likely cause. {coupling}turn on the spot in a log of its own, and leave yaw out of "
@@ -274,6 +278,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
         if sensor.wander > max(sensor.white, _LEAST_WANDER):
             size = size_in_words(sensor.wander, sensor.unit)
             findings.append(about("", "estimator", sensor.axis.name, size=size))
+    findings += [Finding("search ended")] * identification.has_ended
     findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
     findings += _times(identification)
     findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]

@@ -113,6 +113,7 @@ def _identify(tests: Tests, on_progress: Progress, on_answer: OnAnswer | None) -
         slips=wrong,
         structures=tuple(structures_of(fit)),
         alike=fit.alike,
+        has_ended=fit.has_ended,
         times=command_times(fit),
     )
     axes, tested = [], assess.tested_commands(fit.objective, fit.best.z)

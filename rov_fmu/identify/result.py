@@ -603,6 +603,8 @@ class Identification:
     """The hypotheses about the structure that won."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the logs do not tell apart."""
+    has_ended: bool = False
+    """True if the search for causes ended early, because the model is wrong along all axes."""
     times: tuple[str, ...] = ()
     """Times from a command to what a sensor shows that the logs do not tell apart, in words."""
     axes_of_base: tuple[AxisOfBase, ...] = ()

@@ -141,6 +141,7 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "the velocity of the estimator wanders by 0.030 m/s (RMS) beside its position",
         quiet(sensors=(replace(example().sensors[0], unit="m/s", wander=0.001),)),
     ),
+    ("search ended", quiet(has_ended=True), "so the search ended before all were tried", quiet()),
     (
         "not told apart",
         quiet(alike=(("5", "6"),)),
@@ -203,6 +204,8 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "the speed of the rotors lags behind",
         quiet(),
     ),
+    ("coupling", quiet(structures=(Structure("coupling", "", 0.999),)), "by the Coriolis and Munk forces", quiet()),
+    ("curve of its own", structured(HEALTH, kind="curve of its own"), "with 50% of the thrust astern, rel", quiet()),
     ("command limit", structured(HEALTH, kind="command limit"), "beyond a command of 50%, they push no more", quiet()),
     ("voltage drop", structured(HEALTH, kind="voltage drop"), "they lose 50% of their thrust while all have", quiet()),
     (

@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import count
+from time import process_time
 
 import numpy as np
 
@@ -48,7 +49,9 @@ _SAME = 0.01
 _STARTS = ("start 1", "start 2")
 """The kinds of the parameters say where they begin: with much noise, J has few minima far from the data."""
 _UNREFINED = 4
-"""The most steps on all samples of a fit that is wrong because of a mistake in a log."""
+"""The most steps on all samples of a fit that nobody should use."""
+_PATIENCE = 60.0
+"""The processor time after which no more causes are tried for a model that is wrong along all axes, s."""
 _LOUD = 2.3
 """The second start is tried if a slow process ends ten times as large as usual. The motion is then hardly explained by
 the model, and another minimum may explain it."""
@@ -77,6 +80,8 @@ class Fit:
     """Fits with others, which the data do not exclude."""
     alike: tuple[tuple[str, ...], ...] = ()
     """Thrusters along one axis whose forces the data do not tell apart."""
+    has_ended: bool = False
+    """True if the search for causes ended because nothing explained the errors along any axis."""
     structure: Mapping[Axis, Misfit] = field(default_factory=dict)
     """The errors of predictions along each axis."""
 
@@ -129,26 +134,29 @@ def fit_all(
     that it bends. An assumed curve never bends: its shape would explain what a weak or reversed thruster does.
 
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
-    the reason, and not the structure. Such a fit is not refined, because nobody should use it.
+    the reason, and not the structure. Such a fit is not refined, because nobody should use it, nor one whose errors are
+    clearly wrong along all axes. Beyond _PATIENCE, the search for a cause of these ends after one round.
     """
+    began = process_time()
     work = work or ProgressReport()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
     ends, is_enough = _from_starts(quick, work)
     start = StructureFit({}, quick, ends[0], 0.0, 0.0)
-    is_wrong = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
-    most = _UNREFINED if is_wrong else MOST_STEPS
+    is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
+    most = _UNREFINED if is_mistake or start.is_hopeless else MOST_STEPS
     near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
     work.fits(full, near)
     plain = StructureFit({}, full, near, evidence(full, near), evidence(quick, ends[0]))
-    first = dict[Suspect, float]()
-    if not is_wrong:
-        plain, first = settled(plain)
+    plain, first = (plain, dict[Suspect, float]()) if is_mistake else settled(plain)
     before = windows(plain.objective, plain.minimum.z)
     tried, show_tried = count(), work.steps("hypotheses")
-    search = StructureSearch(plain, lambda: show_tried(next(tried)))
-    if not is_wrong:
+    search = StructureSearch(plain, lambda: show_tried(next(tried)), lambda: process_time() - began > _PATIENCE)
+    if not is_mistake:
         search.run()
     full, near = search.now.objective, search.now.minimum
+    is_wrong = is_mistake or search.now.is_hopeless
+    if search.now is plain and start.is_hopeless and not is_wrong:
+        near = minimise(full, near.z, last=False)
     if first or search.odds:
         work.fits(full, near)
     measured = full.table.known.measured_curves
@@ -197,6 +205,7 @@ def fit_all(
         odds,
         tuple(one.posterior for one in search.rivals),
         search.alike,
+        search.has_ended,
         misfits,
     )
 

@@ -39,6 +39,7 @@ from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior
 from rov_fmu.identify.likelihood.records import AHEAD, LEAST_COMMAND, unchanged
 from rov_fmu.identify.likelihood.solve import (
     QUICK,
+    REST,
     Minimum,
     evidence,
     louder,
@@ -468,6 +469,11 @@ class StructureFit:
         return worst(structure(self.objective, self.minimum, ahead=True))
 
     @cached_property
+    def is_hopeless(self) -> bool:
+        """True if the model is wrong along all axes, so that no answer is worth much."""
+        return bool(self.misfits) and all(one.ratio > WRONG for one in self.misfits.values())
+
+    @cached_property
     def posterior(self) -> Posterior:
         """With all effects."""
         return Posterior.of(self.objective.table, self.minimum.z, self.minimum.information)
@@ -495,16 +501,20 @@ def fitted(
     fit `near` ended, or at its prior mean if the hypotheses change that. Where they change the thrust, the noise begins
     as in a first fit: that of a wrong model explains what the right one would. If a motion diverges from there, all
     begin as in a first fit. The result is None if a motion diverges, or if the evidence of thinned logs is below
-    `enough`.
+    `enough`: a fit that will not come there is given up.
     """
     thinned = applied(plain, starts, thinned=True)
     ended = {(p.key, p.mean): z for p, z in zip(near.objective.table.parameters, near.minimum.z, strict=True)}
     there = np.array([ended.get((p.key, p.mean), p.mean) for p in thinned.table.parameters])
     if any(HYPOTHESES[kind].changes_thrust for kind, _ in starts.keys() ^ near.starts.keys()):
         there = louder(thinned, there)
+
+    def promises(end: Minimum, gain: float) -> bool:
+        return evidence(thinned, end) + REST * gain > enough
+
     with suppress(DivergedError):
         first, other = (begun(thinned, z, starts) for z in (there, start_of(thinned)))
-        end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False)
+        end = minimise(thinned, first, elsewhere=[other], enough=QUICK, last=False, promises=promises)
         quick = evidence(thinned, end)
         if quick > enough:
             objective = applied(plain, starts)
@@ -560,9 +570,17 @@ class StructureSearch:
     as the others are unknown may be wrong.
     """
 
-    def __init__(self, plain: StructureFit, on_fit: Callable[[], None] = lambda: None) -> None:
-        """`plain` is the fit without hypotheses; `on_fit` is called before each other fit."""
-        self.plain, self.on_fit = plain, on_fit
+    def __init__(
+        self,
+        plain: StructureFit,
+        on_fit: Callable[[], None] = lambda: None,
+        is_late: Callable[[], bool] = lambda: False,
+    ) -> None:
+        """`plain` is the fit without hypotheses; `on_fit` is called before each other fit, and `is_late` tells whether
+        the search has taken long enough for a model that is wrong along all axes."""
+        self.plain, self.on_fit, self.is_late = plain, on_fit, is_late
+        self.has_ended = False
+        """True if it was late, and nothing had explained the errors along any axis in a round."""
         self.now = plain
         """The fit with the hypotheses that won."""
         self.tried: dict[frozenset[Suspect], StructureFit | None] = {frozenset(): plain}
@@ -590,7 +608,10 @@ class StructureSearch:
 
     def _search(self, rounds: Iterable[int]) -> None:
         """Add, drop and replace hypotheses as long as the fit becomes better, for some rounds."""
-        for _ in rounds:
+        for number in rounds:
+            self.has_ended = number > 0 and self.now.is_hopeless and self.is_late()
+            if self.has_ended:
+                break
             fits = self._round()
             best = max(fits, key=self._gain, default=self.now)
             if self._gain(best) <= 0.0:

@@ -25,6 +25,9 @@ ENOUGH = 0.3
 """The fit ends when a step reduces J by less. 1 is one unit of 2 ln of the likelihood."""
 QUICK = 8.0
 """The reduction of J by new derivatives at which a quick fit ends."""
+REST = 3.0
+"""J may still fall by so many times what it fell by in the last step: the sum of steps that each gain 3/4 of the one
+before. A fit that cannot come close to the best one by this is given up."""
 _TRIALS = ((0.0, 1.0), (0.0, 0.4), (0.0, 0.1), (0.03, 1.0), (0.3, 1.0), (3.0, 1.0), (100.0, 1.0), (1e4, 1.0))
 """The steps that are tried together: the damping in units of the information of the prior, and the share of the step.
 Data that are far more exact than the prior make a step short by its share alone."""

@@ -42,6 +42,7 @@ from rov_fmu.identify.likelihood.solve import (
     ENOUGH,
     MOST_STEPS,
     QUICK,
+    REST,
     Minimum,
     best_explanations,
     evidence,
@@ -58,9 +59,6 @@ _CERTAIN, _WEIGHED = 2.0, 0.05
 and the water inside change from dive to dive."""
 _CLOSE = KEPT + 2.0 * QUICK
 """Up to which difference of evidence quick fits go on to their end, each of which may be QUICK from it."""
-_REST = 3.0
-"""J may still fall by so many times what it fell by in the last step: the sum of steps that each gain 3/4 of the one
-before. A fit that cannot come close to the best one by this is given up."""
 _LENGTHS = {1000.0: "in m{}", 100.0: "in c{}", 10.0: "in d{}", 0.1: "", 0.01: "", 0.001: "in k{}"}
 _ANGLES = {180.0 / pi: "in degrees instead of radians", pi / 180.0: "in radians instead of degrees"}
 _ANGLES |= {100.0: "in hundredths of its unit", 10.0: "in tenths of its unit"}
@@ -145,7 +143,7 @@ def slips(
         unlikely += sum(2.0 * one.count * log(abs(scale)) for one, scale in scaling)
 
         def promises(end: Minimum, gain: float) -> bool:
-            return is_close(evidence(quick, end) + _REST * gain - unlikely)
+            return is_close(evidence(quick, end) + REST * gain - unlikely)
 
         try:
             if is_exact := scaling in fits:

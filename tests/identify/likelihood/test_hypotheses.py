@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -924,6 +924,50 @@ def test_what_explains_nothing_keeps_no_other_hypothesis_from_being_named(
     search.run()
     assert search.odds == {ROTORS: 30.0}
     assert [*search.refuted] == [SLEW]
+
+
+@pytest.mark.parametrize(("yaw", "is_late", "has_ended"), [(9.0, True, True), (9.0, False, False), (4.0, True, False)])
+def test_a_search_ends_when_it_is_late_and_the_model_is_wrong_along_all_axes(
+    yaw: float, is_late: bool, has_ended: bool, reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is tried in the first round may explain the errors. Beyond it, a fit adds nothing that anybody could use."""
+    fits = list[frozenset[Suspect]]()
+
+    def fit(_: object, __: object, starts: Starts, *___: object) -> StructureFit:
+        fits.append(frozenset(starts))
+        return StructureFit(starts, reversed_model, cast("Minimum", None), 20.0 * len(starts), 0.0)
+
+    monkeypatch.setattr("rov_fmu.identify.likelihood.search.fitted", fit)
+    monkeypatch.setattr(
+        "rov_fmu.identify.likelihood.search.structure", lambda *_, **__: {SURGE: Misfit(9.0), YAW: Misfit(yaw)}
+    )
+    monkeypatch.setattr(StructureFit, "needed", property(lambda self: self.starts))
+    search = StructureSearch(fit(None, None, {}), is_late=lambda: is_late)
+    search.suspects, search.apart = {SLEW: (1.0,), ROTORS: (None,)}, {}
+    monkeypatch.setattr(search, "_ranked", lambda sets: [(some, 1.0) for some in sets])
+    search.run()
+    first_round = {frozenset[Suspect](), frozenset({SLEW}), frozenset({ROTORS})}
+    assert ({*fits} == first_round, search.has_ended, search.now.starts) == (has_ended, has_ended, {})
+
+
+def test_a_fit_that_will_not_be_good_enough_is_given_up(
+    reversed_model: Objective, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    quick, steps, derivatives = applied(reversed_model, {}, thinned=True), list[Array](), Objective.data
+
+    def counted(self: Objective, z: Array, *some: Any, **how: Any) -> list[Data]:
+        steps.append(z)
+        return derivatives(self, z, *some, **how)
+
+    monkeypatch.setattr(Objective, "data", counted)
+    near = StructureFit({}, quick, minimise(quick, start_of(quick), most=1, last=False), 0.0, 0.0)
+    counts = list[int]()
+    for enough in (1e6, 0.0):
+        steps.clear()
+        found = fitted(near, reversed_model, {ROTORS: None}, 0.0, enough)
+        counts.append(len(steps))
+        assert (found is None) == (enough > 0.0)
+    assert 2 * counts[0] < counts[1]
 
 
 @pytest.mark.parametrize(("alone", "names"), [(28.0, [REVERSED]), (15.0, [REVERSED, DEAD])])
