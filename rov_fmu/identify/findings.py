@@ -43,6 +43,7 @@ from rov_fmu.io.groups import grouped
 from rov_fmu.io.messages import listed
 from rov_fmu.io.numbers import percent, significant, with_interval
 from rov_fmu.tank.arrays import rms, usual_range
+from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import HEADINGS, MISFITS, Finding, Heading, about
 from rov_fmu.tank.findings import sentences as sentences_by
 from rov_fmu.tank.folder import Folder
@@ -75,6 +76,8 @@ _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
+_ON_THE_SPOT = 0.02
+"""A turn is one on the spot if the push ahead and sideways stays below this share of the full one."""
 _SURE = 0.99
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
@@ -115,8 +118,8 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
-            "moment), and is the likely cause. {coupling}turn on the spot in a log of its own, and leave yaw out of "
-            "the other logs by [leave_out] in rov.toml"
+            "moment), and is the likely cause. {coupling}{spot}leave yaw out of {others} by [leave_out] in "
+            "rov.toml{alone}"
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -256,9 +259,8 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
             findings.append(Finding("do not use", result.axis.name))
         if result.structure > ALARM:
             findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
-        if result.structure > USUAL and _turns_unseen(identification, result):
-            cure = "Log the velocity, or " if identification.vehicle.layout.coupled else _COUPLE
-            findings.append(about("", "unlogged motion", result.axis.name, coupling=cure))
+        if result.structure > USUAL and result.axis is YAW:
+            findings += _on_unlogged_motion(identification)
         if may_rock(identification.folder, result.axis):
             findings.append(Finding("rocking", result.axis.name))
     for curve, known in identification.curves.items():
@@ -630,11 +632,28 @@ def may_rock(folder: Folder, axis: Axis) -> bool:
     return bool(logs) and ("steady", axis.name) not in folder.rows and not any(are_level)
 
 
-def _turns_unseen(identification: Identification, result: AxisResult) -> bool:
-    """Return True if yaw is tested in dives, and none of them shows a motion ahead or sideways."""
-    dives = [log for log in identification.folder.logs if log.axis is None]
-    shown = {channel.quantity.axis for log in dives for channel in log.channels if not channel.unused}
-    return result.axis is YAW and bool(dives) and not {SURGE, SWAY} & shown
+def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
+    """Yield a finding if yaw is tested in dives with a push ahead or sideways, and none shows the motion there."""
+    layout, alone, others = identification.vehicle.layout, set[str](), set[str]()
+    for dive in identification.folder.logs:
+        shown = {channel.quantity.axis for channel in dive.channels if not channel.unused}
+        if dive.axis or not dive.commands or YAW not in shown:
+            continue
+        if {SURGE, SWAY} & shown:
+            return
+        commands = dive.commands.in_rows
+        ahead = [np.abs(push_along(layout, axis, commands)).max() for axis in (SURGE, SWAY) if layout.has(axis)]
+        (alone if max(ahead, default=0.0) < _ON_THE_SPOT else others).add(dive.file.partition(" (from ")[0])
+    if others:
+        yield about(
+            "",
+            "unlogged motion",
+            YAW.name,
+            coupling="Log the velocity, or " if layout.coupled else _COUPLE,
+            spot="" if alone else "turn on the spot in a log of its own, and ",
+            others=listed(sorted(others)),
+            alone=f", because it is alone in {listed(sorted(alone))}" if alone else "",
+        )
 
 
 def assumed_scale(identification: Identification, unit: str = "N") -> str:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW
+from rov_fmu.equation.catalogue import HEAVE, SURGE, YAW, Axis
 from rov_fmu.identify.findings import (
     SENTENCES,
     SEVERITY,
@@ -38,7 +38,7 @@ from rov_fmu.tank import findings as reading
 from rov_fmu.tank.catalogue import QUANTITIES
 from rov_fmu.tank.description import Draft, read_rov_file
 from rov_fmu.tank.findings import Finding
-from rov_fmu.tank.log import Channel, Source
+from rov_fmu.tank.log import Channel, Commands, Source
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import load_vehicle
 from tests.folders import BLUEROV2
@@ -106,10 +106,26 @@ def forces(*ratios: float) -> tuple[MeasuredPoint, ...]:
     )
 
 
-def turning(*names: str) -> Identification:
-    """A dive with some channels, whose yaw the model does not explain."""
-    dive = with_channels(*names)
-    return replace(dive, axes=(replace(dive.axes[0], axis=YAW, structure=2.0),))
+def turning(*names: str, along: Axis = SURGE) -> Identification:
+    """A dive with some channels and a push along an axis, whose yaw the model does not explain."""
+    result = with_channels(*names)
+    pushes = BLUEROV.layout.commands_along(along, 0.5)
+    values = np.tile([*pushes.values()], (len(TIME), 1))
+    commands = Commands.of_rows([name.removeprefix("u_") for name in pushes], TIME, values, Source("u"))
+    (dive,) = result.folder.logs
+    folder = replace(result.folder, logs=[replace(dive, commands=commands)])
+    return replace(result, folder=folder, axes=(replace(result.axes[0], axis=YAW, structure=2.0),))
+
+
+def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
+    moving, turning_alone = turning("heading"), turning("heading", along=YAW)
+    (asked,) = said(moving, "unlogged motion")
+    assert "turn on the spot in a log of its own, and leave yaw out of dive.csv" in asked
+    assert said(turning_alone, "unlogged motion") == []
+    spot = replace(turning_alone.folder.logs[0], file="spot.csv (from 41 s)")
+    both = replace(moving, folder=replace(moving.folder, logs=[*moving.folder.logs, spot]))
+    (told,) = said(both, "unlogged motion")
+    assert told.endswith("Or leave yaw out of dive.csv by [leave_out] in rov.toml, because it is alone in spot.csv")
 
 
 BETA = IdentifiedCoefficient("beta_u", 1.5, (1.3, 1.7), "1", "0.65 within a factor of 1.5", 0.2)
@@ -172,6 +188,8 @@ CASES: Sequence[tuple[str, Identification, str, Identification | None]] = [
         "thruster l: its force is 85% of that of a whole one",
         quiet(),
     ),
+    ("coupling", structured(Structure("coupling", "", 0.999, 1.0)), "a motion along one turns or moves", quiet()),
+    ("curve of its own", structured(Structure("curve of its own", "l", 0.97, 0.7)), "thruster l: it has a", quiet()),
     ("momentary commands", structured(LOST), "about 30% of the yaw command is lost between its rows (10 per", quiet()),
     (
         "reversed commands",
