@@ -26,6 +26,8 @@ _COLORS = (*LINES, "grey")
 """The colours of the lines of a panel."""
 _QUANTITIES = {"N": "force", "m": "place", "rad": "angle", "m/s": "velocity", "rad/s": "rate"}
 """The words for what a panel shows, by its unit."""
+_NODE = re.compile("_p[0-9]+$")
+"""The end of the names of what a tether has for a seaway at each node."""
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
@@ -52,9 +54,16 @@ def recorded_names(structure: SystemStructure) -> list[Name]:
     ]
 
 
+def _shown_starts(structure: SystemStructure) -> dict[Name, None]:
+    """Return the outputs that are connected, without those by which a seaway and the nodes of a tether tell each other
+    where they are and how the water moves."""
+    joined = structure.connections
+    return {one.start: None for one in joined if not (_NODE.search(one.start[1]) or _NODE.search(one.end[1]))}
+
+
 def passed(structure: SystemStructure) -> list[Name]:
-    """Return the outputs that are connected and are numbers."""
-    starts = {one.start for one in structure.connections}
+    """Return the outputs that are connected and are numbers, without those of the nodes of tethers."""
+    starts = _shown_starts(structure)
     return [name for name in recorded_names(structure) if name in starts]
 
 
@@ -113,7 +122,8 @@ def picture(structure: SystemStructure, read: Sequence[Name], names: Sequence[st
     Each quantity has a panel: what a component, or one end or point of it, has in one unit.
     """
     columns = {".".join(name): n for n, name in enumerate(read)}
-    passed = dict.fromkeys(".".join(one.start) for one in structure.connections) or columns
+    plain = [name for name in columns if not re.search("_p?[0-9]+$", name)] or columns
+    passed = dict.fromkeys([".".join(name) for name in _shown_starts(structure)] or plain)
     passed |= {name: None for name in columns if ".tension_" in name}
     chosen = names or [name for name in passed if name in columns and np.ptp(rows[:, columns[name]])]
     panels = [*_panels(structure, [read[columns[name]] for name in chosen], is_chosen=bool(names))]

@@ -282,6 +282,9 @@ def test_a_tether_is_moved_by_the_sea_of_a_plan(tmp_path: Path) -> None:
     of_line = motion["line.F_N_top"] + motion["line.F_N_bottom"]
     np.testing.assert_allclose(of_line[1:], expected[:, 1], rtol=1e-9, atol=1e-9)
     assert np.ptp(of_line) > 2.0
+    plot = (tmp_path / "line.svg").read_text("utf-8")
+    assert "tension_top" in plot
+    assert "_p10" not in plot, "its nodes have no lines"
 
 
 @pytest.mark.long
