@@ -63,17 +63,17 @@ def voltages(vehicle: Vehicle, curve: Curve) -> list[float | None]:
     return [*map(float, found)]
 
 
-def thrust_rows(vehicle: Vehicle, curve: Curve, voltage: float | None) -> list[Row]:
+def thrust_rows(vehicle: Vehicle, curve: Curve, voltage: float | None, exact: float = _EXACT) -> list[Row]:
     """Return the forces and commands of one thruster, both rising, from full reverse to full ahead.
 
     Where the force does not rise with the command, the smaller command stands, and it is 0 for no force. Between two
-    rows, the command is linear in the force.
+    rows, the command is linear in the force, with a relative error of the force of at most `exact`.
     """
-    ahead, astern = (list(_one_way(vehicle, curve, voltage, sign)) for sign in (1.0, -1.0))
+    ahead, astern = (list(_one_way(vehicle, curve, voltage, sign, exact)) for sign in (1.0, -1.0))
     return [*((-force, -c) for force, c in reversed(astern)), (0.0, 0.0), *ahead]
 
 
-def _one_way(vehicle: Vehicle, curve: Curve, voltage: float | None, sign: float) -> Iterator[Row]:
+def _one_way(vehicle: Vehicle, curve: Curve, voltage: float | None, sign: float, exact: float) -> Iterator[Row]:
     """Yield forces and commands in one direction, without their sign: as few as the interpolation needs."""
 
     def force(command: float) -> float:
@@ -92,12 +92,14 @@ def _one_way(vehicle: Vehicle, curve: Curve, voltage: float | None, sign: float)
     while n <= last:
         yield float(forces[n]), float(commands[n])
         end = n + 2
-        while end <= last and _is_straight(commands[n : end + 1], forces[n : end + 1], _SMALL * strongest):
+        while end <= last and _is_straight(
+            commands[n : end + 1], forces[n : end + 1], exact * np.maximum(forces[n : end + 1], _SMALL * strongest)
+        ):
             end += 1
         n = max(min(end - 1, last), n + 1)
 
 
-def _is_straight(commands: Array, forces: Array, small: float) -> bool:
+def _is_straight(commands: Array, forces: Array, allowed: Array) -> bool:
     """Return True if a line between the ends gives the forces in between."""
     line = np.interp(commands, commands[[0, -1]], forces[[0, -1]])
-    return bool((np.abs(line - forces) <= _EXACT * np.maximum(forces, small)).all())
+    return bool((np.abs(line - forces) <= allowed).all())

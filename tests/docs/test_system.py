@@ -212,4 +212,4 @@ def test_the_controller_of_the_page_holds_the_depth(
     monkeypatch.chdir(folder)
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))  # where FMPy unpacks
     exec(compile(block, "autopilot.md", "exec"), {})
-    assert capsys.readouterr().out == "2.000 m\n"
+    assert capsys.readouterr().out == "2.00 m\n"

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from markupsafe import Markup
 
+from rov_fmu.autopilot.allocation import thrust_rows
 from rov_fmu.autopilot.ardusub import RATE, STICK_TIME, TURNING, Mixer, loops_of
 from rov_fmu.autopilot.gains import STEP, autopilot_of
 from rov_fmu.autopilot.law import AXES as LAW_AXES
@@ -37,6 +38,8 @@ _KEYS = {"surge": "WS", "sway": "EQ", "heave": "FR", "yaw": "DA"}
 _SPARE_KEYS = ("LJ", "IK")
 _VERTICAL = 0.9
 """The least vertical part of a thruster's direction for which its label says that it is vertical."""
+_COARSE = 0.02
+"""The relative error of a force in the tables of the page's autopilot, which are part of it."""
 _HELD = {HEAVE: "depth", YAW: "heading", ROLL: "roll", PITCH: "pitch"}
 """What an autopilot of the page holds."""
 _FARTHEST = 0.2
@@ -273,9 +276,9 @@ def _autopilots(vehicle: Vehicle) -> dict[str, Any]:
         own = autopilot_of(vehicle)
     except InputError as error:
         return {"sensors": [], "laws": [], "unheld": f"It is not held: {str(error).partition(': ')[2]}."}
-    steered = replace(
-        own.sharing, stick_time=STICK_TIME
-    )  # a jump to full thrust ahead would tilt a Heavy by 47 degrees
+    tables = tuple(np.array(thrust_rows(vehicle, curve, None, _COARSE)) for curve in vehicle.layout.curves)
+    # A jump to full thrust would tilt a Heavy by 47 degrees.
+    steered = replace(own.sharing, tables=tables, stick_time=STICK_TIME)
     kinds = [("own", "Held by its own gains", round(1.0 / STEP), own.gain(YAW, "v_max"), own.loops, steered)]
     with suppress(InputError):
         sharing = Mixer(vehicle).sharing
@@ -288,7 +291,7 @@ def _autopilots(vehicle: Vehicle) -> dict[str, Any]:
         words = f"{listed(names[axis] for axis in held).capitalize()} {'are' if held[1:] else 'is'} held with {gains}."
         if lacking := [names[axis] for axis in names if axis not in held]:
             words += f" Its thrusters cannot hold {listed(lacking)}."
-        numbers = [*loops.view("f8").ravel().tolist(), *sharing.numbers.tolist()]
+        numbers = [float(f"{x:.7g}") for x in (*loops.view("f8").ravel(), *sharing.numbers)]
         law = {"name": name, "title": title, "rate": rate, "turn": turn, "held": [axis.name for axis in held]}
         laws += [law | {"words": words, "numbers": numbers}] * bool(held)
     unheld = "" if laws else f"It is not held: its thrusters do not push along {listed(a.name for a in names)}."

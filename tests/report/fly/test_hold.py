@@ -1,9 +1,9 @@
 """The page holds a vehicle by its own gains or as ArduSub does, by the law in C, and what a pilot does with it."""
 
 from collections.abc import Callable
-from dataclasses import replace
 from math import degrees
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ import pytest
 from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
 from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import autopilot_of
-from rov_fmu.autopilot.law import PLACE, SENSORS, STICK
+from rov_fmu.autopilot.law import GAINS, LOOP, PLACE, SENSORS, STICK, Sharing
 from tests.report.conftest import flown_vehicle, get, until
 
 pytestmark = pytest.mark.interop
@@ -43,18 +43,20 @@ def test_the_page_flies_as_the_law_does_in_python(kind: str, law: str, fly: Call
         }""",
         [law, ahead, aside],
     )
+    numbers = np.array(page.evaluate("name => live.flight.pilot.model.lawOf(name).numbers", law))
     own = autopilot_of(vehicle)
-    loops, sharing = (
-        (own.loops, replace(own.sharing, stick_time=0.8))
-        if law == "own"
-        else (loops_of({}, 1)[0], Mixer(vehicle).sharing)
-    )
+    loops, sharing = own.loops, own.sharing
+    if law == "ardusub":
+        loops, sharing = loops_of({}, 1)[0], Mixer(vehicle).sharing
+    assert numbers[: loops.size * len(GAINS)] == pytest.approx(loops.view("f8"), rel=1e-6)
+    given = SimpleNamespace(numbers=numbers[loops.size * len(GAINS) :], of_axis=sharing.of_axis, pulse=sharing.pulse)
+    loops = numbers[: loops.size * len(GAINS)].view(LOOP)
     rate = 60 if law == "own" else RATE  # the page steps 0.05 s, in which it samples three times
     has = vehicle.layout.has_attitude
     mode = [STICK, STICK, PLACE, *([PLACE, PLACE] if has else [STICK, STICK]), PLACE]
     aims = np.tile([ahead, aside, 2.3, 0.0, 0.0, 0.5], (6 * rate + 1, 1))
     aims[: rate // 20, [2, 5]] = 2.0, 0.0
-    flights = Flights(vehicle, sharing, [{"z": 2.0}])
+    flights = Flights(vehicle, cast(Sharing, given), [{"z": 2.0}])
     flown = flights.fly(loops, np.tile(mode, (len(aims), 1)), aims, 1.0 / rate)
     expected = dict(zip(SENSORS, flown.sensors[0, -1], strict=True))
     names = [name for name in SENSORS if name in vehicle.layout.places]
