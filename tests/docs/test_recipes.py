@@ -132,7 +132,7 @@ from rov_fmu.fmu.osp import osp_model_description
 from rov_fmu.fmu.terminals import terminals
 from rov_fmu.io.file_kinds import LOG_SUFFIXES
 from rov_fmu.report.page.equations import equations_of
-from rov_fmu.tank.columns import Names
+from rov_fmu.tank.columns import ColumnNames
 from rov_fmu.tank.readers.parsers import format_of
 from rov_fmu.tank.readers.tables import read_table
 from rov_fmu.vehicle.shipped import SHIPPED
@@ -145,7 +145,7 @@ inputs = rov.layout.usual_inputs | {"u_t": 0.5}
 state = rov.layout.at_rest | {"w": 0.2, "z": 5.0}
 whole, half = rov.step(inputs, state, 1.0), rov.step(inputs, rov.step(inputs, state, 0.5), 0.5)
 dive = Path(sys.argv[1])
-log, entries = read_table(dive, rov.layout, HEAVE, Names(), format_of(dive).open(dive))
+log, entries = read_table(dive, rov.layout, HEAVE, ColumnNames(), format_of(dive).open(dive))
 files = mujoco.mujoco_texts(rov, "rov", {}, {})
 content = native_content(rov, fmi=3).files
 forces = arrays.forces(rov, inputs, {})
