@@ -1,7 +1,7 @@
 """An instance of an unpacked FMU in this process, whose library is called with arrays that are allocated once.
 
 FMPy loads the library, instantiates and initializes. What is called in each step is called by address: FMPy makes new
-arrays for each call, which takes 6.2 µs for a step with inputs and outputs in place of 1.6.
+arrays for each call, so that a step of the VideoRay with three inputs and seven outputs takes 6.6 µs in place of 2.5.
 """
 
 import ctypes
