@@ -94,12 +94,13 @@ def _stick(random: np.random.Generator, n: int, ahead: float, back: float, hold:
     return found[:n]
 
 
-def write_log(path: Path, dived: Dive, seed: int = 0, *, force: bool = False) -> None:
-    """Write the messages, each after the time at which it arrived."""
+def write_log(path: Path, dived: Dive, seed: int = 0, *, force: bool = False, dvl: bool = True) -> None:
+    """Write the messages, each after the time at which it arrived; without `dvl` those that most vehicles have."""
     packer, random = mavlink.MAVLink(None, srcSystem=1, srcComponent=1), np.random.default_rng(seed)
     packed = (
         struct.pack(">Q", round(1e6 * (_BEGUN + time))) + message.pack(packer)
         for time, message in _messages(dived, random)
+        if dvl or message.get_type() != "LOCAL_POSITION_NED"
     )
     write_whole(Output(path, b"".join(packed)), force=force)
 
@@ -142,9 +143,10 @@ def _messages(dived: Dive, random: np.random.Generator) -> Iterator[tuple[float,
 @click.option(
     "--force", is_flag=True, help="Replace a file that this example did not write, or that has changed since."
 )
-def main(file: Path, *, force: bool) -> None:
+@click.option("--no-dvl", "dvl", is_flag=True, default=True, flag_value=False, help="Log no velocity.")
+def main(file: Path, *, force: bool, dvl: bool) -> None:
     """Write the log."""
-    write_log(file, dive(), force=force)
+    write_log(file, dive(), force=force, dvl=dvl)
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ import pytest
 import rov_fmu
 from rov_fmu.cli import main
 from rov_fmu.fmu.related import origin
-from rov_fmu.identify.progress import ProgressReport
+from rov_fmu.identify.progress import HYPOTHESES, SPLINE, ProgressReport
 from rov_fmu.interface.identify_command import identify_tests
 from rov_fmu.io.messages import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
@@ -135,3 +135,8 @@ def test_a_stage_that_is_left_out_is_no_part_of_the_work() -> None:
     without, with_ = shares["quadratic thrust"][0], shares["quadratic thrust"][3]
     assert 0.0 < shares["start 1"][0] + 1e-9 < without < with_ < 1.0
     assert all(before <= after for before, after in pairwise(shares["quadratic thrust"][:3]))
+    known = list[float]()
+    work = ProgressReport(lambda _, share: known.append(share))
+    work.leave_out(HYPOTHESES, *SPLINE)
+    work.steps("start 1")(2)
+    assert known[0] > shares["start 1"][2], "what is known to be left out is not waited for"

@@ -155,7 +155,8 @@ def _panels(
         plain = [name for name in own if not re.search(r"_[0-9]+$", name[1])]
         shown = own if is_chosen or not plain else plain
         owner = ", ".join(filter(None, [component, end]))
-        title = f"{_QUANTITIES[unit]} of {owner}" if unit in _QUANTITIES else owner
+        is_place = unit != "m" or own[0][1][0] in "xyz"  # and not the elevation of a sea
+        title = f"{_QUANTITIES[unit]} of {owner}" if unit in _QUANTITIES and is_place else owner
         for some in np.array_split(np.arange(len(shown)), -(-len(shown) // len(_COLORS))):
             yield unit, title, [shown[n] for n in some]
 

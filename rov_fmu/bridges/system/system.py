@@ -52,7 +52,7 @@ _MOST_BYTES = 1_000_000_000
 
 
 def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda _: None) -> SystemStructure:
-    """Return the system of a plan, which was read from a path. `on_part` is called with each component.
+    """Return the system of a plan, which was read from a path. `on_part` is called with what is made.
 
     Raises SystemPlanError with every reason, FileError about a vehicle, BuildError if its FMU cannot be built.
     """
@@ -81,7 +81,7 @@ def made(plan: SystemPlan, path: Path, on_part: Callable[[str], object] = lambda
         raise SystemPlanError(*lines_on(path, wrong))
     _pass_on(connections, parts, values)
     for name, vehicle in vehicles.items():
-        on_part(name)
+        on_part(f"{name}, the FMU of {vehicle.name}")
         described = parts[name]
         built = replace(described, content=_built(vehicle))
         parts |= {other: built for other, part in parts.items() if part is described}

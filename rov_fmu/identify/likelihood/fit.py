@@ -39,7 +39,7 @@ from rov_fmu.identify.likelihood.solve import (
     scaled,
     start_of,
 )
-from rov_fmu.identify.progress import ProgressReport
+from rov_fmu.identify.progress import HYPOTHESES, REFINED, SPLINE, ProgressReport
 from rov_fmu.identify.result import ALARM, KEPT
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
@@ -144,6 +144,7 @@ def fit_all(
     start = StructureFit({}, quick, ends[0], 0.0, 0.0)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
     most = _UNREFINED if is_mistake or start.is_hopeless else MOST_STEPS
+    work.leave_out(*((HYPOTHESES, REFINED, *SPLINE) if is_mistake else ()))
     near = minimise(full, scaled(full, ends[0].z), work.steps("all samples"), most=most, last=False)
     work.fits(full, near)
     plain = StructureFit({}, full, near, evidence(full, near), evidence(quick, ends[0]))
@@ -217,6 +218,7 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
 
 def _from_starts(quick: Objective, work: ProgressReport) -> tuple[list[Minimum], bool]:
     """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
+    work.leave_out(*(() if quick.table.known.measured_curves else SPLINE))
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
         if is_enough := bool(ends) and not any(_is_loud(quick.table, end.z) for end in ends):
