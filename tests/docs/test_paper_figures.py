@@ -1,8 +1,10 @@
-"""The figures of the paper: files for a publication, with captions and with the numbers that the paper prints."""
+"""The pictures of the docs, made anew when what draws them has changed, and the figures of the paper: files for a
+publication, with captions and with the numbers that the paper prints."""
 
 import re
 from io import BytesIO
 from itertools import cycle
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
 
+from docs import pictures
+from docs.pictures import ELSEWHERE, HERE, PICTURES, changed
 from examples.videoray.figures import COLUMNS, FORMATS, PaperFigure, paper_figures
 from tests.commands import ROOT
 
@@ -84,3 +88,33 @@ def test_curves_and_points_are_those_that_the_paper_prints() -> None:
     for name, count in {"figure_11a": 3, "figure_11b": 2, "surge_steps": 0}.items():
         lines = drawn(FIGURES[name]).lines
         assert sum(line.get_marker() == "o" and len(points(line)) > 0 for line in lines) == count, "Tau where measured"
+
+
+# ---- The pictures of the docs ----------------------------------------------------------------------------------------
+
+
+def test_no_page_or_plot_has_changed_since_its_picture_was_made() -> None:
+    advice = "make them (python -m docs.pictures NAME), look at them, or say that they look the same (--same)"
+    assert not changed(), advice
+
+
+def test_each_picture_of_a_page_is_made_by_a_command() -> None:
+    texts = [path.read_text(encoding="utf-8") for path in (ROOT / "README.md", *HERE.glob("*.md"))]
+    shown = {Path(name).name for text in texts for name in re.findall(r"!\[[^\]]*\]\(([^):]+)\)", text)}
+    drawn = {path.name for path in HERE.glob("drawings/*.svg")}  # by docs.reference
+    assert shown - drawn == PICTURES.keys() | ELSEWHERE.keys()
+
+
+def test_a_digest_follows_the_code_and_not_its_comments(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "plot.py").write_text('"""Draw."""\nwidth = 1  # inch\n')
+    (tmp_path / "page.css").write_text("a {}")
+    monkeypatch.setattr(pictures, "ROOT", tmp_path)
+    picture = pictures.Picture(lambda _: b"", ("*.py", "page.*"))
+    before = picture.digest
+    (tmp_path / "plot.py").write_text('"""Draw a plot."""\nwidth = 1\n')
+    assert picture.digest == before
+    (tmp_path / "plot.py").write_text("width = 2\n")
+    assert picture.digest != before
+    (tmp_path / "plot.py").write_text("width = 1\n")
+    (tmp_path / "page.css").write_text("a { color: red }")
+    assert picture.digest != before
