@@ -743,7 +743,9 @@ class StructureSearch:
         for starts, gain in [*self._promising()]:
             if gain < won - _FAR:
                 continue
-            enough = max(one.quick for one in (self.now, *fits)) - WINS
+            # What explains a model that is wrong along all axes is far better, also on few samples.
+            rise = _FAR if self.now.is_hopeless and self.is_late() else -WINS
+            enough = max(one.quick for one in (self.now, *fits)) + rise
             self.on_fit()
             fit = fitted(self.now, self.plain.objective, starts, self._prior(starts), enough)
             # Without a fit, the evidence of thinned logs is not enough.
