@@ -35,7 +35,7 @@ class Constant:
     """What was seen."""
 
 
-_FLIGHTS = "flights of ArduSub's simulator"
+_FLIGHTS = "ArduSub's simulator"
 CONSTANTS = {
     "alike": Constant(
         2.0,
