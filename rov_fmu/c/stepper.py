@@ -69,7 +69,8 @@ class EngineMemory:
         """Return all variables of a vehicle now, in the order of `layout.places`."""
         library, addresses = self._c
         library.single_calculate(addresses[vehicle])
-        return self._variables[vehicle]
+        own: NDArray[np.float64] = self._variables[vehicle]
+        return own
 
 
 class Stepper(EngineMemory):
