@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu.study.plan.figure_units import unit_of
-from rov_fmu.study.plan.figures import Figures
+from rov_fmu.study.plan.figures import Figures, read_expression
 
 UNITS = {"x": "m", "y": "m", "u": "m/s", "psi": "rad", "c": "1", "der(u)": "m/s2", "rov.z": "m", "m": "kg"}
 TIMES = np.linspace(0.0, 10.0, 101)
@@ -49,7 +48,7 @@ CASES = [(unit, text) for unit, texts in OF.items() for text in texts]
 
 @pytest.mark.parametrize(("unit", "text"), CASES, ids=[text for _, text in CASES])
 def test_a_figure_has_the_unit_of_what_it_is_made_of(unit: str, text: str) -> None:
-    assert unit_of(text, UNITS) == unit
+    assert read_expression(text, UNITS).unit == unit
 
 
 @pytest.mark.parametrize("unit", ["m", "m/s", "kg", "m/s2"])

@@ -5,6 +5,9 @@ A plan may come from anyone, so an expression can compute and do nothing else. T
 are no attributes, texts, lists, comprehensions or statements, and functions take a fixed number of values, because
 further ones of NumPy write into arrays. Every value is a number or an array with one dimension, and no operation gives
 an array that is longer than those it was given, so sizes and times are bounded by the length of the text.
+
+The unit of a value follows from the units of what it is made of. Products of two units, powers, logarithms and sums of
+different units have none here.
 """
 
 import ast
@@ -17,7 +20,7 @@ from inspect import Parameter, signature
 from itertools import pairwise
 from math import e, inf, nan, pi
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,6 +41,19 @@ _Value = Any
 """A number or an array with one dimension."""
 _Compute = Callable[[Mapping[str, _Value]], _Value]
 """Returns the value of a part of an expression for the values of all names."""
+_Unit = str | None
+"""The unit of a value, _PLAIN for a number, or None where it does not follow."""
+_PLAIN = ""
+"""The unit of a number in the text, which may be anything in a sum, and nothing in a product."""
+_UnitRule = Callable[..., _Unit] | _Unit
+"""The unit of a result, or the function that returns it for the units of the values."""
+
+
+class _Part(NamedTuple):
+    """A part of an expression."""
+
+    compute: _Compute
+    unit: _Unit
 
 
 class ExpressionError(RovError, ValueError):
@@ -63,13 +79,14 @@ class FigureFunction:
     """The number of values that it takes."""
     parameters: tuple[str, ...] = ()
     """The names of all parameters, if values may be given by name."""
+    unit: _UnitRule = None
 
     @classmethod
-    def by_name(cls, compute: Callable[..., _Value]) -> "FigureFunction":
+    def by_name(cls, compute: Callable[..., _Value], unit: _UnitRule) -> "FigureFunction":
         """Return a function whose values may be given by the names of its parameters."""
         parameters = signature(compute).parameters
         needed = sum(p.default is Parameter.empty for p in parameters.values())
-        return cls(compute, needed, len(parameters), tuple(parameters))
+        return cls(compute, needed, len(parameters), tuple(parameters), unit)
 
     def __call__(self, *values: _Value, **by_name: _Value) -> _Value:
         """Return the result, a number or an array with one dimension. Raises TypeError if it is neither."""
@@ -81,12 +98,35 @@ class FigureFunction:
         return result
 
 
+# ---- Units -----------------------------------------------------------------------------------------------------------
+
+
+def unit_of_first(first: _Unit, *_: _Unit) -> _Unit:
+    """Return the unit of the first value."""
+    return first
+
+
+def _common(*units: _Unit) -> _Unit:
+    """Return the unit of a sum, of which a plain number may have any unit."""
+    others = {*units} - {_PLAIN}
+    return None if len(others) > 1 else next(iter(others), _PLAIN)
+
+
+def _scaled(one: _Unit, other: _Unit) -> _Unit:
+    """Return the unit of a value that is multiplied or divided by another one without a unit."""
+    return one if other in (_PLAIN, "1") else None
+
+
+def _quotient(above: _Unit, below: _Unit) -> _Unit:
+    return "1" if above and above == below else _scaled(above, below)
+
+
 # ---- What an expression may use --------------------------------------------------------------------------------------
 
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> FigureFunction:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100)
+    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100, unit=_common)
 
 
 def _round(y: _Value, decimals: float = 0.0) -> _Value:
@@ -95,31 +135,38 @@ def _round(y: _Value, decimals: float = 0.0) -> _Value:
     return np.round(y, _whole_number(decimals))
 
 
-_OF_ONE_VALUE = (
-    *("abs", "sign", "sqrt", "exp", "log", "log10", "ceil", "floor", "degrees", "radians", "isfinite", "isnan"),
-    *("sin", "cos", "tan", "arcsin", "arccos", "arctan", "sinh", "cosh", "tanh"),
-    *("all", "any", "argmax", "argmin", "mean", "median", "prod", "ptp", "std", "sum", "var"),
-    *("cumsum", "diff", "unwrap"),
-)
-"""Functions of NumPy with one value. Their other parameters are not allowed, because `out`, for example, writes into an
-array."""
-_OF_TWO_VALUES = ("arctan2", "hypot", "maximum", "minimum", "percentile", "searchsorted")
+_OF_ONE_VALUE: Mapping[_UnitRule, Sequence[str]] = {
+    unit_of_first: ("abs", "ceil", "cumsum", "diff", "floor", "mean", "median", "ptp", "std", "sum", "unwrap"),
+    "1": ("all", "any", "argmax", "argmin", "cos", "isfinite", "isnan", "sign", "sin", "tan"),
+    "rad": ("arcsin", "arccos", "arctan", "radians"),
+    "deg": ("degrees",),
+    None: ("cosh", "exp", "log", "log10", "prod", "sinh", "sqrt", "tanh", "var"),
+}
+"""Functions of NumPy with one value, by the unit of their result. Their other parameters are not allowed, because
+`out`, for example, writes into an array."""
+_OF_TWO_VALUES: Mapping[_UnitRule, Sequence[str]] = {
+    _common: ("hypot", "maximum", "minimum"),
+    unit_of_first: ("percentile",),
+    "1": ("searchsorted",),
+    "rad": ("arctan2",),
+}
 FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
     {
-        name: FigureFunction(getattr(np, name), count, count)
-        for count, names in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
+        name: FigureFunction(getattr(np, name), count, count, unit=unit)
+        for count, by_unit in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
+        for unit, names in by_unit.items()
         for name in names
     }
     | {
-        "clip": FigureFunction(np.clip, 3, 3),
+        "clip": FigureFunction(np.clip, 3, 3, unit=_common),
         "gradient": FigureFunction(np.gradient, 1, 2),
-        "interp": FigureFunction(np.interp, 3, 3),
-        "len": FigureFunction(lambda y: float(len(y))),
+        "interp": FigureFunction(np.interp, 3, 3, unit=lambda *units: units[-1]),
+        "len": FigureFunction(lambda y: float(len(y)), unit="1"),
         "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
         "min": _of_all(np.min, np.minimum),
-        "round": FigureFunction(_round, 1, 2),
-        "sorted": FigureFunction(np.sort),
-        "where": FigureFunction(np.where, 3, 3),
+        "round": FigureFunction(_round, 1, 2, unit=unit_of_first),
+        "sorted": FigureFunction(np.sort, unit=unit_of_first),
+        "where": FigureFunction(np.where, 3, 3, unit=lambda _, *either: _common(*either)),
     }
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
@@ -134,6 +181,14 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., _Value]] = {
     **{ast.Eq: np.equal, ast.NotEq: np.not_equal},
 }
 """Comparisons are NumPy's, because Python's True + True is an integer, and integers would grow without end."""
+_UNITS: Mapping[type[ast.AST], _UnitRule] = {
+    **dict.fromkeys((ast.Add, ast.Sub), _common),
+    ast.Mult: lambda one, other: _scaled(one, other) or _scaled(other, one),
+    ast.Div: _quotient,
+    **dict.fromkeys((ast.UAdd, ast.USub), unit_of_first),
+    **dict.fromkeys((ast.Not, ast.Invert), "1"),
+}
+"""The units of the results of operators; those of the others do not follow."""
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
@@ -142,10 +197,14 @@ _OPERATORS: Mapping[type[ast.AST], Callable[..., _Value]] = {
 class FigureExpression:
     """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
 
-    def __init__(self, text: str, functions: Mapping[str, FigureFunction]) -> None:
+    def __init__(
+        self, text: str, functions: Mapping[str, FigureFunction], units: Mapping[str, str] = MappingProxyType({})
+    ) -> None:
+        """`units` has those of the variables."""
         self.names: set[str] = set()
         """The variables and constants that it names."""
         self._functions, self._depth = functions, 0
+        self._units = {**dict.fromkeys(CONSTANTS, _PLAIN), TIME: "s", **units}
         try:
             with warnings.catch_warnings():  # Python's own about the text, such as "1if" without a space
                 warnings.simplefilter("ignore")
@@ -154,11 +213,13 @@ class FigureExpression:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels") from error
         except (SyntaxError, UnicodeError, ValueError) as error:
             raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
-        self.value = self._read(tree.body)
+        self.value, unit = self._read(tree.body)
         """Returns the value, a number or an array, for the values of all names. May raise any exception."""
+        self.unit = unit or ""
+        """The unit of the value, or an empty text where it does not follow."""
 
-    def _read(self, node: ast.expr | None) -> _Compute:
-        """Return the function that computes a node; for None, which an end of a slice may be, it returns None."""
+    def _read(self, node: ast.expr | None) -> _Part:
+        """Return the part that computes a node; for None, which an end of a slice may be, it returns None."""
         if self._depth == _DEEPEST:
             raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
         self._depth += 1
@@ -166,13 +227,13 @@ class FigureExpression:
         self._depth -= 1
         return found
 
-    def _computed(self, node: ast.expr | None) -> _Compute:  # noqa: C901, PLR0911, PLR0912 (a case for each kind)
+    def _computed(self, node: ast.expr | None) -> _Part:  # noqa: C901, PLR0911, PLR0912 (a case for each kind)
         match node:
             case None:
-                return lambda _: None
+                return _Part(lambda _: None, None)
             case ast.Constant(value=int() | float() as value):
                 number = _constant(value)
-                return lambda _: number
+                return _Part(lambda _: number, _PLAIN)
             case ast.Name(id=name):
                 return self._variable(name)
             case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
@@ -182,24 +243,25 @@ class FigureExpression:
             case ast.Subscript(
                 value=ast.Call(func=ast.Name(id="where"), args=[condition], keywords=[]), slice=ast.Constant(value=0)
             ):
-                return self._of(np.flatnonzero, condition)
+                return self._of(np.flatnonzero, "1", condition)
             case ast.Subscript(value=value, slice=ast.Slice(lower=lower, upper=upper, step=step)):
-                return self._of(_slice, value, lower, upper, step)
+                return self._of(_slice, unit_of_first, value, lower, upper, step)
             case ast.Subscript(value=value, slice=index):
-                return self._of(_index, value, index)
+                return self._of(_index, unit_of_first, value, index)
             case ast.UnaryOp(op=op, operand=value):
-                return self._of(_OPERATORS[type(op)], value)
+                return self._of(_OPERATORS[type(op)], _UNITS[type(op)], value)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return self._of(_OPERATORS[type(op)], left, right)
+                return self._of(_OPERATORS[type(op)], _UNITS.get(type(op)), left, right)
             case ast.Compare(left=left, ops=ops, comparators=others) if {*map(type, ops)} <= _OPERATORS.keys():
-                return self._of(partial(_compare, [_OPERATORS[type(op)] for op in ops]), left, *others)
+                return self._of(partial(_compare, [_OPERATORS[type(op)] for op in ops]), "1", left, *others)
             case ast.BoolOp(op=op, values=operands):
                 is_enough = any if isinstance(op, ast.Or) else all
-                parts = [self._read(operand) for operand in operands]
-                return lambda values: np.bool_(is_enough(_truth(part(values)) for part in parts))
+                computes = [self._read(operand).compute for operand in operands]
+                return _Part(lambda values: np.bool_(is_enough(_truth(one(values)) for one in computes)), "1")
             case ast.IfExp(test=test, body=body, orelse=otherwise):
-                condition_of, one, other = map(self._read, (test, body, otherwise))
-                return lambda values: (one if _truth(condition_of(values)) else other)(values)
+                (is_true, _), (one, unit), (other, other_unit) = map(self._read, (test, body, otherwise))
+                either = _common(unit, other_unit)
+                return _Part(lambda values: (one if _truth(is_true(values)) else other)(values), either)
             case ast.Call(func=ast.Name(id=name)):
                 return self._call(name, node)
             case ast.Call(func=function):
@@ -207,10 +269,11 @@ class FigureExpression:
         assert node
         raise self._refused(node)
 
-    def _of(self, function: Callable[..., _Value], *nodes: ast.expr | None) -> _Compute:
-        """Return the function that computes nodes, and a function of their values."""
-        parts = [*map(self._read, nodes)]
-        return lambda values: function(*[part(values) for part in parts])
+    def _of(self, function: Callable[..., _Value], unit: _UnitRule, *nodes: ast.expr | None) -> _Part:
+        """Return the part that computes nodes, and a function of their values."""
+        computes, units = zip(*map(self._read, nodes), strict=True)
+        result = unit(*units) if callable(unit) else unit
+        return _Part(lambda values: function(*[compute(values) for compute in computes]), result)
 
     def _refused(self, node: ast.expr) -> ExpressionError:
         text = brief(ast.unparse(node), 40)
@@ -218,11 +281,11 @@ class FigureExpression:
             return ExpressionError(f"{text} is an attribute, which is not allowed: write {node.attr}(...)")
         return ExpressionError(f"{text} is not allowed; {_ALLOWED}")
 
-    def _variable(self, name: str) -> _Compute:
+    def _variable(self, name: str) -> _Part:
         self.names.add(name)
-        return operator.itemgetter(name)
+        return _Part(operator.itemgetter(name), self._units.get(name))
 
-    def _call(self, name: str, node: ast.Call) -> _Compute:
+    def _call(self, name: str, node: ast.Call) -> _Part:
         function = self._functions.get(name)
         if function is None:
             near = did_you_mean(name, self._functions)
@@ -239,11 +302,13 @@ class FigureExpression:
             most = f" to {function.most}" if function.most > function.least else ""
             what = f" ({', '.join(function.parameters)})" if function.parameters else ""
             raise ExpressionError(f"{name} takes {function.least}{most} values{what}, each once, and not {count}")
-        first = len(node.args)
+        first, named = len(node.args), {k.arg: k.value for k in node.keywords}
+        ordered = [key for key in function.parameters if key in named]
         return self._of(
-            lambda *values: function(*values[:first], **dict(zip(by_name, values[first:], strict=True))),
+            lambda *values: function(*values[:first], **dict(zip(ordered, values[first:], strict=True))),
+            function.unit,
             *node.args,
-            *(k.value for k in node.keywords),
+            *(named[key] for key in ordered),
         )
 
 

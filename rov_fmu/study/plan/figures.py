@@ -1,8 +1,9 @@
 """The figures of a run: expressions over its outputs, and the functions of time that they may call."""
 
 import warnings
-from collections.abc import Callable, Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from math import isfinite, isnan, nan
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from rov_fmu.study.plan.expression import (
     FigureExpression,
     FigureFunction,
     elements,
+    unit_of_first,
 )
 
 Array = npt.NDArray[np.float64]
@@ -38,15 +40,14 @@ class Responses:
     def __init__(self, times: Array) -> None:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
-        named: dict[str, Callable[..., Any]] = {
-            "V_ss": self.steady,
-            "Tau": self.time_constant,
-            "overshoot": self.overshoot,
-            "settling_time": self.settling_time,
-            "at": self.at,
-            "final": self.final,
+        self.functions = {
+            "V_ss": FigureFunction.by_name(self.steady, unit_of_first),
+            "Tau": FigureFunction.by_name(self.time_constant, "s"),
+            "overshoot": FigureFunction.by_name(self.overshoot, "1"),
+            "settling_time": FigureFunction.by_name(self.settling_time, "s"),
+            "at": FigureFunction.by_name(self.at, unit_of_first),
+            "final": FigureFunction.by_name(self.final, unit_of_first),
         }
-        self.functions = {name: FigureFunction.by_name(function) for name, function in named.items()}
         """The functions by their names in an expression."""
 
     def at(self, y: Array, time: float) -> float:
@@ -121,9 +122,15 @@ def _functions(times: Array) -> dict[str, FigureFunction]:
     return {**FUNCTIONS, **Responses(times).functions}
 
 
-def read_expression(text: str) -> FigureExpression:
-    """Read an expression without a run. Raises ExpressionError with the reason."""
-    return FigureExpression(text, _functions(np.zeros(1)))
+def read_expression(text: str, units: Mapping[str, str] = MappingProxyType({})) -> FigureExpression:
+    """Read an expression without a run. Raises ExpressionError with the reason.
+
+    `units` has those of the variables.
+
+    Examples:
+        read_expression("x[-1] - at(x, 10)", {"x": "m"}).unit  # "m"
+    """
+    return FigureExpression(text, _functions(np.zeros(1)), units)
 
 
 def meaning(name: str) -> str:

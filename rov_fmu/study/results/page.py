@@ -9,7 +9,7 @@ import pandas as pd
 
 from rov_fmu.io.messages import FileError
 from rov_fmu.report.templates import inline_script, number, page
-from rov_fmu.study.plan.figure_units import unit_of
+from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.study.plan.plan import REASON, STATUS
 from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
@@ -83,7 +83,7 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     quantiles, mean, sd = statistics(there, QUANTILES)
     is_still = bool(there.size) and _is_constant(there)
     expression = results.plan["figures"][name]
-    unit = unit_of(expression, results.units)
+    unit = read_expression(expression, results.units).unit
     found = {
         "name": name,
         "expression": expression,
