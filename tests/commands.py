@@ -87,6 +87,7 @@ WRITING = {
 READING = {
     ("build", "vehicle"): "build videoray.toml",
     ("build", "sign"): "build videoray.toml --sign key.fmu",
+    ("list", "folder"): "list tests",
     ("simulate", "vehicle"): "simulate videoray.toml",
     ("simulate", "commands"): "simulate videoray.toml --input points.csv",
     ("fly", "vehicle"): "fly videoray.toml",

@@ -48,6 +48,7 @@ from tests.vehicles import (
     a_vehicle,
     pulsed,
 )
+from verification.tables import main as print_tables
 
 HERE = Path(__file__).parent
 FOLDER = HERE / "results"
@@ -217,7 +218,7 @@ RESULTS: dict[str, Callable[[], str]] = {
     **{f"{name}.sdf": partial(_in_gazebo, *of) for name, of in IN_GAZEBO.items()},
     **{f"{name}.urdf": partial(_in_ros, LOADED[name]) for name in ("everything", "bluerov2_heavy", "remus100")},
     "cross_drag.urdf": partial(_in_ros, with_cross(LOADED["bluerov2"], b_d_uw=0.3)),
-    "tables.txt": partial(_printed, "tables videoray"),
+    "tables.txt": partial(_said, lambda: print_tables(["videoray"])),
     "simulate.txt": partial(_printed, "simulate videoray --set u_l=0.3 --set u_r=0.3 --set a_d_u=10 --set z=2"),
     "tune.txt": partial(_printed, "tune bluerov2_heavy --axis heave --command 0.5 --v-ss 0.4 --tau 0.3"),
     "tune_points.txt": partial(_printed, "tune videoray --axis heave --points", str(HERE / "csv" / "points.csv")),
