@@ -147,7 +147,7 @@ TOGETHER: Sequence[tuple[Mapping[str, Iterable[float]], list[str]]] = [
 
 def guessed_of(columns: Mapping[str, Iterable[float]]) -> dict[str, str]:
     numbers = {title: np.array([*values], float) for title, values in columns.items()}
-    return guessed([*numbers], numbers, None, [])[1]
+    return guessed(numbers, None, [])[1]
 
 
 @pytest.mark.parametrize("header", LARGEST)

@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby, islice, takewhile
 from math import inf, pi
 from pathlib import Path
@@ -15,6 +16,7 @@ from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Curve, SourcedVector, Thruster, VehicleAxis
 from rov_fmu.io.columns import NEUTRAL, NO_OUTPUT, PULSES, KnownColumns
 from rov_fmu.io.csv_table import DataFileError
+from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.catalogue import (
     COMMANDS,
@@ -71,6 +73,7 @@ _CURVE = re.compile(r"[a-z][a-z0-9_]{0,29}")
 _LIKELY = {"depth": 100.0, "heading": 2.1 * pi, "roll angle": pi, "pitch angle": 0.5 * pi, "voltage": 1000.0}
 """The largest number that is likely in the SI unit. If a larger one has no unit, it is in a smaller unit."""
 _EXTERNAL = {axis.external.casefold(): axis for axis in AXES.values()}
+_BY_DIRECTION = {("xyz"[axis.place], axis.is_rotation): axis for axis in AXES.values()}
 _VELOCITIES = {axis.velocity: f"{axis.name} velocity" for axis in AXES.values()}
 _RATES = {True: "yaw velocity", False: "surge velocity"}
 _LONG_STEP, _STEP, _LONG_LOG = 5.0, 1.5, 2e4
@@ -139,76 +142,188 @@ def fitting(names: Sequence[str], layouts: Iterable[Layout]) -> Layout | None:
 # ---- Logs ------------------------------------------------------------------------------------------------------------
 
 
+@dataclass(frozen=True, eq=False)
+class _CsvColumn:
+    """A column of a CSV file: its header, and the numbers below it as they stand in the file."""
+
+    title: str
+    numbers: Array
+    name: str
+    unit: str
+    """The name and the unit in the header."""
+    words: str
+    """The words of the name in small letters and in English."""
+
+    @classmethod
+    def of(cls, title: str, numbers: Array) -> "_CsvColumn":
+        """Return the column below a header."""
+        return cls(title, numbers, *header_parts(title), _words(title))
+
+    @cached_property
+    def pulses(self) -> Array:
+        """The numbers without those that stand for no pulse."""
+        return self.numbers[~np.isin(self.numbers, NO_OUTPUT)]
+
+    @cached_property
+    def are_pulses(self) -> bool:
+        """True if the numbers are in the range of pulses."""
+        return _within(self.pulses, PULSE_RANGE)
+
+    @cached_property
+    def may_be_command(self) -> bool:
+        """True if the name and the unit of the header are not against the command of a thruster."""
+        unit = self.unit.casefold()
+        is_unit_of_command = unit == "%" or unit.startswith(PULSES)
+        no_command = _NO_COMMAND - _SHARES if is_unit_of_command else _NO_COMMAND
+        is_possible = is_unit_of_command or unit in ("", "1", "-", "pwm")
+        is_other = no_command.intersection(self.words.split()) or _velocity_by_unit(self.title)
+        return bool(is_possible and len(self.numbers) and not is_other)
+
+    def is_command(self, meant: str) -> bool:
+        """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us.
+
+        `meant` is the column that the header seems to mean.
+        """
+        if not self.may_be_command:
+            return False
+        unit = self.unit
+        if unit.startswith(PULSES) and self.are_pulses:
+            return True
+        if re.search(COMMANDS, self.words) or (unit == "%" and not meant):
+            return bool((np.abs(self.pulses) <= 100.0).all()) or self.are_pulses
+        values, counts = np.unique(self.pulses, return_counts=True)
+        return _within(values, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
+
+    @cached_property
+    def force(self) -> Axis | None:
+        """The axis of a component of a wrench, a force or torque that is applied; None for another column.
+
+        Its header has a symbol, such as `X_ext`, or names a force or a torque and its direction.
+        """
+        if axis := _EXTERNAL.get(self.name.casefold()):
+            return axis
+        match = re.search(rf"\b({FORCE}|{TORQUE})\b.* ([xyz])$", self.words)
+        return _BY_DIRECTION[match[2], match[1] == TORQUE] if match else None
+
+    @property
+    def largest(self) -> float:
+        """The size of the largest number; 0 without numbers."""
+        return float(np.abs(self.numbers).max(initial=0.0))
+
+    @property
+    def unit_of_command(self) -> str:
+        """The unit of a command: from the header, or else from the size of the numbers."""
+        unit, most = self.unit, self.largest
+        known = unit in ("%", "1") or unit.startswith(PULSES)
+        return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"
+
+    def unit_of(self, name: str) -> str:
+        """Return the unit of the column as a quantity or a time: that of the header, or else the likely one."""
+        units = QUANTITIES[name].units if name in QUANTITIES else TIMES
+        if given := name_and_unit(self.title, units)[1]:
+            return given
+        most = self.largest
+        if name == "time":
+            long = float(np.ptp(self.numbers)) if len(self.numbers) else 0.0
+            usual = long / max(len(self.numbers) - 1, 1)
+            is_ms = (usual > _LONG_STEP or (usual > _STEP and long > _LONG_LOG)) and most < 1e9
+            return next((unit for least, unit in _EPOCHS if most > least), "ms" if is_ms else "s")
+        largest = _LIKELY.get(name, inf)
+        return next((unit for unit, per in units.items() if most <= largest * per), [*units][-1])
+
+    def meant(self, rotations: Collection[str] = ()) -> str:
+        """Return the name of the column that the header seems to mean, or an empty text.
+
+        `rotations` are the beginnings of headers of quaternions.
+        """
+        if self.words.endswith((" x", " y", " z")) and (self.words[:-1] in rotations or not len(self.numbers)):
+            return ""
+        candidates = [*_candidates(self.title, ("", "time", *QUANTITIES))]
+        for name in takewhile(bool, candidates):
+            quantity = QUANTITIES.get(name)
+            own, unit = name_and_unit(self.title, quantity.units if quantity else TIMES)
+            is_sure = not (quantity and quantity.is_velocity) or own[-1] in ("x", "y", "z")
+            if unit and (is_sure or PLURALS.isdisjoint(words_in(self.title))):
+                return name
+            if unit == "" and is_sure and name not in _WITH_UNIT and FALSE_FRIENDS.isdisjoint(own):
+                return name
+        return "" if candidates else _velocity_by_unit(self.title)
+
+
+_Meant = Mapping[_CsvColumn, str]
+"""The names of the columns of rov.toml that the columns of a file seem to mean; empty texts for none."""
+
+
 def guessed(
-    titles: Sequence[str], numbers: Mapping[str, Array], axis: Axis | None, layouts: Iterable[Layout]
+    numbers: Mapping[str, Array], axis: Axis | None, layouts: Iterable[Layout]
 ) -> tuple[Layout, dict[str, str]]:
     """Return a layout with the thrusters that a CSV file seems to have, and what its headers seem to mean.
 
     `numbers` has the numbers below each header as they stand in the file. The headers of commands mean the names of
     thrusters.
     """
-    rotations = {words[:-1] for words in map(_words, titles) if words.endswith(" w")}
-    meant = {title: _meant(title, numbers[title], rotations) for title in titles}
+    own = [_CsvColumn.of(*column) for column in numbers.items()]
+    rotations = {column.words[:-1] for column in own if column.words.endswith(" w")}
+    meant = {column: column.meant(rotations) for column in own}
     if "time" not in meant.values():
-        meant |= dict.fromkeys(_clock(meant, numbers), "time")
+        meant |= dict.fromkeys(_clock(meant), "time")
     layouts = [*layouts]
-    commanding = _commanding(meant, numbers, layouts)
+    commanding = _commanding(meant, layouts)
     names = _names(commanding)
-    forces = {title: force for title in commanding if (force := _force(title))}
+    forces = {column: force for column in commanding if (force := column.force)}
     if forces:  # beside them, a velocity may have its symbol alone
         layout = Layout.of_wrench(map(VehicleAxis, AXES.values()))
-        meant = {title: name or _VELOCITIES.get(header_parts(title)[0], "") for title, name in meant.items()}
+        meant = {column: name or _VELOCITIES.get(column.name, "") for column, name in meant.items()}
     else:
         layout = fitting(names, layouts) or assumed_layout(names)
     known = [thruster.name for thruster in layout.thrusters]
     is_column = KnownColumns(columns_of_log(layout, axis)).has
-    columns = {title: f"{of.external} [{of.load}]" for title, of in forces.items() if not is_column(title)}
-    if not forces and not all(map(is_column, commanding)):
-        for title, name in zip(commanding, names if {*names} == {*known} else known, strict=True):
-            columns[title] = f"u_{name} [{_unit_of_command(title, numbers[title])}]"
-    others = {title: name for title, name in meant.items() if title not in commanding and not is_column(title)}
+    new = [column for column in own if not is_column(column.title)]
+    found = {column: f"{of.external} [{of.load}]" for column, of in forces.items() if column in new}
+    if not forces and not {*new}.isdisjoint(commanding):
+        for column, name in zip(commanding, names if {*names} == {*known} else known, strict=True):
+            found[column] = f"u_{name} [{column.unit_of_command}]"
+    others = {column: meant[column] for column in new if column not in commanding}
     if axis:
-        columns |= _of_axis(axis, [title for title, name in others.items() if not name], numbers)
-    return layout, columns | _measured(others, numbers, is_up=_is_up(meant, numbers))
+        found |= _of_axis(axis, others)
+    found |= _measured(others, is_up=_is_up(meant))
+    return layout, {column.title: title for column, title in found.items()}
 
 
-def _of_axis(axis: Axis, titles: Iterable[str], numbers: Mapping[str, Array]) -> dict[str, str]:
+def _of_axis(axis: Axis, meant: _Meant) -> dict[_CsvColumn, str]:
     """Return what headers seem to mean in a log of one axis whose words alone say it: its command and its position."""
-    found: dict[str, str] = {}
-    for title in (title for title in titles if len(numbers[title])):
-        words = _words(title)
-        if words == COMMAND:
-            found[title] = f"{COMMAND} [{_unit_of_command(title, numbers[title])}]"
-        elif words in ("distance", "position") and name_and_unit(title, QUANTITIES[axis.position].units)[1] == "":
-            found[title] = f"{axis.position} [{_unit(title, axis.position, numbers[title])}]"
+    found: dict[_CsvColumn, str] = {}
+    for column in (column for column, name in meant.items() if not name and len(column.numbers)):
+        if column.words == COMMAND:
+            found[column] = f"{COMMAND} [{column.unit_of_command}]"
+        elif (
+            column.words in ("distance", "position")
+            and name_and_unit(column.title, QUANTITIES[axis.position].units)[1] == ""
+        ):
+            found[column] = f"{axis.position} [{column.unit_of(axis.position)}]"
     return found
 
 
-def _commanding(meant: Mapping[str, str], numbers: Mapping[str, Array], layouts: Iterable[Layout]) -> list[str]:
-    """Return the headers of the commands of thrusters, or else those of forces that are applied.
+def _commanding(meant: _Meant, layouts: Iterable[Layout]) -> list[_CsvColumn]:
+    """Return the columns of the commands of thrusters, or else those of forces that are applied.
 
     Outputs are numbered: if one is a command, then so are the others of its name, unit and range.
     """
-    possible = [title for title in meant if _may_be_command(title, numbers[title])]
-    sure = {title for title in possible if _is_command(title, numbers[title], meant[title])}
-    families: dict[tuple[str, str, bool], list[str]] = {}
-    for title in possible:
-        name, unit = header_parts(title)
-        families.setdefault((re.sub(r"\d+", "#", name), unit, _are_pulses(numbers[title])), []).append(title)
+    possible = [column for column in meant if column.may_be_command]
+    sure = {column for column in possible if column.is_command(meant[column])}
+    families = grouped(((re.sub(r"\d+", "#", c.name), c.unit, c.are_pulses), c) for c in possible)
     for (name, _, are_pulses), own in families.items():
-        is_sure = not sure.isdisjoint(own) or (are_pulses and _work_all_the_time([numbers[title] for title in own]))
+        is_sure = not sure.isdisjoint(own) or (are_pulses and _work_all_the_time(own))
         if "#" in name and is_sure:
             sure.update(own)
-    chosen = [title for title in possible if title in sure]
+    chosen = [column for column in possible if column in sure]
     best = min(map(_grade, chosen), default=0)
-    chosen = [title for title in chosen if _grade(title) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
-    outputs = {name: numbers[title] for name, title in zip(_names(chosen), chosen, strict=True)}
-    ends = {name: (float(own.min()), float(own.max())) for name, own in outputs.items()}
-    is_pulse = any(map(_are_pulses, outputs.values()))
+    chosen = [column for column in chosen if _grade(column) == best < _NO_THRUSTER][:_MOST_THRUSTERS]
+    by_name = dict(zip(_names(chosen), chosen, strict=True))
+    ends = {name: (float(own.numbers.min()), float(own.numbers.max())) for name, own in by_name.items()}
+    is_pulse = any(column.are_pulses for column in chosen)
     kept = likely_thrusters(ends, layouts, *((NEUTRAL, _IDLE_PULSE) if is_pulse else (0.0, 0.0)))
-    return [title for name, title in zip(ends, chosen, strict=True) if name in kept] or [
-        title for title in meant if _force(title) and len(numbers[title])
-    ]
+    return [by_name[name] for name in kept] or [column for column in meant if column.force and len(column.numbers)]
 
 
 def likely_thrusters(
@@ -227,47 +342,47 @@ def likely_thrusters(
     return next((names[:n] for n in range(last, len(names) + 1) if fitting(names[:n], known)), names[:last])
 
 
-def _grade(title: str) -> int:
+def _grade(column: _CsvColumn) -> int:
     """Return 0 for a header that may be that of a command, 1 for that of something wanted, which is a command if there
     is no other, and more for one that names no thruster."""
-    words = {*_words(title).split()}
+    words = {*column.words.split()}
     if not (wanted := words & NOT_MEASURED):
         return 0
-    if not (re.search(THRUSTER, _words(title)) or any(map(str.isdigit, words))):
+    if not (re.search(THRUSTER, column.words) or any(map(str.isdigit, words))):
         return _NO_THRUSTER
     return 0 if wanted <= {"cmd", "command", "commands"} else 1
 
 
-def _clock(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> list[str]:
-    """Return the header of the first column that rises from row to row and may be a time, or nothing."""
-    rows = max(map(len, numbers.values()), default=0)
+def _clock(meant: _Meant) -> list[_CsvColumn]:
+    """Return the first column that rises from row to row and may be a time, or nothing."""
+    rows = max((len(column.numbers) for column in meant), default=0)
     rising = (
-        title
-        for title, name in meant.items()
+        column
+        for column, name in meant.items()
         if not name
-        and header_parts(title)[1] in ("", *TIMES)
-        and len(numbers[title]) == rows >= _FEWEST_ROWS
-        and (np.diff(numbers[title]) > 0.0).all()
-        and not _is_command(title, numbers[title], name)
+        and column.unit in ("", *TIMES)
+        and len(column.numbers) == rows >= _FEWEST_ROWS
+        and (np.diff(column.numbers) > 0.0).all()
+        and not column.is_command(name)
     )
     return [*islice(rising, 1)]
 
 
-def _is_up(meant: Mapping[str, str], numbers: Mapping[str, Array]) -> bool:
+def _is_up(meant: _Meant) -> bool:
     """Return True if the third component of a position is negative, so that z points up and y to port."""
-    depths = (numbers[title] for title, name in meant.items() if name == "depth" and "z" in words_in(title))
-    depth = next((found for found in depths if len(found)), None)
-    return depth is not None and bool(np.median(depth) < 0.0)
+    named = (column for column, name in meant.items() if name == "depth" and "z" in words_in(column.title))
+    depths = [column.numbers for column in named if len(column.numbers)]
+    return bool(depths and np.median(depths[0]) < 0.0)
 
 
-def _measured(meant: Mapping[str, str], numbers: Mapping[str, Array], *, is_up: bool) -> dict[str, str]:
+def _measured(meant: _Meant, *, is_up: bool) -> dict[_CsvColumn, str]:
     """Return the columns that headers mean; the first header of each column counts."""
     columns, taken = {}, {""}
-    for title, name in meant.items():
+    for column, name in meant.items():
         if name not in taken:
             taken.add(name)
-            sign = "-" if is_up and {"y", "z"}.intersection(words_in(title)) else ""
-            columns[title] = f"{sign}{name} [{_unit(title, name, numbers[title])}]"
+            sign = "-" if is_up and {"y", "z"}.intersection(words_in(column.title)) else ""
+            columns[column] = f"{sign}{name} [{column.unit_of(name)}]"
     return columns
 
 
@@ -280,26 +395,6 @@ def _candidates(title: str, columns: Iterable[str]) -> Iterator[str]:
     """Yield the columns among these of which a header has a word, in the order of the catalogue."""
     words = _words(title)
     return (name for name, pattern in HEADERS if name in columns and re.search(rf"\b({pattern})\b", words))
-
-
-def _meant(title: str, numbers: Array, rotations: Collection[str]) -> str:
-    """Return the name of the column that a header seems to mean, or an empty text.
-
-    `rotations` are the beginnings of headers of quaternions.
-    """
-    words = _words(title)
-    if words.endswith((" x", " y", " z")) and (words[:-1] in rotations or not len(numbers)):
-        return ""
-    candidates = [*_candidates(title, ("", "time", *QUANTITIES))]
-    for name in takewhile(bool, candidates):
-        quantity = QUANTITIES.get(name)
-        own, unit = name_and_unit(title, quantity.units if quantity else TIMES)
-        is_sure = not (quantity and quantity.is_velocity) or own[-1] in ("x", "y", "z")
-        if unit and (is_sure or PLURALS.isdisjoint(words_in(title))):
-            return name
-        if unit == "" and is_sure and name not in _WITH_UNIT and FALSE_FRIENDS.isdisjoint(own):
-            return name
-    return "" if candidates else _velocity_by_unit(title)
 
 
 def _velocity_by_unit(title: str) -> str:
@@ -315,8 +410,9 @@ def _velocity_by_unit(title: str) -> str:
 
 def one_of_several(title: str, numbers: Array) -> str:
     """Return words about a header that is not read, because others tell the same; empty for any other header."""
-    name = _meant(title, numbers, ())
-    return f"another {name} [{_unit(title, name, numbers)}]" if name and len(numbers) else ""
+    column = _CsvColumn.of(title, numbers)
+    name = column.meant()
+    return f"another {name} [{column.unit_of(name)}]" if name and len(numbers) else ""
 
 
 def may_be_velocity(title: str, *, is_rotation: bool) -> bool:
@@ -326,97 +422,33 @@ def may_be_velocity(title: str, *, is_rotation: bool) -> bool:
     return bool((unit or rates & words) and NOT_MEASURED.isdisjoint(words) and own)
 
 
-def _may_be_command(title: str, numbers: Array) -> bool:
-    """Return True if the name and the unit of a header are not against the command of a thruster."""
-    unit = header_parts(title)[1].casefold()
-    is_unit_of_command = unit == "%" or unit.startswith(PULSES)
-    no_command = _NO_COMMAND - _SHARES if is_unit_of_command else _NO_COMMAND
-    is_possible = is_unit_of_command or unit in ("", "1", "-", "pwm")
-    is_other = no_command.intersection(_words(title).split()) or _velocity_by_unit(title)
-    return bool(is_possible and len(numbers) and not is_other)
-
-
-def _is_command(title: str, numbers: Array, meant: str) -> bool:
-    """Return True for the command of a thruster, by its name, unit and size, or for pulses that rest at 1500 us."""
-    if not _may_be_command(title, numbers):
-        return False
-    given = numbers[~np.isin(numbers, NO_OUTPUT)]
-    unit = header_parts(title)[1]
-    if unit.startswith(PULSES) and _within(given, PULSE_RANGE):
-        return True
-    if re.search(COMMANDS, _words(title)) or (unit == "%" and not meant):
-        return bool((np.abs(given) <= 100.0).all()) or _within(given, PULSE_RANGE)
-    values, counts = np.unique(given, return_counts=True)
-    return _within(given, _USUAL_PULSES) and abs(values[counts.argmax()] - NEUTRAL) <= _REST
-
-
-def _work_all_the_time(outputs: Iterable[Array]) -> bool:
+def _work_all_the_time(outputs: Iterable[_CsvColumn]) -> bool:
     """Return True for several outputs in whole microseconds on both sides of the usual neutral pulse."""
-    working = [values for values in outputs if values.min() < NEUTRAL < values.max()]
+    working = [own.numbers for own in outputs if own.numbers.min() < NEUTRAL < own.numbers.max()]
     whole = all(_within(values, _USUAL_PULSES) and (values == np.round(values)).all() for values in working)
     return len(working) >= _FEWEST_WORKING and whole
-
-
-def _are_pulses(numbers: Array) -> bool:
-    return _within(numbers[~np.isin(numbers, NO_OUTPUT)], PULSE_RANGE)
 
 
 def _within(numbers: Array, ends: tuple[float, float]) -> bool:
     return bool(len(numbers) and ends[0] <= numbers.min() and numbers.max() <= ends[1])
 
 
-def _names(titles: Sequence[str]) -> list[str]:
+def _names(columns: Sequence[_CsvColumn]) -> list[str]:
     """Return names of thrusters for columns of commands: what is particular in those of the columns, or else numbers.
 
     The words that all headers share say nothing: the particular part of `thr_FS_pwm` is `FS`. Numbers that count from 0
     become those of the thrusters, which count from 1.
     """
-    parts = [header_parts(title)[0] for title in titles]
+    parts = [column.name for column in columns]
     words = [re.findall(r"[^\W\d_]+|\d+|[\W_]+", part) for part in parts]
     shared = set.intersection(*map(set, words)) if len(words) > 1 else {*words[0][:-1]} if words else set()
     particular = [re.sub(r"[\W_]+", "_", "".join(w for w in own if w not in shared)).strip("_") for own in words]
-    if {*particular} == {str(n) for n in range(len(titles))}:
+    if {*particular} == {str(n) for n in range(len(columns))}:
         return [str(int(number) + 1) for number in particular]
     for names in (particular, parts):
         if all(_NAME.fullmatch(name) for name in names) and len({name.casefold() for name in names}) == len(names):
             return names
-    return [str(n + 1) for n in range(len(titles))]
-
-
-def _unit(title: str, name: str, numbers: Array) -> str:
-    """Return the unit of a column, from its header or else the likely one."""
-    units, most = QUANTITIES[name].units if name in QUANTITIES else TIMES, float(np.abs(numbers).max(initial=0.0))
-    given = name_and_unit(title, units)[1]
-    if name == "time":
-        long = float(np.ptp(numbers)) if len(numbers) else 0.0
-        usual = long / max(len(numbers) - 1, 1)
-        is_ms = (usual > _LONG_STEP or (usual > _STEP and long > _LONG_LOG)) and most < 1e9
-        likely = next((unit for least, unit in _EPOCHS if most > least), "ms" if is_ms else "s")
-    else:
-        largest = _LIKELY.get(name, inf)
-        likely = next((unit for unit, per in units.items() if most <= largest * per), [*units][-1])
-    return given or likely
-
-
-def _force(title: str) -> Axis | None:
-    """Return the axis of a component of a wrench, a force or torque that is applied; None for another header.
-
-    It has a symbol, such as `X_ext`, or names a force or a torque and its direction.
-    """
-    if axis := _EXTERNAL.get(header_parts(title)[0].casefold()):
-        return axis
-    match = re.search(rf"\b({FORCE}|{TORQUE})\b.* ([xyz])$", _words(title))
-    if not match:
-        return None
-    index, is_rotation = "xyz".index(match[2]), match[1] == TORQUE
-    return next(axis for axis in AXES.values() if (axis.place, axis.is_rotation) == (index, is_rotation))
-
-
-def _unit_of_command(title: str, numbers: Array) -> str:
-    """Return the unit of a command: from its header, or else from the size of the values."""
-    unit, most = header_parts(title)[1], float(np.abs(numbers).max(initial=0.0))
-    known = unit in ("%", "1") or unit.startswith(PULSES)
-    return unit if known else "1" if most <= 1.0 else "%" if most <= 100.0 else "us"
+    return [str(n + 1) for n in range(len(columns))]
 
 
 # ---- Tables ----------------------------------------------------------------------------------------------------------

@@ -107,7 +107,7 @@ def _inspected(path: Path, layouts: Sequence[Layout], layout: Layout | None, tab
             return [_of_table(path, kind, columns, ranges)]
         renamed = time_columns(start, renamed) | renamed
         own = {renamed.get(title, title): numbers[title] for title in titles}
-        guess, columns = guessed([*own], own, axis, [layout] if layout else layouts)
+        guess, columns = guessed(own, axis, [layout] if layout else layouts)
         layout = layout or guess
         known = columns_of_log(layout, axis)
         named = KnownColumns(known)
