@@ -254,14 +254,7 @@ class Chart {
       const half = replay.recording.signals[signal].band;
       const error = shown(factor * (replay.errors[signal][placeOf(other.times, Math.min(at, time))] ?? 0), digits);
       words.push(
-        `error ${error}${
-          half
-            ? ` ± ${shown(
-                factor * between(half.times, (k) => half.values[k], at),
-                digits,
-              )}`
-            : ""
-        }`,
+        `error ${error}${half ? ` ± ${shown(factor * between(half.times, (k) => half.values[k], at), digits)}` : ""}`,
       );
     } else if (isPointed && other) words.push(`ghost ${this.reading(other, at, time)}`);
     else if (isPointed && mine.band) words.push(`± ${shown(mine.band(placeOf(mine.times, at)), digits)}`);
