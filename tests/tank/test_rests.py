@@ -126,6 +126,15 @@ def hand(rate: float) -> Change:
     return limit
 
 
+def off_at_the_ends(t: float, s: State) -> None:
+    """Thrusters that are off until 8 s and from 95 s on leave a neutral vehicle where it is."""
+    s.w *= float(8.0 < t < 95.0)
+
+
+def ends_below(t: float, s: State) -> None:
+    s.down = 0.35 if t > 88.0 else s.down
+
+
 def pushes_on(t: float, s: State) -> None:
     s.down = 0.3 if 20.0 < t < 26.0 or 40.0 < t < 56.0 or 64.0 < t < 74.0 else s.down
 
@@ -136,12 +145,22 @@ def pushes_on(t: float, s: State) -> None:
         (drawn(1, floats, start=0.05), [(0.0, 12.0), (82.0, 110.0)], [(0.0, 9.0), (97.0, 110.0)]),
         (drawn(2, floats, start=0.6, zeroed=True), [(0.0, 12.0), (82.0, 110.0)], [(3.0, 8.0), (97.0, 110.0)]),
         (drawn(3, pushes_down, dives_to(7.0)), [(0.0, 110.0)], [(54.0, 61.0)]),
+        (drawn(4, ends_below, dives_to(7.0)), [(0.0, 110.0)], [(102.0, 109.0)]),
         (drawn(4, holds_depth, dives_to(6.5)), [(44.0, 78.0)], [(50.0, 74.0)]),
         (drawn(5, waits, on_deck, start=-1.2), [(0.0, 24.5)], [(0.0, 23.5)]),
         (drawn(7, pushes_on, hand(0.0)), [(40.0, 60.0)], [(48.0, 55.0)]),
         (drawn(8, pushes_on, hand(-0.4)), [(40.0, 62.0)], [(50.0, 54.0)]),
     ],
-    ids=["surface", "depth set to zero", "bottom", "depth held on the bottom", "deck", "hand", "pulled up"],
+    ids=[
+        "surface",
+        "depth set to zero",
+        "bottom",
+        "bottom at the end",
+        "depth held on the bottom",
+        "deck",
+        "hand",
+        "pulled up",
+    ],
 )
 def test_a_rest_is_left_out_with_one_finding(
     dive: Log, within: list[tuple[float, float]], at_least: list[tuple[float, float]]
@@ -160,6 +179,13 @@ def test_a_dive_that_touches_nothing_is_left_as_it_is(load: float) -> None:
         for command in (nothing, holds_depth):
             dive = drawn(10 + seed, command, load=load)
             assert without_rests(dive, LAYOUT) == [dive]
+
+
+def test_thrusters_that_are_off_at_the_ends_of_a_log_are_no_rest() -> None:
+    """Rests between, and those that a surface or a bottom explains, are tried above."""
+    for seed in range(5):
+        dive = drawn(30 + seed, limit=off_at_the_ends, load=0.0)
+        assert without_rests(dive, LAYOUT) == [dive]
 
 
 def test_a_dive_from_depth_0_in_a_tank_without_a_surface_is_left_as_it_is(tmp_path: Path) -> None:
