@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from rov_fmu.equation.catalogue import HEAVE, YAW
+from rov_fmu.equation.catalogue import HEAVE, YAW, Axis
 from rov_fmu.io.columns import Column, read_columns
 from rov_fmu.tank.catalogue import QUANTITIES, as_json
 from rov_fmu.tank.channels import Topic, channels_of
@@ -145,9 +145,9 @@ TOGETHER: Sequence[tuple[Mapping[str, Iterable[float]], list[str]]] = [
 """Unknown headers with the numbers below them, and what they seem to mean."""
 
 
-def guessed_of(columns: Mapping[str, Iterable[float]]) -> dict[str, str]:
+def guessed_of(columns: Mapping[str, Iterable[float]], axis: Axis | None = None) -> dict[str, str]:
     numbers = {title: np.array([*values], float) for title, values in columns.items()}
-    return guessed(numbers, None, [])[1]
+    return guessed(numbers, axis, [])[1]
 
 
 @pytest.mark.parametrize("header", LARGEST)
@@ -247,3 +247,10 @@ def test_a_unit_may_stand_before_the_axis_and_a_plural_is_a_rate_only_behind_one
 )
 def test_a_header_of_something_else_means_nothing(header: str) -> None:
     assert guessed_of({header: [1.0]}) == {}
+
+
+@pytest.mark.parametrize(
+    ("header", "meaning"), [("position", "depth [m]"), ("Distance", "depth [m]"), ("position [fathom]", "")]
+)
+def test_the_position_in_a_log_of_one_axis_needs_no_other_word(header: str, meaning: str) -> None:
+    assert guessed_of({header: [1.0]}, HEAVE) == ({header: meaning} if meaning else {})
