@@ -28,6 +28,17 @@ function gap({ left, right, top, bottom }, [x, y]) {
   return Math.hypot(Math.max(left - x, 0, x - right), Math.max(top - y, 0, y - bottom));
 }
 
+/** Returns whether a point lies within polygons; a polygon within another one is a hole. @param {number[][][]} polygons @param {number[]} point */
+function isInside(polygons, [x, y]) {
+  const left = polygons.flatMap((points) =>
+    points.filter(([u, v], n) => {
+      const [p, q] = points[(n + 1) % points.length];
+      return v > y !== q > y && u + ((p - u) * (y - v)) / (q - v) < x;
+    }),
+  );
+  return left.length % 2 === 1;
+}
+
 /** The directions in which a label may lie beside its thruster. */
 const SIDES = [0, 1, 2, 3, 4, 5, 6, 7].map((n) => [Math.cos((n * Math.PI) / 4), Math.sin((n * Math.PI) / 4)]);
 /** The distances from its thruster at which a label may lie, in radii of the thruster. */
@@ -53,12 +64,17 @@ function jetOf(share, r, size) {
   return Math.abs(share) < 0.004 ? 0 : -Math.sign(share) * (0.6 * r + (0.3 + 1.7 * Math.abs(share)) * size);
 }
 
+/** The least share of a thruster, or of the end of its jet, that is seen where it has a label. */
+const SEEN = 0.25;
+
 /** A vehicle in the picture. */
 class Figure {
   /** @param {Vehicle} vehicle */
   constructor(vehicle) {
     this.vehicle = vehicle;
     this.shape = new Shape(vehicle);
+    /** What was drawn, the nearest part last. @type {Drawn[]} */
+    this.parts = [];
     /** Where the labels were drawn. @type {DOMRect[]} */
     this.boxes = [];
   }
@@ -66,8 +82,7 @@ class Figure {
   /** Draws the vehicle. @param {Board} board @param {View} view Of the body frame. @param {Model} model @param {boolean} isGhost */
   draw(board, view, model, isGhost) {
     const { prisms, tubes, thrusters, fins, radius } = this.shape;
-    /** @type {Drawn[]} */
-    const parts = [
+    this.parts = [
       ...prisms.flatMap((one) => this.prism(one, view)),
       ...tubes.flatMap((one) => this.tube(one, view)),
       ...fins.map((corners) => this.part("fin", [corners.map((p) => seen(view, p))], corners, view)),
@@ -79,11 +94,12 @@ class Figure {
           r: radius,
           ends: /** @type {[number, number]} */ ([-0.6 * radius, 0.6 * radius]),
         };
-        return [...this.tube(tube, view), ...this.jets(n, this.share(n, model), view)];
+        const own = [...this.tube(tube, view), ...this.jets(n, this.share(n, model), view)];
+        return own.map((part) => ({ ...part, thruster: n }));
       }),
     ].sort((one, other) => one.layer - other.layer || one.near - other.near);
     const { grey, blue } = board.colours;
-    for (const { kind, polygons } of parts) {
+    for (const { kind, polygons } of this.parts) {
       const [part, tone] = kind.split(" ");
       if (part === "jet") board.area(polygons, isGhost ? grey : blue, "", tone ? 0.5 : 0.28);
       else if (isGhost) board.area(polygons, grey, grey, 0.18);
@@ -158,20 +174,37 @@ class Figure {
     });
   }
 
-  /** Puts each label at the end of the jet of its thruster: away from the vehicle's middle, or where it covers less, and nearest to its own
-   * thruster. Labels without such a place, and those that would cover each other, are left out. @param {Board} board @param {View} view @param {Model} model @param {DOMRect[]} taken */
+  /** Returns whether the last drawing hides a thruster (the kind "tube"), or the end of its "jet". @param {number} n @param {string} kind
+   * @param {Vector} end @param {View} view */
+  isHidden(n, kind, end, view) {
+    const { along } = this.shape.thrusters[n];
+    const own = this.parts.map((part) => part.thruster === n && part.kind.startsWith(kind));
+    const before = this.parts.slice(own.lastIndexOf(true) + 1);
+    const solid = before.filter(({ kind }) => !kind.startsWith("jet"));
+    const points = ring(end, along, this.shape.radius).map((p) => seen(view, p));
+    const free = points.filter((p) => !solid.some(({ polygons }) => isInside(polygons, p)));
+    return free.length < SEEN * points.length;
+  }
+
+  /** Puts each label at the end of the jet of its thruster, or at a thruster whose jet is hidden: away from the vehicle's middle, or where
+   * it covers less, and nearest to its own thruster. Labels without such a place, those that would cover each other, and those of what is
+   * hidden are left out. @param {Board} board @param {View} view @param {Model} model @param {DOMRect[]} taken */
   label(board, view, model, taken) {
     const { thrusters } = this.vehicle;
     const [x, y] = view.origin;
     this.boxes = [];
     if (view.scale * this.vehicle.size < (thrusters.length > 4 ? 45 : 24)) return;
     const r = this.shape.radius * view.scale;
-    const ends = this.shape.thrusters.map(({ at, along }, n) => {
-      const jet = jetOf(this.share(n, model), this.shape.radius, this.vehicle.size);
-      return [at, plus(at, [jet, along])].map((p) => seen(view, p));
-    });
+    const points = this.shape.thrusters.map(({ at, along }, n) => [
+      at,
+      plus(at, [jetOf(this.share(n, model), this.shape.radius, this.vehicle.size), along]),
+    ]);
+    const ends = points.map((own) => own.map((p) => seen(view, p)));
     const covered = ends.map(([[u, v]]) => new DOMRect(u - r, v - r, 2 * r, 2 * r));
-    ends.forEach(([, [u, v]], n) => {
+    points.forEach(([at, tip], n) => {
+      const place = !this.isHidden(n, "jet", tip, view) ? tip : at;
+      if (place === at && this.isHidden(n, "tube", at, view)) return;
+      const [u, v] = seen(view, place);
       const { label } = thrusters[n];
       const far = Math.hypot(u - x, v - y);
       const away = far < 2 ? [1, 0] : [(u - x) / far, (v - y) / far];

@@ -6,8 +6,9 @@
  * @typedef {{kind: string, face: Vector[], depth: Vector, holes: Vector[][]}} Prism */
 /** A tube around a point and along a direction of length 1. `ends` are where it begins and ends along it.
  * @typedef {{kind: string, at: Vector, along: Vector, r: number, ends: [number, number]}} Tube */
-/** A part of the vehicle as it is drawn: its polygons on the screen, and its order, first by layer and then by how near it is.
- * @typedef {{kind: string, polygons: number[][][], layer: number, near: number}} Drawn */
+/** A part of the vehicle as it is drawn: its polygons on the screen, its order, first by layer and then by how near it is, and the number
+ * of the thruster that it belongs to, if it does.
+ * @typedef {{kind: string, polygons: number[][][], layer: number, near: number, thruster?: number}} Drawn */
 
 const HORIZONTAL = 0.3; // the largest vertical part of the direction of a thruster that drives a vehicle ahead, aside or around
 const FRAME = 4; // so many thrusters that drive it horizontally stand in an open frame

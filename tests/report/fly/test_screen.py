@@ -160,6 +160,48 @@ def test_a_label_stands_nearest_to_its_own_thruster(kind: str, fly: Callable[...
     ]
 
 
+_HIDDEN = """azimuth => {
+    const { picture, flight, vehicle } = live;
+    const { board, pilot } = picture;
+    picture.camera = { azimuth, elevation: 0.62 };
+    live.draw();
+    const labels = new Set(drawnTexts.get(board).map(([words]) => words));
+    const { model } = flight.pilot;
+    const view = viewOfFrame(picture.look(positionOf(model)), rotationOf(model), [0, 0, 0]);
+    const { width, height } = board.canvas;
+    const canvas = Object.assign(document.createElement("canvas"), { width, height });
+    const own = board.pen;
+    board.pen = canvas.getContext("2d", { willReadFrequently: true });
+    board.pen.setTransform(own.getTransform());
+    const pixels = () => {
+        board.clear();
+        pilot.draw(board, view, model, false);
+        return board.pen.getImageData(0, 0, width, height).data;
+    };
+    const whole = pixels();
+    const disc = Math.PI * (pilot.shape.radius * view.scale * devicePixelRatio) ** 2;
+    const hidden = pilot.shape.thrusters.flatMap((one, n) => {
+        const { label, at } = { ...vehicle.thrusters[n], at: one.at };
+        one.at = [0, 0, -1e4];
+        const without = pixels();
+        one.at = at;
+        const changed = whole.filter((value, k) => k % 4 === 0 && value !== without[k]).length;
+        return labels.has(label) && changed < 0.1 * disc ? [label] : [];
+    });
+    board.pen = own;
+    return hidden;
+}"""
+"""Returns the labels of thrusters without which the picture is almost the same."""
+
+
+@pytest.mark.parametrize("kind", ["videoray", "bluerov2", "bluerov2_heavy"])
+def test_a_thruster_that_the_hull_hides_has_no_label(kind: str, fly: Callable[..., Any]) -> None:
+    page = fly(kind, width=1280)
+    record_drawn_texts(page)
+    page.evaluate("() => { live.pause(true); live.frame = () => {}; }")
+    assert [page.evaluate(_HIDDEN, azimuth / 2.0) for azimuth in range(13)] == [[]] * 13
+
+
 def test_there_is_one_north(page: Any) -> None:
     """The rose, the picture from above and the track turn together, wherever the camera is."""
     for azimuth in (0.0, 0.5, -2.0):
