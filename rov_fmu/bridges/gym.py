@@ -185,6 +185,7 @@ class RovEnv(gymnasium.Env[Array, Array]):
 
     def __init__(self, vehicle: Vehicle, *, step: float = STEP, steps: int = STEPS, draws: Draws = True) -> None:
         self.many = RovVectorEnv(vehicle, step=step, steps=steps, draws=draws)
+        self.states, self.commands = self.many.states, self.many.commands
         self.observation_space, self.action_space = self.many.single_observation_space, self.many.single_action_space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:

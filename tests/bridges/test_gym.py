@@ -33,6 +33,7 @@ def test_the_environment_checker_passes() -> None:
     environment = RovEnv(rov_fmu.load("videoray_refit"))
     check_env(environment, skip_render_check=True)
     assert environment.many.steps == 300
+    assert (environment.states[0], environment.commands[0]) == ("u", "u_l")
 
 
 def test_a_vehicle_has_a_registered_environment_of_one_and_of_many() -> None:
