@@ -129,6 +129,13 @@ def test_pages_that_begin_with_a_task_are_short_and_every_page_is_in_one_part() 
         assert len(re.sub(r"^```\{code-cell\}.*?^```$", "", text, flags=re.MULTILINE | re.DOTALL).split()) <= 1200, page
 
 
+@pytest.mark.parametrize("page", sorted((ROOT / "docs").glob("*.md")), ids=name)
+def test_the_first_sentence_of_a_page_says_for_whom_it_is(page: Path) -> None:
+    """It follows the heading and a picture. Pages that show a file at the top of the repository have its own."""
+    shown = re.sub(r"\A---.*?^---\n|^(#|!\[)[^\n]*", "", page.read_text("utf-8"), flags=re.MULTILINE | re.DOTALL)
+    assert shown.strip().startswith(("For ", "The site shows "))
+
+
 def test_the_page_of_the_vehicles_says_how_far_they_are_off() -> None:
     _, *rows = compared.tables()["videoray_measured"]
     paper, refit = (max(abs(float(row[n].rstrip("%"))) for row in rows) for n in (1, 2))
@@ -334,9 +341,8 @@ def test_version_is_that_of_the_package() -> None:
 
 def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() -> None:
     """The long tests, the importers and the site on every change, the exhaustive tests every week."""
-    every_change, weekly, workflow, site = (
-        (ROOT / name).read_text(encoding="utf-8")
-        for name in (".ci/run", WEEKLY, ".github/workflows/test.yml", ".ci/build-site")
+    every_change, weekly, workflow = (
+        (ROOT / name).read_text(encoding="utf-8") for name in (".ci/run", WEEKLY, ".github/workflows/test.yml")
     )
     assert all(f"\npytest -rs -m {marker}" in every_change for marker in ("long", "interop"))
     assert "- run: pytest -rs -m weekly" in weekly
@@ -344,9 +350,9 @@ def test_every_set_of_tests_and_the_commands_of_the_readme_are_run_and_told() ->
     assert all(f"`pytest -m {marker}`" in contributing for marker in ("long", "interop", "weekly"))
     for line in lines(blocks(README, "sh")[1]):
         assert f"- run: {line.split('#')[0].strip()}\n" in workflow
-    assert site.endswith('pip install -e ".[docs]" && sphinx-build -W docs site "${@:2}"\n')
-    assert '- run: .ci/build-site "$RUNNER_TEMP/docs"\n' in workflow, "with the notebooks executed"
-    assert "begin_beside site .ci/build-site" in every_change
+    alone = '- run: pip install -e ".[docs]" && sphinx-build -W docs site\n'
+    assert alone in workflow.partition("\n  documentation:")[2].partition("[test]")[0], "with the notebooks executed"
+    assert "begin_beside site sphinx-build -W docs site" in every_change
 
 
 @pytest.mark.long
