@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
+from pythonfmu import FmuBuilder
 
 from examples.system import engines, run
 from examples.system.engines import ENGINES, NAMES, Trajectory
@@ -201,15 +202,17 @@ def test_the_picture_of_a_tether_shows_it(tmp_path: Path) -> None:
     assert "Tension" in (tmp_path / "tether.svg").read_text(encoding="utf-8")
 
 
-def test_the_controller_of_the_page_holds_the_depth(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_controller_of_the_page_holds_the_depth(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = (ROOT / "docs" / "autopilot.md").read_text(encoding="utf-8")
-    hold, block = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    hold, controller = re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    (plan,) = re.findall(r"^```toml\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
     exec(compile(hold, "autopilot.md", "exec"), {})
     assert capsys.readouterr().out == "2.00 m\n"
-    assert len(block.splitlines()) <= 20
-    monkeypatch.chdir(folder)
-    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))  # where FMPy unpacks
-    exec(compile(block, "autopilot.md", "exec"), {})
-    assert capsys.readouterr().out == "2.00 m\n"
+    (tmp_path / "depth.py").write_text(controller, encoding="utf-8")
+    FmuBuilder.build_FMU(tmp_path / "depth.py", dest=tmp_path)
+    rov = '[component.rov]\nvehicle = "videoray"\n'
+    (tmp_path / "plan.toml").write_text(f"step = 0.05\nstop_time = 60\n{plan}{rov}", encoding="utf-8")
+    with without_page():
+        assert main(["system", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "plan.ssp"), "--run"]) == 0
+    motion = np.genfromtxt(tmp_path / "plan.csv", delimiter=",", names=True, deletechars="")
+    assert f"{motion['rov.z'][-1]:.2f} m" in text
