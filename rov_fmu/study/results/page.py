@@ -1,7 +1,6 @@
 """The page about a study, one HTML file: bands, distributions, sensitivities and failures."""
 
 from collections.abc import Iterator, Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,9 @@ from rov_fmu.io.messages import FileError
 from rov_fmu.report.templates import inline_script, number, page
 from rov_fmu.study.plan.figures import read_expression
 from rov_fmu.study.plan.plan import REASON, STATUS
-from rov_fmu.study.results.plots import draw_band, draw_distribution, draw_indices, draw_lines, indices_height, plot
+from rov_fmu.study.results import plots
 from rov_fmu.study.results.results import QUANTILES, Results, statistics
 
-_POINTS = 400
-"""The number of points of a band that are drawn; more would not be visible."""
 _NUMBERS = 6
 """The number of values of a distribution that are shown."""
 _REASONS = 50
@@ -53,14 +50,11 @@ def study_page(results: Results) -> str:
         more_rows=len(runs[_ROWS:]),
         no_indices={name: found for name, found in indices.items() if isinstance(found, str)},
         indices=tables,
-        index_plots=[
-            plot(f"Sobol indices of {name}", partial(draw_indices, rows=rows), name, height=indices_height(len(rows)))
-            for name, rows in tables.items()
-        ],
+        index_plots=[plots.indices(name, rows) for name, rows in tables.items()],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
         few=_FEW,
         few_figures=_FEW_FIGURES,
-        bands=[_band(results, name) for name in outputs],
+        bands=[plots.band(name, results) for name in outputs],
         script=inline_script("plots.js"),
         correlated=[group for group in results.groups if len(group) > 1],
         parameters=[_parameter(name, runs[name], plan, results) for name in results.parameters],
@@ -84,37 +78,31 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     is_still = bool(there.size) and _is_constant(there)
     expression = results.plan["figures"][name]
     unit = read_expression(expression, results.units).unit
-    found = {
+    plot = None
+    if there.size and not is_still:
+        plot = (
+            plots.over_grid(name, unit, expression, results, grid)
+            if grid
+            else plots.distribution(name, there, quantiles, unit, expression)
+        )
+    return {
         "name": name,
         "expression": expression,
         "unit": unit,
         "runs": there.size,
         "is_still": is_still,
-        "plot": None,
+        "plot": plot,
+        "quantiles": quantiles,
+        "mean": mean,
+        "sd": sd,
+        "ends": (float(there.min()), float(there.max())) if there.size else None,
     }
-    if there.size and not is_still:
-        if grid:
-            draw = partial(draw_lines, name=name, unit=unit, results=results, grid=grid)
-            label = f"{name} over {' and '.join(grid)}"
-        else:
-            draw = partial(draw_distribution, values=there, quantiles=quantiles, unit=unit)
-            label = f"Distribution of {name}"
-        found["plot"] = plot(label, draw, name, expression)
-    ends = (float(there.min()), float(there.max())) if there.size else None
-    return {**found, "quantiles": quantiles, "mean": mean, "sd": sd, "ends": ends}
 
 
 def _is_constant(values: Any) -> bool:
     """True when values are practically constant."""
     with np.errstate(over="ignore"):
         return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
-
-
-def _band(results: Results, output: str) -> dict[str, Any]:
-    bands = results.bands(output)
-    shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
-    draw = partial(draw_band, bands=shown, unit=results.units[output])
-    return plot(f"Trajectories of {output}", draw, output, results.descriptions[output])
 
 
 def _sensitivities(results: Results) -> dict[str, Any]:

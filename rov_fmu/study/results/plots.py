@@ -1,22 +1,23 @@
-"""The plots of a study's page."""
+"""The plots of a study's page. Each function declares one: its label, what stands above it, and how it is drawn."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from textwrap import shorten, wrap
 from typing import Any
 
 import numpy as np
-import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from rov_fmu.report.plots.steps import evenly
-from rov_fmu.report.plots.svg import LIGHT, LINES, Draw, inline_svg, with_even_text, with_formulas
+from rov_fmu.report.plots.svg import LIGHT, LINES, inline_svg, with_even_text, with_formulas
 from rov_fmu.report.templates import number, with_unit
 from rov_fmu.study.results.results import Results
 
 _WIDTH = 3.7  # inches
 _HEIGHT = 2.6  # inches
+_POINTS = 400
+"""The number of points of a band that are drawn; more would not be visible."""
 _BINS = 40
 _MARKED = 40
 """A line with at most this many points has markers."""
@@ -32,88 +33,108 @@ _BAR = 0.34
 """The height of a bar, as a share of the distance between two variables."""
 
 
-def plot(label: str, draw: Draw, name: str, text: str = "", height: float = _HEIGHT) -> dict[str, Any]:
-    """Return a plot with the name and the text above it. `label` is for screen readers; the height is in inches."""
-    return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(draw), (_WIDTH, height), marked=True)}
-
-
-def draw_distribution(figure: Figure, values: Any, quantiles: list[float], unit: str = "") -> None:
-    """Draw a histogram of values with their median, and with the range from their first to their last quantile."""
-    ax = figure.subplots()
+def distribution(name: str, values: Any, quantiles: list[float], unit: str, expression: str) -> dict[str, Any]:
+    """Plot a histogram of the values of a figure with their median, and with the range from their first to their last
+    quantile."""
     low, median, high = (quantiles[n] for n in (0, len(quantiles) // 2, -1))
-    ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
-    shares = np.full(len(values), 100.0 / len(values))
-    bins = min(_BINS, max(5, round(len(values) ** 0.5)))
-    _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
-    bars.set_label("share")  # type: ignore[union-attr]
-    ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
-    ax.set(xlabel=with_unit("", unit), ylabel="runs (%)")
-    _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
+
+    def draw(ax: Axes) -> None:
+        ax.axvspan(low, high, facecolor=LIGHT["band"], edgecolor="none", zorder=0)
+        shares = np.full(len(values), 100.0 / len(values))
+        bins = min(_BINS, max(5, round(len(values) ** 0.5)))
+        _, _, bars = ax.hist(values, bins=bins, weights=shares, color=LIGHT["blue"], alpha=0.75)
+        bars.set_label("share")  # type: ignore[union-attr]
+        ax.axvline(median, color=LIGHT["orange"], linewidth=1.4)
+        ax.set(xlabel=with_unit("", unit), ylabel="runs (%)")
+        _set_ticks(ax, 3 if np.ptp(values) < _NARROW * np.abs(values).max() else 6)
+
+    return _plot(f"Distribution of {name}", draw, name, expression)
 
 
-def draw_lines(figure: Figure, name: str, unit: str, results: Results, grid: Sequence[str]) -> None:
-    """Draw a figure over the variable with more values, with a line for some values of the other one."""
-    ax = figure.subplots()
+def over_grid(name: str, unit: str, expression: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
+    """Plot a figure over the variable with more values, with a line for some values of the other one."""
     along, *others = grid
     runs = results.runs.sort_values(along, kind="stable")
-    lines = [("", runs)]
-    for other in others:
-        some = evenly(np.unique(runs[other]).tolist())
-        lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
-    for (label, line), color in zip(lines, LINES, strict=False):
-        marker = "o" if len(line) <= _MARKED else ""
-        ax.plot(line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label)
-    for other in others:
-        title = with_unit(other, results.units[other])
-        figure.legend(title=title, handlelength=1.0, loc="outside right upper")
-    ax.set(xlabel=with_unit(along, results.units[along]), ylabel=with_unit("", unit))
-    _set_ticks(ax)
+
+    def draw(ax: Axes) -> None:
+        lines = [("", runs)]
+        for other in others:
+            some = evenly(np.unique(runs[other]).tolist())
+            lines = [(number(value, 4), runs[runs[other] == value]) for value in some]
+        for (label, line), color in zip(lines, LINES, strict=False):
+            marker = "o" if len(line) <= _MARKED else ""
+            ax.plot(
+                line[along], line[name], color=LIGHT[color], marker=marker, markersize=3.5, linewidth=1.4, label=label
+            )
+        for other in others:
+            title = with_unit(other, results.units[other])
+            ax.figure.legend(title=title, handlelength=1.0, loc="outside right upper")
+        ax.set(xlabel=with_unit(along, results.units[along]), ylabel=with_unit("", unit))
+        _set_ticks(ax)
+
+    return _plot(f"{name} over {' and '.join(grid)}", draw, name, expression)
 
 
-def draw_band(figure: Figure, bands: pd.DataFrame, unit: str) -> None:
-    """Draw the median of an output over time, and the bands between its quantiles."""
-    ax = figure.subplots()
-    t = bands.index.to_numpy()
-    values = bands.to_numpy(float)
-    low, below, median, above, high = np.where(np.isfinite(values), values, np.nan).T
-    ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
-    ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
-    for edge, label in ((low, "5 %"), (high, "95 %")):
-        ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
-    ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
-    ax.set(xlabel="time (s)", ylabel=with_unit("", unit))
-    _set_ticks(ax)
+def band(output: str, results: Results) -> dict[str, Any]:
+    """Plot the median of an output over time, and the bands between its quantiles."""
+    bands = results.bands(output)
+    shown = bands.iloc[:: max(1, len(bands) // _POINTS)]
+
+    def draw(ax: Axes) -> None:
+        t = shown.index.to_numpy()
+        values = shown.to_numpy(float)
+        low, below, median, above, high = np.where(np.isfinite(values), values, np.nan).T
+        ax.fill_between(t, low, high, color=LIGHT["blue"], alpha=0.16, linewidth=0.0)
+        ax.fill_between(t, below, above, color=LIGHT["blue"], alpha=0.28, linewidth=0.0)
+        for edge, label in ((low, "5 %"), (high, "95 %")):
+            ax.plot(t, edge, color=LIGHT["blue"], linewidth=0.5, alpha=0.5, label=label)
+        ax.plot(t, median, color=LIGHT["blue"], linewidth=1.6, label="median")
+        ax.set(xlabel="time (s)", ylabel=with_unit("", results.units[output]))
+        _set_ticks(ax)
+
+    return _plot(f"Trajectories of {output}", draw, output, results.descriptions[output])
 
 
-def indices_height(variables: int) -> float:
-    """Return the height in inches of a plot of Sobol indices."""
-    return 1.0 + 0.45 * min(variables, _SHOWN_INDICES)
-
-
-def draw_indices(figure: Figure, rows: Sequence[dict[str, Any]]) -> None:
-    """Draw the Sobol indices of a figure as bars with their 95 % intervals; unreliable ones are grey.
+def indices(figure: str, rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """Plot the Sobol indices of a figure as bars with their 95 % intervals; unreliable ones are grey.
 
     A row has `name`, `S1`, `S1_95`, `S1_tells` and the same for ST, and the largest ST comes first.
     """
-    ax = figure.subplots()
     shown = rows[:_SHOWN_INDICES]
-    ends = [0.0, 1.0]
-    for key, color, offset in (("S1", "blue", -0.5), ("ST", "teal", 0.5)):
-        at = np.arange(len(shown)) + offset * _BAR
-        values, half_widths = (np.array([row[name] for row in shown], float) for name in (key, f"{key}_95"))
-        colors = [LIGHT[color if row[f"{key}_tells"] else "grey"] for row in shown]
-        ax.barh(at, values, _BAR, color=colors, alpha=0.75)
-        ax.errorbar(values, at, xerr=half_widths, fmt="none", ecolor=LIGHT["ink"], elinewidth=1.0, capsize=2.0)
-        ends += [*(values - half_widths), *(values + half_widths)]
-    ax.set(xlim=(max(min(ends), -0.3) - 0.02, min(max(ends), 1.3) + 0.02), ylim=(len(shown) - 0.4, -0.6))
-    ax.set_yticks(range(len(shown)), ["\n".join(_name_lines(row["name"])) for row in shown])
-    ax.tick_params("y", labelcolor=LIGHT["ink"])
-    ax.grid(visible=False, axis="y")
-    ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8)
-    ax.set_xlabel("share of the variance")
-    looks = [Patch(color=LIGHT[color], alpha=0.75, label=label) for color, label in _KINDS.items()]
-    legend = figure.legend(handles=looks, loc="outside upper right", ncols=2, handlelength=1.0, columnspacing=1.2)
-    with_formulas(*legend.get_texts())
+
+    def draw(ax: Axes) -> None:
+        ends = [0.0, 1.0]
+        for key, color, offset in (("S1", "blue", -0.5), ("ST", "teal", 0.5)):
+            at = np.arange(len(shown)) + offset * _BAR
+            values, half_widths = (np.array([row[name] for row in shown], float) for name in (key, f"{key}_95"))
+            colors = [LIGHT[color if row[f"{key}_tells"] else "grey"] for row in shown]
+            ax.barh(at, values, _BAR, color=colors, alpha=0.75)
+            ax.errorbar(values, at, xerr=half_widths, fmt="none", ecolor=LIGHT["ink"], elinewidth=1.0, capsize=2.0)
+            ends += [*(values - half_widths), *(values + half_widths)]
+        ax.set(xlim=(max(min(ends), -0.3) - 0.02, min(max(ends), 1.3) + 0.02), ylim=(len(shown) - 0.4, -0.6))
+        ax.set_yticks(range(len(shown)), ["\n".join(_name_lines(row["name"])) for row in shown])
+        ax.tick_params("y", labelcolor=LIGHT["ink"])
+        ax.grid(visible=False, axis="y")
+        ax.axvline(0.0, color=LIGHT["muted"], linewidth=0.8)
+        ax.set_xlabel("share of the variance")
+        looks = [Patch(color=LIGHT[color], alpha=0.75, label=label) for color, label in _KINDS.items()]
+        legend = ax.figure.legend(
+            handles=looks, loc="outside upper right", ncols=2, handlelength=1.0, columnspacing=1.2
+        )
+        with_formulas(*legend.get_texts())
+
+    return _plot(f"Sobol indices of {figure}", draw, figure, height=1.0 + 0.45 * len(shown))
+
+
+def _plot(
+    label: str, draw: Callable[[Axes], None], name: str, text: str = "", height: float = _HEIGHT
+) -> dict[str, Any]:
+    """Return a plot with the name and the text above it. `label` is for screen readers; the height is in inches."""
+
+    def drawn(figure: Figure) -> None:
+        draw(figure.subplots())
+
+    return {"name": name, "text": text, "svg": inline_svg(label, with_even_text(drawn), (_WIDTH, height), marked=True)}
 
 
 def _name_lines(name: str) -> list[str]:
