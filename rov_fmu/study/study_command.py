@@ -9,10 +9,10 @@ from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
 from rov_fmu.report.console import console, paragraph, print_end, shell_words
 from rov_fmu.report.progress import StudyParts, parts
-from rov_fmu.study.plan.plan import load_plan
-from rov_fmu.study.plan.prepared import vehicle_file
+from rov_fmu.study.plan.plan import PlanError, load_plan
 from rov_fmu.study.results.store import PAGE, STUDY, is_description
 from rov_fmu.study.run.run_study import do_study
+from rov_fmu.vehicle.shipped import named_in
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
@@ -67,7 +67,7 @@ def study_plan(
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
     print_summary(results, spent)
     if vehicle and run is not None:
-        content = _motion_of(results, run, vehicle_file("vehicle", vehicle, plan))
+        content = _motion_of(results, run, named_in(plan, "vehicle", vehicle, PlanError))
         files |= write_whole(Output(motion, content), force=force)
     print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):

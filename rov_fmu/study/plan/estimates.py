@@ -45,25 +45,24 @@ class Estimates:
 
     def check(self) -> Iterator[str]:
         """Yield a line for each estimate that does not fit the plan or the FMU."""
-        plan, groups = self._plan, self._part.groups
-        if self._vehicle and not self._vehicle.intervals:
-            yield key_line(_KEY, "no coefficient of this vehicle has an interval", plan.vary_from)
-        elif self._vehicle and not self.names and not plan.vary:
-            yield key_line(
-                _KEY, "nothing varies, because [set] gives every coefficient that has an interval", plan.vary_from
-            )
-        if self.names and plan.sampler == "grid":
-            yield key_line(
-                _KEY, "a grid needs values or a range, but estimated coefficients have distributions", plan.vary_from
-            )
-        for name, value in zip(self.names, self._part.values.tolist(), strict=True):
-            if reason := unsettable(name, self._has):
-                yield key_line(_KEY, reason, plan.vary_from)
-            elif reason := self._has[name].wrong(value):
-                yield key_line(_KEY, f"{name} of this vehicle does not fit the FMU: it {reason}", plan.vary_from)
-        if plan.sampler == "saltelli" and len(self.names) > len(groups) + len(plan.vary) == 1:
+        plan = self._plan
+        yield from (key_line(_KEY, reason, plan.vary_from) for reason in self._misfits())
+        if plan.sampler == "saltelli" and len(self.names) > len(self._part.groups) + len(plan.vary) == 1:
             reason = "Sobol indices need independent variables, but all varied variables are correlated"
             yield key_line("sampler", reason, plan.sampler)
+
+    def _misfits(self) -> Iterator[str]:
+        if self._vehicle and not self._vehicle.intervals:
+            yield "no coefficient of this vehicle has an interval"
+        elif self._vehicle and not self.names and not self._plan.vary:
+            yield "nothing varies, because [set] gives every coefficient that has an interval"
+        if self.names and self._plan.sampler == "grid":
+            yield "a grid needs values or a range, but estimated coefficients have distributions"
+        for name, value in zip(self.names, self._part.values.tolist(), strict=True):
+            if reason := unsettable(name, self._has):
+                yield reason
+            elif reason := self._has[name].wrong(value):
+                yield f"{name} of this vehicle does not fit the FMU: it {reason}"
 
     def warnings(self) -> Iterator[str]:
         """Yield a sentence for each property of the results that a reader may not expect."""

@@ -75,7 +75,7 @@ class Prepared:
 
 def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     """Check that a plan, read from `path`, fits an FMU. Raises PlanError with every reason."""
-    vehicle = load_vehicle(vehicle_file("vary_from", plan.vary_from, path)) if plan.vary_from else None
+    vehicle = load_vehicle(named_in(path, "vary_from", plan.vary_from, PlanError)) if plan.vary_from else None
     estimates = Estimates(plan, vehicle, model.variables)
     own, unread = [*check_plan(plan)], []
     from_file: Mapping[str, InputSignal] = {}
@@ -112,11 +112,6 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
         yield f"{model.name} has no inputs: its parameters and start values alone determine its runs"
     elif not {*names} & {*given}:
         yield f"the plan gives no input of the FMU ({some_of(names)}): all keep their start values"
-
-
-def vehicle_file(key: str, given: str, path: Path) -> Path:
-    """Return the vehicle file that a key names: one in the folder of the plan, or one that ships. Raises PlanError."""
-    return named_in(path, key, given, PlanError)
 
 
 def _file_inputs(plan: Plan, path: Path, model: Model) -> tuple[dict[str, InputSignal], Sequence[int]]:

@@ -72,9 +72,11 @@ class Results:
     def trajectories(self, runs: Sequence[int] | None = None) -> pd.DataFrame:
         """Return the kept outputs with a row for each `run` and time `t` (s), of the given runs, or of all runs that
         ended."""
-        table = self._trajectories((TIME, *self.outputs), None if runs is None else ds.field(RUN).isin([*runs]))
+        names = (TIME, *self.outputs)
+        columns = {RUN: ds.field(RUN), **{name: ds.field(TRAJECTORY, name) for name in names}}
+        table = self._table(columns, _ENDED if runs is None else _ENDED & ds.field(RUN).isin([*runs]))
         counts = pc.list_value_length(table[TIME]).to_numpy()
-        lists = {name: pc.list_flatten(table[name]) for name in (TIME, *self.outputs)}
+        lists = {name: pc.list_flatten(table[name]) for name in names}
         return pa.table({RUN: np.repeat(table[RUN].to_numpy(), counts), **lists}).to_pandas()  # type: ignore[no-any-return]
 
     def bands(self, output: str, quantiles: Sequence[float] = QUANTILES) -> pd.DataFrame:
@@ -130,11 +132,6 @@ class Results:
     def incomplete(self) -> pd.DataFrame:
         """The runs that ended but lack a figure, with their reasons."""
         return self.runs[self.runs[STATUS] == INCOMPLETE]
-
-    def _trajectories(self, names: Sequence[str], rows: Any = None) -> pa.Table:
-        """Return lists of the times and the outputs of the runs that ended, with their numbers."""
-        columns = {RUN: ds.field(RUN), **{name: ds.field(TRAJECTORY, name) for name in names}}
-        return self._table(columns, _ENDED if rows is None else _ENDED & rows)
 
     @cached_property
     def _rows(self) -> Any:

@@ -11,9 +11,8 @@ from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
 from rov_fmu.study.plan.prepared import Job
-from rov_fmu.study.plan.system_model import SystemModel
 from rov_fmu.study.run.run import Evaluation, Run, failed_run
-from rov_fmu.study.run.system_simulator import SystemSimulator
+from rov_fmu.study.run.system import SystemModel, SystemSimulator
 
 _MANY = 10.0
 """The seconds that the runs of a task may take in addition to the limit of one run. A task is made to take 1 s."""

@@ -21,7 +21,7 @@ from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.interrupts import ctrl_c_withheld, temporary_folder
 from rov_fmu.io.messages import FileError, StudyError, brief, reason_of
 from rov_fmu.io.output import WriteError
-from rov_fmu.study.run.rows import Rows
+from rov_fmu.study.run.run import Rows
 from rov_fmu.study.run.work import Work
 from rov_fmu.study.run.worker import Delivery, do_runs
 

@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Literal
 from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
-from rov_fmu.study.plan.plan import Plan, load_plan
-from rov_fmu.study.plan.prepared import Prepared, prepare, vehicle_file
-from rov_fmu.study.plan.system_model import SystemModel, read_system
+from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
+from rov_fmu.study.plan.prepared import Prepared, prepare
 from rov_fmu.study.results.store import Store, identity
 from rov_fmu.study.run.lanes import do_in_lanes
-from rov_fmu.study.run.system_simulator import half_step_words
+from rov_fmu.study.run.system import SystemModel, half_step_words, read_system
 from rov_fmu.study.run.work import Progress, Spent, Work
+from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
 if TYPE_CHECKING:
@@ -153,5 +153,5 @@ def _model(plan: Plan, path: Path, engine: Engine) -> Model:
     if plan.system:
         return read_system(path.parent / plan.system)
     assert plan.vehicle
-    vehicle = load_vehicle(vehicle_file("vehicle", plan.vehicle, path))
+    vehicle = load_vehicle(named_in(path, "vehicle", plan.vehicle, PlanError))
     return vehicle_model(vehicle) if engine == "lanes" else vehicle_fmu(vehicle)

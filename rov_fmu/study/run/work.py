@@ -9,7 +9,7 @@ from threading import Event, Thread
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.study.results.store import Store
-from rov_fmu.study.run.rows import Rows
+from rov_fmu.study.run.run import Rows
 
 _WATCH = 2.0
 """The progress is reported at least every so many seconds."""

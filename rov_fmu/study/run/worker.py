@@ -16,7 +16,7 @@ from distributed.diagnostics.plugin import WorkerPlugin
 from rov_fmu.study.plan.figures import Array
 from rov_fmu.study.plan.prepared import Job
 from rov_fmu.study.run.child import Child
-from rov_fmu.study.run.rows import Rows, rows_of
+from rov_fmu.study.run.run import Rows, rows_of
 
 
 class _Pool:

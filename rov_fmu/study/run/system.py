@@ -1,0 +1,144 @@
+"""The system (SSP) that a study runs many times. Its variables are those of all components, with the names
+component.variable."""
+
+import zipfile
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, replace
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from rov_fmu.bridges.system.connections import Connection
+from rov_fmu.bridges.system.half_step import half_step
+from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
+from rov_fmu.bridges.system.part import Part
+from rov_fmu.bridges.system.ssp import read_ssp
+from rov_fmu.fmus.description import budget
+from rov_fmu.fmus.instance import RunError
+from rov_fmu.fmus.unpacking import unpack_fmu
+from rov_fmu.fmus.variable import Value, Variable
+from rov_fmu.io.child_process import ChildError, ChildProcess
+from rov_fmu.io.interrupts import temporary_folder
+from rov_fmu.io.reading import read_bytes
+from rov_fmu.study.plan.model import Model
+from rov_fmu.study.plan.prepared import Job
+
+
+@dataclass(frozen=True, kw_only=True)
+class SystemModel(Model):
+    """A system, whose content is that of the SSP."""
+
+    sources: Mapping[str, str]
+    """The path of the FMU of each component in the SSP."""
+    values: Mapping[str, Mapping[str, Value]]
+    """The start values of each component."""
+    connections: Sequence[Connection]
+
+    def unpack(self, folder: Path) -> None:
+        """Unpack the FMU of each component into a folder of its own. Raises FileError."""
+        with zipfile.ZipFile(BytesIO(self.content)) as archive:  # read_ssp has checked it
+            for name, own in folders_of(folder, self.sources).items():
+                unpack_fmu(BytesIO(archive.read(self.sources[name])), Path(f"{self.name}: {name}"), own)
+
+    def running(self, folder: str) -> str:
+        """Return the component that a process ran which did not return."""
+        return busy(folder, self.sources)
+
+
+def split(name: str) -> Name:
+    """Return the component and the variable of a name."""
+    component, _, own = name.partition(".")
+    return component, own
+
+
+def read_system(path: Path) -> SystemModel:
+    """Read a system. Raises FileError."""
+    system = read_ssp(path)
+    connected = {one.end for one in system.connections}
+    variables = {
+        f"{component}.{name}": _variable(
+            component, part, name, system.values[component], (component, name) in connected
+        )
+        for component, part in system.parts.items()
+        for name in part.variables
+        if part.variables[name].kind != "String"
+    }
+    return SystemModel(
+        name=path.name,
+        content=read_bytes(path),
+        variables=variables,
+        sources=system.sources,
+        values=system.values,
+        connections=system.connections,
+    )
+
+
+def _variable(component: str, part: Part, name: str, values: Mapping[str, Value], connected: bool) -> Variable:
+    """Return a variable of a component with its start value in the system. One that is connected cannot be set."""
+    own = part.variables[name]
+    return replace(
+        own,
+        name=f"{component}.{name}",
+        start=float(values.get(name, own.start)),
+        can_be_set=own.can_be_set and not connected,
+        causality="connected" if connected else own.causality,
+    )
+
+
+# ---- Its runs --------------------------------------------------------------------------------------------------------
+
+
+class SystemSimulator:
+    """An unpacked system, in a process of its own, with new instances for each run."""
+
+    def __init__(self, folder: str, job: Job, model: SystemModel) -> None:
+        self._job, self._model = job, model
+        self._master = Master(folder, [*model.sources], model.connections, [split(name) for name in job.recorded])
+
+    def run(self, values: Sequence[float], parts: int = 1) -> dict[str, npt.NDArray[Any]]:
+        """Run once and return every recorded variable at every communication point. Raises RunError.
+
+        `values` are those of the varied variables. Each step of the job is made of some `parts`, between which the
+        FMUs exchange values, too.
+        """
+        plan = self._job.plan
+        inputs = {split(name): np.repeat(signal, parts) for name, signal in self._job.inputs.items()}
+        start = {component: dict(own) for component, own in self._model.values.items()}
+        for name, value in {**plan.set, **dict(zip(self._job.varied, values, strict=True))}.items():
+            component, own = split(name)
+            start[component][own] = value
+        rows = [self._master.begin(start, plan.step / parts, plan.stop_time, plan.start_time, inputs)]
+        rows += self._master.step(plan.steps * parts)[parts - 1 :: parts]
+        columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
+        has = self._model.variables
+        return {name: column.astype(has[name].dtype) for name, column in zip(self._job.recorded, columns, strict=True)}
+
+    def renew(self) -> None:
+        """End the instances."""
+        self._master.end()
+
+    reset = renew
+
+
+def half_step_words(job: Job, model: SystemModel) -> str:
+    """Return a line about what half the step changes in one run of a study; none if nothing is connected."""
+    starts = dict.fromkeys(".".join(one.start) for one in model.connections)
+    if not (names := [name for name in starts if name in model.variables]):
+        return ""
+    alike, limits = replace(job, recorded=names), budget(2.0 * job.plan.time_limit)
+    with temporary_folder("system-") as folder:
+        model.unpack(Path(folder))
+        try:
+            with closing(ChildProcess(SystemSimulator, folder, alike, model, limits=limits)) as child:
+                runs = [child.call("run", job.trials[0], parts) for parts in (1, 2)]
+                child.call("renew")
+        except (ChildError, RunError) as error:
+            who = f"{model.running(folder)} " if isinstance(error, ChildError) else ""
+            return f"half the step was tried in one run, which cannot be done: {who}{error}"
+    rows, halved = (np.array([*run.values()], np.float64).T for run in runs)
+    half = half_step(rows, halved, [model.variables[name].unit for name in names])
+    return f"in one run, {half.words([*map(split, names)])}"
