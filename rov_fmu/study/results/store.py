@@ -208,9 +208,7 @@ def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
             schema, table = file.schema_arrow, file.read(None if whole else [RUN])
-        about, has = json.loads(schema.metadata[_ABOUT.encode()]), {*schema.names}
-        if TRAJECTORY in has:
-            has |= {f"{TRAJECTORY}.{inner.name}" for inner in schema.field(TRAJECTORY).type}
+        about, has = json.loads(schema.metadata[_ABOUT.encode()]), schema.empty_table().flatten().column_names
         first, end, of, digest = (about[key] for key in ("first", "end", "study", "digest"))
         rows = table[RUN].to_pylist()
         reason = _reason(of, study, digest)
@@ -225,7 +223,7 @@ def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
     columns = study["columns"]
     outputs = [TIME, *columns["outputs"]] if columns["outputs"] else []
     wanted = {*columns["parameters"], *columns["figures"], *(f"{TRAJECTORY}.{name}" for name in outputs)}
-    if lacking := sorted(wanted - has):
+    if lacking := sorted(wanted.difference(has)):
         raise FileError(f"{path}: lacks {listed(lacking)}")
     return first, end
 
