@@ -71,7 +71,7 @@ def strongest_of(tested: Tested, command: float) -> float:
 def beyond_tests(commands: Sequence[float], tested: Tested) -> Array:
     """Return the standard errors of ln V_ss because commands are stronger than those of the tests."""
     ratios = [abs(command) / strongest_of(tested, command) for command in commands]
-    return np.asarray(_EXPONENT * np.log(np.maximum(ratios, 1.0)))
+    return _EXPONENT * np.log(np.maximum(ratios, 1.0))
 
 
 def commands_of_answers(tested: Tested) -> list[float]:

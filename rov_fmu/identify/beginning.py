@@ -374,7 +374,7 @@ def _forces(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> Iterato
 def _drag_force(vehicle: Vehicle, axis: Axis, logs: Sequence[SampledLog]) -> float:
     """Return the drag along an axis at a large velocity by how fast the vehicle slows down, N or N m; 0 if unknown."""
     largest = 0.0
-    for channel in (m.channel for one in logs for m in one.measured if m.sensor.axis is axis):
+    for channel in (m.channel for one in logs for m in one.measured if m.axis is axis):
         time, speeds = velocities(channel)
         if len(speeds):
             slower = -changes(time, np.abs(speeds)) / changes(time, time)

@@ -69,7 +69,7 @@ def structures_of(fit: Fit) -> Iterator[Structure]:
         if n is not None:
             structure = replace(structure, value=_number(fit, n)[0], unit=parameters[n].unit)
         yield structure
-    if files := tuple(one.log.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
+    if files := tuple(one.file for one in fit.objective.logs if one.lost and _changes_anywhere(fit, one)):
         yield _named(fit, ("momentary commands", files), None, inf)
 
 
@@ -82,7 +82,7 @@ def _named(fit: Fit, suspect: Suspect, start: Start, odds: float) -> Structure:
 
 def _changes_anywhere(fit: Fit, sampled: SampledLog) -> bool:
     """Return True if commands that hold surely change within more than half of the time between two rows."""
-    index = fit.posterior.table.index(WIDTH, sampled.log.file)
+    index = fit.posterior.table.index(WIDTH, sampled.file)
     if sampled.is_momentary or index is None:
         return False
     _, low, _ = fit.posterior.ends(index)
@@ -110,12 +110,12 @@ def loggers_of(fit: Fit) -> Iterator[Logging]:
     # a delay that the vehicle does not keep belongs to the logger
     delay = float(posterior.z[lag]) if lag in posterior.absent else 0.0
     for sampled in fit.objective.logs:
-        index = table.index(OFFSET, sampled.log.file)
+        index = table.index(OFFSET, sampled.file)
         if index is None:
             continue
         offset, (low, high) = _number(fit, index)
-        width = table.get(posterior.z, WIDTH, sampled.log.file) * sampled.interval
-        yield Logging(sampled.log.file, sampled.interval, offset + delay, (low + delay, high + delay), width)
+        width = table.get(posterior.z, WIDTH, sampled.file) * sampled.interval
+        yield Logging(sampled.file, sampled.interval, offset + delay, (low + delay, high + delay), width)
 
 
 def command_times(fit: Fit) -> tuple[str, ...]:
@@ -139,7 +139,7 @@ def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
     """Yield the noise and the outliers of each measured quantity over all logs."""
     objective, table = fit.objective, fit.posterior.table
     seen = grouped(
-        (m.channel.quantity.name, (m, np.abs(data.normalised[record.sensor == number]) > _OUTLIER))
+        (m.quantity.name, (m, np.abs(data.normalised[record.sensor == number]) > _OUTLIER))
         for sampled, record, data in zip(objective.logs, objective.records, fit.best.data, strict=False)
         for number, m in enumerate(sampled.measured)
     )
@@ -148,4 +148,4 @@ def sensors_of(fit: Fit) -> Iterator[SensorNoise]:
         count = sum(len(m.channel.values) for m, _ in some)
         outliers = float(np.mean(np.concatenate([is_far for _, is_far in some])))
         wander = max(float(table.wander(fit.best.z, one, m.sensor)) for one in objective.logs)
-        yield SensorNoise(m.sensor.axis, name, m.channel.quantity.unit, *noise, count, outliers, wander)
+        yield SensorNoise(m.axis, name, m.quantity.unit, *noise, count, outliers, wander)

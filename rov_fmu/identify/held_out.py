@@ -95,7 +95,7 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
     for n in logs:
         others = [m for m in logs if m != n]
         words = "the other log" if len(others) == 1 else f"the other {len(others)} logs"
-        rest, middle = list({m.sensor.axis for m in objective.logs[n].measured}), len(objective.records[n].time) // 2
+        rest, middle = list({m.axis for m in objective.logs[n].measured}), len(objective.records[n].time) // 2
         halves = slice(middle), slice(middle, None)
         with_others = f" and {words}" if others else ""
         parts = [(slice(None), words if others else "the tables", DataPart(others, rows))]
@@ -189,15 +189,15 @@ def _predicted(
         for number, m in enumerate(sampled.measured):
             at = later & (record.sensor == number)
             is_left_out = m.sensor.is_velocity and (span < inf) != bool(sampled.lost)
-            if at.sum() < 10 or is_left_out or m.sensor.axis not in out.axes:
+            if at.sum() < 10 or is_left_out or m.axis not in out.axes:
                 continue
             off, deviation = off_all[at], deviations[at]
             measured = record.value[at]
             yield Prediction(
-                axis=m.sensor.axis,
-                file=sampled.log.file,
-                quantity=m.channel.quantity.name,
-                unit=m.channel.quantity.unit,
+                axis=m.axis,
+                file=sampled.file,
+                quantity=m.quantity.name,
+                unit=m.quantity.unit,
                 is_position=not m.sensor.is_velocity,
                 span=span,
                 by=out.by,
@@ -206,7 +206,7 @@ def _predicted(
                 predicted=measured - off,
                 deviation=deviation,
                 unchanged=unchanged(record.time[at], measured, span),
-                noise=objective.table.noise(z, m.channel.quantity.name)[0],
+                noise=objective.table.noise(z, m.quantity.name)[0],
                 error=rms(off),
                 coverage=float(np.mean(np.abs(off) <= NORMAL * deviation)),
                 loss=cost(off, deviation**2) / len(off),
@@ -235,7 +235,7 @@ def ahead(
             if share is _STEPS[-1]:
                 raise
     deviations = np.sqrt(run.variances + variances_of(slopes, covariance))
-    wraps = np.array([m.channel.quantity.wraps for m in objective.logs[number].measured])
+    wraps = np.array([m.quantity.wraps for m in objective.logs[number].measured])
     lost = wraps[objective.records[number].sensor]
     return run.innovations, np.where(lost, np.minimum(deviations, _LOST), deviations)
 

@@ -221,7 +221,7 @@ def _given_the_last(covariance: Array, count: int) -> Array:
     regression = covariance[first, last] @ np.linalg.pinv(covariance[last, last], hermitian=True)
     conditional = covariance[first, first] - regression @ covariance[last, first]
     np.fill_diagonal(conditional, np.maximum(np.diag(conditional), 0.0))
-    return np.asarray(conditional)
+    return conditional
 
 
 METHOD = (

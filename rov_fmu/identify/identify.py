@@ -146,7 +146,7 @@ def _axis(
     in all logs, and `vehicle` is that of the fit."""
     # The thrust of a wrench is the largest force in the logs, if there is any.
     is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
-    files = [one.log.file for one in fit.objective.logs if any(m.sensor.axis is axis for m in one.measured)]
+    files = [one.file for one in fit.objective.logs if any(m.axis is axis for m in one.measured)]
     slow = [*largest(d for d in found.disturbances if d.concerns(axis) and d.file in files)]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
@@ -163,7 +163,7 @@ def _axis(
     drivers = {thruster.curve for thruster in vehicle.layout.thrusters_along(axis)}
     acting = [effect for effect in found.effects if effect.of in {"", axis.name, *drivers}]
     limits = tests.description.tables.limits
-    is_other = not fit.ends or assess.differs(fit.objective.table, fit.ends, axis, tested)
+    is_other = assess.differs(fit.objective.table, fit.ends, axis, tested)
     shown = replace(fit.posterior, z=fit.file.posterior.z)
     result = AxisResult(
         axis=axis,
@@ -174,8 +174,8 @@ def _axis(
         points=tuple(p for p in points if p.subject == axis.name and p.quantity != "force"),
         next_test=next_test(fit.objective, shown, axis, limits, answers, tested) if answers else None,
         compared=assess.answers_of_file(against, axis) if against and against.layout.has(axis) else (),
-        structure=fit.structure[axis].ratio if axis in fit.structure else 0.0,
-        soon=fit.structure[axis].soon if axis in fit.structure else 0.0,
+        structure=fit.structure[axis].ratio,
+        soon=fit.structure[axis].soon,
         disturbances=slow,
         effects=acting,
         slips=[s for s in found.slips if s.file in files],
@@ -195,7 +195,7 @@ def _of_base(tests: Tests, fit: Fit, vehicle: Vehicle) -> Iterator[AxisOfBase]:
     """
     description = tests.description
     shown = {c.quantity.axis for log in tests.folder.logs for c in log.channels if not c.unused}
-    shown |= {m.sensor.axis for one in fit.objective.logs for m in one.measured}
+    shown |= {m.axis for one in fit.objective.logs for m in one.measured}
     lacking = [AXES[f.axis] for f in tests.folder.findings if f.kind in ("axis left out", "axis not pushed")]
     for axis in (*(axis for axis in vehicle.layout.bare_axes if axis not in fit.known.fitted), *lacking):
         is_of_file = axis.coefficient("a_d") in description.known

@@ -86,7 +86,7 @@ def next_test(
 
 def _widths(slopes: Array, covariance: Array) -> Array:
     """Return the relative half-widths of some intervals, which are never claimed to be narrower than EXACT."""
-    return np.asarray(np.maximum(QUANTILE * np.sqrt(variances_of(slopes, covariance)), EXACT))
+    return np.maximum(QUANTILE * np.sqrt(variances_of(slopes, covariance)), EXACT)
 
 
 def _at_least(tested: Tested, strength: float) -> Tested:

@@ -106,7 +106,7 @@ def _errors(objective: Objective, minimum: Minimum) -> dict[Axis, str]:
         off = objective.run(minimum.z, n, begin=begin, span=AHEAD).innovations
         for number, m in enumerate(sampled.measured):
             if len(own := off[counts & (record.sensor == number)]):
-                errors.setdefault(m.sensor.axis, {}).setdefault(m.channel.quantity, []).append(own)
+                errors.setdefault(m.axis, {}).setdefault(m.quantity, []).append(own)
     return {axis: _in_words(*next(iter(own.items()))) for axis, own in errors.items()}
 
 

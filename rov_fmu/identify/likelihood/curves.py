@@ -61,7 +61,7 @@ def _weights(commands: Array) -> Array:
     """Return the derivatives of eta at some commands with respect to the coordinates of a curve: ... x COUNT."""
     own, is_astern = _spline()(np.maximum(np.abs(commands), KNOTS[0])), (commands < 0.0)[..., None]
     knots = np.concatenate([np.where(is_astern, 0.0, own), np.where(is_astern, own, 0.0)], axis=-1)
-    return np.asarray(knots @ _root() / _POWER)
+    return knots @ _root() / _POWER
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +176,7 @@ _NODES = np.polynomial.legendre.leggauss(24)
 def _integral(of: Callable[[Array], Array], low: Array, high: Array) -> Array:
     """Return the integral of a function between arrays of ends."""
     middle, half = 0.5 * (low + high), 0.5 * (high - low)
-    return np.asarray(half * sum(weight * of(middle + half * node) for node, weight in zip(*_NODES, strict=True)))
+    return half * sum(weight * of(middle + half * node) for node, weight in zip(*_NODES, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,12 +201,12 @@ class Motions:
 
     def acceleration(self, v: Array) -> Array:
         """Return v', (18)."""
-        return np.asarray(self.of["C"] - np.sign(v) * self._slowing(v, np.abs(v)))
+        return self.of["C"] - np.sign(v) * self._slowing(v, np.abs(v))
 
     def _slowing(self, side: Array, speed: Array) -> Array:
         """Return the deceleration by the drag at some speeds, ahead or astern as the sign of `side`."""
         A, B = self.drag(side)
-        return np.asarray((B + A * speed * (np.maximum(speed, _SLOWEST) / self.typical) ** self._power(side)) * speed)
+        return (B + A * speed * (np.maximum(speed, _SLOWEST) / self.typical) ** self._power(side)) * speed
 
     @property
     def is_quadratic(self) -> bool:
@@ -235,7 +235,7 @@ class Motions:
             quadratic = A * v * (v / self.typical) ** power
             slope = B + (2.0 + power) * quadratic  # of the drag, which is (B + quadratic) v
             v = v * np.exp(np.clip((np.abs(C) / v - B - quadratic) / slope, -1.0, 1.0))
-        return np.asarray(np.where(C == 0.0, 0.0, v))
+        return np.where(C == 0.0, 0.0, v)
 
     def stopping_distance(self, v: Array, share: float) -> Array:
         """Return the distance from v until `share` of it without any force, m or rad."""
@@ -268,17 +268,17 @@ def measured_time_constant(motions: Motions, load: Array, T: Array, linear: Arra
 
     def ahead(t: Array) -> Array:
         e = np.exp(-t / T)
-        return np.asarray(lagging * T * ((2.0 - linear) * e - 0.5 * (1.0 - linear) * e**2))
+        return lagging * T * ((2.0 - linear) * e - 0.5 * (1.0 - linear) * e**2)
 
     def lacking(t: Array) -> Array:
         e = np.exp(-t / T)
-        return np.asarray(lagging * ((2.0 - linear) * e - (1.0 - linear) * e**2))
+        return lagging * ((2.0 - linear) * e - (1.0 - linear) * e**2)
 
     def rate(t: Array, w: Array) -> Array:
-        return np.asarray(motions.acceleration(w + ahead(t)))
+        return motions.acceleration(w + ahead(t))
 
     def slope(t: Array, w: Array) -> Array:
-        return np.asarray(h * (rate(t, w) - lacking(t)))
+        return h * (rate(t, w) - lacking(t))
 
     w, times, waits = -ahead(0.0 * h), np.full(goal.shape, inf), np.isfinite(Tau)
     for n in range(1000):

@@ -69,9 +69,9 @@ class Fit:
     file: FileFit
     """What the vehicle file can say, without weak effects: the values of the vehicle."""
     difference: float
-    """How much larger J is at the end of the second start."""
-    ends: tuple[Array, Array] | None = None
-    """The coordinates at the ends of both starts; None if the second one has none."""
+    """How much larger J is at the end of the second start; 0 if one was enough."""
+    ends: tuple[Array, Array]
+    """The coordinates at the ends of both starts, which are the same if one was enough."""
     starts: Starts = field(default_factory=dict)
     """The hypotheses about the structure that won, with the coordinates of their rows."""
     odds: Mapping[Suspect, float] = field(default_factory=dict)
@@ -140,7 +140,7 @@ def fit_all(
     began = process_time()
     work = work or ProgressReport()
     quick, full = (Objective.of_known(known, logs, rows, thinned=thinned) for thinned in (True, False))
-    ends, is_enough = _from_starts(quick, work)
+    ends = _from_starts(quick, work)
     start = StructureFit({}, quick, ends[0], 0.0, 0.0)
     is_mistake = start.predicted > ALARM and is_mistaken(full, ends[0].z, start.posterior.errors)
     most = _UNREFINED if is_mistake or start.is_hopeless else MOST_STEPS
@@ -177,7 +177,7 @@ def fit_all(
         work.steps("exact derivatives")(0)
         best = refined(full, near)
     posterior = Posterior.of(full.table, best.z, best.information)
-    difference = ends[-1].value - ends[0].value if len(ends) > 1 or is_enough else np.inf
+    difference = ends[-1].value - ends[0].value
     apart = [
         abs(ends[-1].z[n] - ends[0].z[n]) / max(posterior.errors[n], _SAME * full.deviation[n])
         for n in posterior.of_vehicle
@@ -201,7 +201,7 @@ def fit_all(
         posterior,
         replace(of_file, posterior=of_file.posterior.widened(ratios, unseen)),
         float(difference),
-        (ends[0].z, ends[-1].z) if len(ends) > 1 or is_enough else None,
+        (ends[0].z, ends[-1].z),
         {**dict.fromkeys(first), **search.now.starts},
         odds,
         tuple(one.posterior for one in search.rivals),
@@ -216,16 +216,16 @@ def _bending(objective: Objective, bent: frozenset[str]) -> Objective:
     return Objective.of_known(replace(objective.table.known, bent=bent), objective.logs, objective.rows)
 
 
-def _from_starts(quick: Objective, work: ProgressReport) -> tuple[list[Minimum], bool]:
-    """Return the minima of J of thinned logs from one start or two, the least first, and whether one was enough."""
+def _from_starts(quick: Objective, work: ProgressReport) -> list[Minimum]:
+    """Return the minima of J of thinned logs from two starts, the least first, or from one if that is enough."""
     work.leave_out(*(() if quick.table.known.measured_curves else SPLINE))
     ends: list[Minimum] = []
     for n, words in enumerate(_STARTS):
-        if is_enough := bool(ends) and not any(_is_loud(quick.table, end.z) for end in ends):
+        if ends and not _is_loud(quick.table, ends[0].z):
             break
         ends.append(least_from(quick, start_of(quick, n), work.steps(words)))
         work.fits(quick, min(ends, key=lambda end: end.value))
-    return sorted(ends, key=lambda end: end.value), is_enough
+    return sorted(ends, key=lambda end: end.value)
 
 
 def _is_loud(table: Table, z: Array) -> bool:

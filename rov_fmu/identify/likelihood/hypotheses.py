@@ -93,15 +93,15 @@ class Hypothesis:
 
 def _momentary(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
     coefficients, full = known.coefficients, known.full
-    return known, [one.with_lines(coefficients, full) if one.log.file in of else one for one in logs]
+    return known, [one.with_lines(coefficients, full) if one.file in of else one for one in logs]
 
 
 def _settled(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-    return known, [one.settled_at(at) if one.log.file in of and (at := one.jump) is not None else one for one in logs]
+    return known, [one.settled_at(at) if one.file in of and (at := one.jump) is not None else one for one in logs]
 
 
 def _averaged(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-    return known, [one.with_means() if one.log.file in of else one for one in logs]
+    return known, [one.with_means() if one.file in of else one for one in logs]
 
 
 def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
@@ -109,7 +109,7 @@ def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior
     assert isinstance(start, tuple)
     times, found = dict(zip(of, start, strict=True)), []
     for one in logs:
-        begin, end = times.get(one.log.file, (-inf, inf))
+        begin, end = times.get(one.file, (-inf, inf))
         acts = (one.record.told >= begin) & (one.record.told < end)
         found.append(one.with_inputs(np.where(acts[:, None], one.record.inputs, 0.0)))
     return known, found
@@ -176,13 +176,12 @@ def _differing(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, L
     known, logs = _of_layout(_with_own_curve)(known, logs, of, start)
     curve = known.layout.curves_by_name[own]
     values = {curve.name_of(key): known.coefficients.get(shared.coefficient(key), 0.0) for key in curve.keys}
-    exact = {curve.name_of(key) for key in (*shared.keys, "c_0") if shared.coefficient(key) in known.exact}
-    own_keys = {curve.name_of(f"{key}{end}") for key, end in (("a_t", REVERSE), ("b_t", REVERSE), ("c_0", ""))}
+    kept = {*shared.keys}.difference((f"a_t{REVERSE}", f"b_t{REVERSE}", "c_0"))
     return replace(
         known,
         coefficients={**known.coefficients, **values},
         curves=[*known.curves, curve],
-        exact=known.exact | (exact - own_keys),
+        exact=known.exact.union(curve.name_of(key) for key in kept if shared.coefficient(key) in known.exact),
         own_curves={**known.own_curves, own: (shared.name, name)},
     ), logs
 
@@ -207,28 +206,26 @@ def dive_commands(sampled: SampledLog) -> dict[str, Array]:
 
 def _momentary_files(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield the files with momentary commands."""
-    files = [one.log.file for one in logs if one.lost and not one.is_momentary]
+    files = [one.file for one in logs if one.lost and not one.is_momentary]
     if files:
         yield tuple(files)
 
 
 def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield the files whose first or last row has a command."""
-    files = [one.log.file for one in logs if np.abs(one.record.inputs[[0, -1]]).max() > LEAST_COMMAND]
+    files = [one.file for one in logs if np.abs(one.record.inputs[[0, -1]]).max() > LEAST_COMMAND]
     if files:
         yield tuple(files)
 
 
 def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each file in whose first half a horizontal velocity jumps. Beyond, too little is left to judge it by."""
-    yield from (
-        (one.log.file,) for one in logs if one.jump is not None and one.jump < np.mean(one.record.time[[0, -1]])
-    )
+    yield from ((one.file,) for one in logs if one.jump is not None and one.jump < np.mean(one.record.time[[0, -1]]))
 
 
 def _slow_tables(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield one suspect, about all tables with rows far apart, if there are any."""
-    files = [one.log.file for one in logs if one.is_slow_table]
+    files = [one.file for one in logs if one.is_slow_table]
     if files:
         yield tuple(files)
 
@@ -247,20 +244,20 @@ def lost_in_words(lost: Mapping[str, float], interval: float) -> dict[str, str]:
 
 def _of_lost(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
     """Return the files, and along which axis most of the command is lost between their rows."""
-    most = max((one for one in logs if one.log.file in of), key=lambda one: max(one.lost.values()))
+    most = max((one for one in logs if one.file in of), key=lambda one: max(one.lost.values()))
     return {"of": listed(of), **lost_in_words(most.lost, most.interval)}
 
 
 def _of_settled(_: Prior, logs: Logs, of: Of, _start: Start) -> dict[str, str]:
     """Return each file with the time since its first row from which its velocities count."""
-    some = (one for one in logs if one.log.file in of)
-    return {"of": listed(f"{one.log.file} (until {one.settled - one.record.told[0]:.1f} s)" for one in some)}
+    some = (one for one in logs if one.file in of)
+    return {"of": listed(f"{one.file} (until {one.settled - one.record.told[0]:.1f} s)" for one in some)}
 
 
 def _of_acting(_: Prior, logs: Logs, of: Of, start: Start) -> dict[str, str]:
     """Return each file whose commands do not always act, with the times since its first row between which they do."""
     assert isinstance(start, tuple)
-    told, words = {one.log.file: one.record.told for one in logs}, []
+    told, words = {one.file: one.record.told for one in logs}, []
     for file, (begin, end) in zip(of, start, strict=True):
         first, last = (f"{float(np.clip(t, *told[file][[0, -1]]) - told[file][0]):.1f}" for t in (begin, end))
         words.append(f"{file} ({first} to {last} s)")

@@ -190,7 +190,7 @@ def derivatives(function: Callable[[Array], Array], z: Array, indices: Sequence[
     """
     moves = [(k, sign * step) for k, step in zip(indices, steps.tolist(), strict=True) for sign in (1.0, -1.0)]
     found = function(changed(z, moves))
-    return np.asarray((found[:, ::2] - found[:, 1::2]) / (2.0 * steps))
+    return (found[:, ::2] - found[:, 1::2]) / (2.0 * steps)
 
 
 def cost(innovations: Array, variances: Array) -> float:
@@ -281,7 +281,7 @@ class Objective:
         def largest(speeds: Array) -> float:
             return float(np.quantile(speeds[speeds > 0.0], _REACHED)) if np.any(speeds > 0.0) else 0.0
 
-        measured = {m.sensor.axis: velocities[m.sensor.axis.velocity] for m in self.logs[number].measured}
+        measured = {m.axis: velocities[m.axis.velocity] for m in self.logs[number].measured}
         return {axis: (largest(-v), largest(v)) for axis, v in measured.items()}
 
     def changes(
@@ -309,8 +309,8 @@ class Objective:
         """Return False where a parameter certainly does not change what is predicted of a log."""
         sampled = self.logs[number]
         if parameter.log is not None:
-            return parameter.of == sampled.log.file
-        quantities = {m.channel.quantity.name for m in sampled.measured}
+            return parameter.of == sampled.file
+        quantities = {m.quantity.name for m in sampled.measured}
         layout = sampled.layout
         names = {"", HORIZONTAL, *layout.by_name, *layout.curves_by_name, *layout.curve_of, *quantities}
         return parameter.of in names and not parameter.is_fixed
@@ -323,12 +323,11 @@ class Objective:
             [partial(self.run, z, n, repeated=earlier[n] if earlier else None) for n in range(len(self.logs))]
         )
 
-    def row_values(self, z: Array, rows: Sequence[TableRow] | None = None) -> tuple[Array, Array]:
-        """Return the innovations of all or some of m rows of tables and their variances; m x n for n sets."""
-        rows = self.rows if rows is None else rows
-        measured = np.array([row.measured for row in rows])
-        off = (measured - modelled(rows, *self.table.model(z), self.table.least_lag).T).T
-        noise = np.array([self.table.row_noise(z, row.noise) * row.scale for row in rows])
+    def row_values(self, z: Array) -> tuple[Array, Array]:
+        """Return the innovations of m rows of tables and their variances; m x n for n sets."""
+        measured = np.array([row.measured for row in self.rows])
+        off = (measured - modelled(self.rows, *self.table.model(z), self.table.least_lag).T).T
+        noise = np.array([self.table.row_noise(z, row.noise) * row.scale for row in self.rows])
         return off, noise**2
 
     @property

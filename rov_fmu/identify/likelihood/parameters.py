@@ -312,7 +312,7 @@ class Table:
 
     def of_log(self, z: Array, sampled: SampledLog) -> Parameters:
         """Return the sets of parameters of the filter for a log."""
-        file, layout = sampled.log.file, sampled.layout
+        file, layout = sampled.file, sampled.layout
         coefficients = self.coefficients(z)
         shapes = self._shapes(z, coefficients)
         for part, name in zip(CURRENT, ("V_N", "V_E"), strict=True):
@@ -332,7 +332,7 @@ class Table:
             along = slow(WANDER if sampled.record.wanders else "slow velocity", HORIZONTAL)
         if layout.has(HEAVE) and any(s.axis is HEAVE for s in sampled.record.sensors):
             down = slow("slow velocity", HEAVE.name)
-        noises = [self.noise(z, m.channel.quantity.name) for m in sampled.measured]
+        noises = [self.noise(z, m.quantity.name) for m in sampled.measured]
         powers = [self.powers(z, axis) for axis in axes]
         levers = {key: tuple(self.get(z, kind, "", part) for part in _PLACES) for key, kind in PLACED.items()}
         return Parameters(
@@ -350,10 +350,10 @@ class Table:
             levers=tuple(levers[m.sensor.is_velocity] if has_place(m.sensor) else AT_ORIGIN for m in sampled.measured),
             turn=self.get(z, TURN),
             scales=tuple(
-                np.exp(self.get(z, SENSOR_SCALE, m.sensor.axis.name)) if m.sensor.is_velocity else 1.0
+                np.exp(self.get(z, SENSOR_SCALE, m.axis.name)) if m.sensor.is_velocity else 1.0
                 for m in sampled.measured
             ),
-            offsets=tuple(self.get(z, SENSOR_OFFSET, file, m.channel.quantity.name) for m in sampled.measured),
+            offsets=tuple(self.get(z, SENSOR_OFFSET, file, m.quantity.name) for m in sampled.measured),
             mean_drifts=tuple(self.get(z, SENSOR_OFFSET, file, _of_estimator(part)) for part in CURRENT),
             offset=self.get(z, OFFSET, file) + self.get(z, "dead time"),
             width=self.get(z, WIDTH, file),
@@ -450,7 +450,8 @@ def _ramped(values: Sequence[float], spans: Sequence[float], rise: float) -> Ite
 
 def table_of(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[str]) -> Table:
     """Return all parameters for some logs. `row_noises` are the names of the tables whose rows have noise."""
-    parameters = tuple(p for p in _parameters(known, logs, row_noises) if p.deviation > 0.0)
+    every = _parameters(known, logs, row_noises)
+    parameters = tuple(p for p in every if p.deviation > 0.0 and p.of not in known.own_curves)
     return Table(known.layout, known.coefficients, known.full, parameters, known.exact, known)
 
 
@@ -505,7 +506,7 @@ def _parameters(known: Prior, logs: Sequence[SampledLog], row_noises: Sequence[s
 
 
 def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
-    for curve in (one for one in known.curves if one.name not in known.own_curves):
+    for curve in known.curves:
         name = curve.name
         is_measured = name in known.measured_curves
         yield make("thrust scale", name, deviation=1.0 if is_measured else known.thrust_errors.get(name))
@@ -541,7 +542,7 @@ def _of_curves(known: Prior, make: Make, shape: float) -> Iterator[Parameter]:
 
 def _advance(known: Prior, make: Make) -> Iterator[Parameter]:
     """Yield the loss of thrust with speed of each curve. Forces at rest, even exact ones, do not tell it."""
-    for curve in (one for one in known.layout.curves if one.name not in known.own_curves):
+    for curve in known.layout.curves:
         if "d" in curve.keys and not curve.tables and curve.coefficient("d") not in known.exact:
             yield make("advance", curve.name, mean=_lost(curve, known.coefficients))
             if f"d{REVERSE}" in curve.keys:
@@ -587,7 +588,7 @@ def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
 
 
 def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parameter]:
-    file, half = sampled.log.file, 0.5 * sampled.interval
+    file, half = sampled.file, 0.5 * sampled.interval
     share, width = (0.5, {"mean": 1.0, "low": 1.0}) if sampled.is_momentary else (1.0, {})
     mean = -half
     if sampled.has_means:  # their commands act in the intervals of the measurements, at known times
@@ -597,7 +598,7 @@ def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parame
     directions = CURRENT if "psi" in sampled.layout.state or sampled.layout.has_attitude else CURRENT[:1]
     for part in directions if sampled.shows_horizontal else ():
         yield make("current", file, part, log=number)
-    offsets = {m.channel.quantity.name: m.channel.quantity.unit for m in _with_offset(sampled)}
+    offsets = {m.quantity.name: m.quantity.unit for m in _with_offset(sampled)}
     if sampled.record.wanders:
         offsets |= dict.fromkeys(map(_of_estimator, directions), "m/s")
     for part, unit in offsets.items():
@@ -627,7 +628,7 @@ def _of_sensors(logs: Sequence[SampledLog], make: Make) -> Iterator[Parameter]:
         }
         for part in _PLACES if turns - {YAW} else _PLACES[:2] if turns else ():
             yield make(kind, "", part)
-    for axis in {m.sensor.axis: None for one in logs for m in one.seen_twice}:
+    for axis in {m.axis: None for one in logs for m in one.seen_twice}:
         yield make(SENSOR_SCALE, axis.name)
     for part in sorted({with_same_lag(sensor) for one in logs for sensor in one.record.sensors}):
         yield make("sensor lag", "", part)
@@ -650,7 +651,7 @@ def _of_noise(known: Prior, logs: Sequence[SampledLog], make: Make) -> Iterator[
         yield make("slow velocity", HORIZONTAL)
     if True in horizontal:
         yield make(WANDER, HORIZONTAL)
-    noises = grouped((m.channel.quantity.name, m.noise) for one in logs for m in one.measured)
+    noises = grouped((m.quantity.name, m.noise) for one in logs for m in one.measured)
     quieter = 0.0 if any(one.lost for one in logs) else _QUIETER
     for quantity, some in noises.items():
         mean = log(sorted(some)[len(some) // 2])

@@ -21,6 +21,7 @@ from rov_fmu.identify.likelihood.kinds import LAG, PRIORS
 from rov_fmu.identify.result import least_error
 from rov_fmu.io.groups import grouped
 from rov_fmu.tank.arrays import Array, Flags, rms
+from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.clocks import first_in_each, gaps, held, in_rows
 from rov_fmu.tank.columns import push_along
 from rov_fmu.tank.findings import Finding, about
@@ -81,6 +82,16 @@ class SampledChannel:
     noise: float
     """A first guess of the standard deviation of its white noise, SI units."""
 
+    @property
+    def axis(self) -> Axis:
+        """The axis of the motion that it measures."""
+        return self.sensor.axis
+
+    @property
+    def quantity(self) -> MeasuredQuantity:
+        """What it measures, with the unit."""
+        return self.channel.quantity
+
     def some_of(self, kept: Flags) -> "SampledChannel":
         """Return the channel with some of its samples."""
         time, values = self.channel.time[kept], self.channel.values[kept]
@@ -107,6 +118,11 @@ class SampledLog:
     """True if its rows have the means of commands and measurements over the interval before them."""
     settled: float = -inf
     """The time from which its horizontal velocities count, s: before, their sensor did not know them."""
+
+    @property
+    def file(self) -> str:
+        """The name of the log."""
+        return self.log.file
 
     @property
     def horizon(self) -> float:
@@ -188,7 +204,7 @@ class SampledLog:
         is_horizontal = any(s.is_horizontal for s in positions)
         axes = {s.axis for s in positions}
         velocities = (m for m in self.measured if m.sensor.is_velocity)
-        return [m for m in velocities if m.sensor.axis in axes or (is_horizontal and m.sensor.is_horizontal)]
+        return [m for m in velocities if m.axis in axes or (is_horizontal and m.sensor.is_horizontal)]
 
     @property
     def is_slow_table(self) -> bool:
@@ -238,7 +254,7 @@ class SampledLog:
 
     def _clear(self, m: SampledChannel) -> SampledChannel:
         """Return a channel without the means of an angle that may contain a jump by a full turn."""
-        raw = self.log.used(m.channel.quantity.name)
+        raw = self.log.used(m.quantity.name)
         if raw is None or raw.unwrapped[1] is raw.samples[1]:
             return m
         return m.some_of(_clear_of(0.0 if raw.samples[1].min() > -_AT_SEAM else pi, m.channel.values))
@@ -573,7 +589,7 @@ def _start(
     A velocity that is not measured is taken to be small, unless it is clearly not, or is that of a free decay.
     """
     start = dict(layout.at_rest)
-    first = {(m.sensor.axis.name, m.sensor.is_velocity): m for m in measured}
+    first = {(m.axis.name, m.sensor.is_velocity): m for m in measured}
     errors = {name: _CALM for name in layout.state if name not in DRIFTS}
 
     def of(axis: Axis, *, is_velocity: bool) -> tuple[float, float] | None:
@@ -605,7 +621,7 @@ def _start(
 
 def typical(some: Sequence[SampledLog], axis: Axis) -> float:
     """Return a large velocity along an axis in the logs, m/s or rad/s: the 90 % quantile of its size; 0 if unknown."""
-    speeds = (np.abs(velocities(m.channel)[1]) for one in some for m in one.measured if m.sensor.axis is axis)
+    speeds = (np.abs(velocities(m.channel)[1]) for one in some for m in one.measured if m.axis is axis)
     return max((float(np.quantile(of_one, 0.9)) for of_one in speeds if len(of_one)), default=0.0)
 
 
@@ -621,4 +637,4 @@ def velocities(channel: Channel) -> tuple[Array, Array]:
 def changes(time: Array, values: Array) -> Array:
     """Return by how much values change in about 1 s, from each sample that has another one so much later."""
     lag = max(1, int(np.searchsorted(time, time[0] + 1.0)))
-    return np.asarray(values[lag:] - values[:-lag])
+    return values[lag:] - values[:-lag]

@@ -152,10 +152,10 @@ def structure(objective: Objective, best: Minimum, *, ahead: bool = False) -> di
         for m, at, noise, change in zip(sampled.measured, masks, least, motion, strict=True):
             if at.sum() >= _FEWEST:
                 R = rms(errors[at])
-                found[m.sensor.axis] = Misfit(R).or_larger(found.get(m.sensor.axis, Misfit()))
+                found[m.axis] = Misfit(R).or_larger(found.get(m.axis, Misfit()))
                 if is_motion and moves(noise, change):
                     both = noise * sqrt(max(R**2 - 1.0, 0.0)), change
-                    errors_of.setdefault((m.sensor.axis, m.sensor.is_velocity), []).append(both)
+                    errors_of.setdefault((m.axis, m.sensor.is_velocity), []).append(both)
     for (axis, _), some in errors_of.items():
         most, motion = np.max(some, axis=0).tolist()
         found[axis] = found[axis].or_larger(Misfit(0.0, most / motion))
@@ -191,7 +191,7 @@ def with_steps(objective: Objective, best: Minimum, misfits: Mapping[Axis, Misfi
                 continue
             part = np.floor((record.time - record.time[0] - begin) / span)
             for number, m in enumerate(sampled.measured):
-                own, axis = record.sensor == number, m.sensor.axis
+                own, axis = record.sensor == number, m.axis
                 noise = hypot(m.noise, table.wander(best.z, sampled, m.sensor))
                 at = counts & own
                 if span == _SOON and at.sum() >= _FEWEST:
@@ -282,7 +282,7 @@ def _without_slow_noise(table: Table, z: Array) -> Array:
 
 def windows(objective: Objective, z: Array) -> dict[str, float]:
     """Return the part of the time between rows in which a command may change, of each log that does not tell when."""
-    found = {one.log.file: objective.table.get(z, WIDTH, one.log.file) for one in objective.logs if one.has_windows}
+    found = {one.file: objective.table.get(z, WIDTH, one.file) for one in objective.logs if one.has_windows}
     return {
         file: 1.0 if width > MOST_OF_ROW else max(float(width), CONSTANTS["narrowest"].value)
         for file, width in found.items()
@@ -308,7 +308,7 @@ def unseen_errors(objective: Objective, z: Array, before: Mapping[str, float], m
     """
     now, parameters = windows(objective, z), objective.table.parameters
     widths = [
-        one.interval * (before if one.is_momentary else now)[one.log.file] for one in objective.logs if one.has_windows
+        one.interval * (before if one.is_momentary else now)[one.file] for one in objective.logs if one.has_windows
     ]
     found = np.zeros((len(z), len(z)))
     vehicle, shapes = objective.table.model(z)
@@ -359,10 +359,10 @@ def times_of(objective: Objective, best: Array, files: Of) -> dict[str, tuple[fl
             z[n] = p.high if kind.slow and kind.slow.acts_as == "force" else p.low
     coefficients = table.coefficients(best)
     for n, sampled in enumerate(objective.logs):
-        if sampled.log.file not in files:
+        if sampled.file not in files:
             continue
         scale = np.array([float(table.force_unit(z, form.axis)) for form in sampled.layout.axes])
-        prompt = {m.sensor.axis for m in sampled.measured if m.sensor.is_velocity} or {*sampled.layout.bare_axes}
+        prompt = {m.axis for m in sampled.measured if m.sensor.is_velocity} or {*sampled.layout.bare_axes}
         scale[[form.axis not in prompt for form in sampled.layout.axes]] = inf
         first, time = objective.filters[n].force, objective.records[n].time
         at = first_in_each(time, 1.0 / _IDLE_STEP)
@@ -380,7 +380,7 @@ def times_of(objective: Objective, best: Array, files: Of) -> dict[str, tuple[fl
         begins, ends = rows(gain), rows(gain[::-1])
         if begins or ends:
             begin, end = time[at][begins] if begins else -inf, time[at][-1 - ends] if ends else inf
-            found[sampled.log.file] = float(begin), float(end)
+            found[sampled.file] = float(begin), float(end)
     return found
 
 

@@ -65,7 +65,7 @@ def _piece(objective: Objective, z: Array, number: int, run: FilterRun, index: i
     time = record.time[first_in_each(record.time, 1.0 / _STEP)]
 
     def at(times: Array, values: Array) -> Array:
-        return np.asarray(np.interp(time, times, values), np.float64)
+        return np.interp(time, times, values)
 
     causes = {"the time": time - time[0]}
     for quantity, words in _CHANNELS.items():
@@ -103,7 +103,7 @@ def _distance(objective: Objective, number: int, run: FilterRun, time: Array, ax
         return None
 
     def at(name: str) -> Array:
-        return np.asarray(np.interp(time, record.time, run.states[:, states.index(name)]), np.float64)
+        return np.interp(time, record.time, run.states[:, states.index(name)])
 
     x, y = at("x"), at("y")
     psi = at("psi") if "psi" in states else np.zeros(len(time))

@@ -57,7 +57,7 @@ def unknown_forces(objective: Objective, runs: Sequence[FilterRun]) -> Iterator[
     for number, (sampled, run) in enumerate(zip(objective.logs, runs, strict=True)):
         first, time = objective.filters[number].force, objective.records[number].time
         for index, form in enumerate(sampled.layout.axes, first):
-            yield UnknownForce(form.axis, sampled.log.file, time, run.states[:, index], run.deviations[:, index])
+            yield UnknownForce(form.axis, sampled.file, time, run.states[:, index], run.deviations[:, index])
 
 
 def _evidence(objective: Objective, best: Minimum, index: int) -> float:
@@ -126,7 +126,7 @@ def _disturbance(
         unit,
         evidence,
         axis=axis,
-        file=sampled.log.file,
+        file=sampled.file,
         share=size / usual,
         since=float(time[clear[0]] - time[0]) if len(clear) else None,
     )

@@ -99,6 +99,11 @@ class _Match:
     """By scale: the ratio of the values, divided by it, to the simulated motion, where the two are alike."""
 
     @property
+    def axis(self) -> Axis | None:
+        """The axis of the motion that it measures, if it is one."""
+        return self.channel.quantity.axis
+
+    @property
     def scales(self) -> list[float]:
         """The scales that lead to a ratio near 1, the most usual mistake first; none if the scale 1 does."""
         likely = [scale for scale, ratio in self.ratios.items() if abs(log(ratio)) < _NEAR]
@@ -180,12 +185,12 @@ def slips(
         for (file, quantity), words in sorted(told.items(), key=lambda item: item[0])
     )
     layout = objective.table.layout
-    axes = {axis for one, scale in first if scale < 0.0 and (axis := one.channel.quantity.axis)}
+    axes = {axis for one, scale in first if scale < 0.0 and (axis := one.axis)}
     drivers = {thruster.name for axis in axes for thruster in layout.thrusters_along(axis)}
     is_told = first in fits and not (drivers and any(map(apart(objective, best).get, drivers)))
     if not is_told:
         return tuple(mistakes), inf
-    concerned = {one.channel.quantity.axis for one, _ in first}
+    concerned = {one.axis for one, _ in first}
     return tuple(mistakes), worst({axis: one for axis, one in structure(*fits[first]).items() if axis in concerned})
 
 
@@ -201,7 +206,7 @@ def _inertias(known: Prior, objective: Objective, z: Array, errors: Array) -> It
 
 def _lightness(scaling: Scaling, axis: Axis, ratio: float, error: float) -> float:
     """Return how unlikely an inertia is that is below the vehicle's own. With k, it is k times as large."""
-    scale = min((abs(scale) for one, scale in scaling if one.channel.quantity.axis is axis), default=1.0)
+    scale = min((abs(scale) for one, scale in scaling if one.axis is axis), default=1.0)
     return max(-(ratio + log(scale)) / error, 0.0) ** 2
 
 
@@ -212,7 +217,7 @@ def _drag(scaling: Scaling, compared: Sequence[_Match], guessed: Sequence[str]) 
     """
     scales, ratios = dict(scaling), dict[str, list[float]]()
     for match in compared:
-        axis = match.channel.quantity.axis
+        axis = match.axis
         if axis and axis.name in guessed and match.ratios:
             scale, ratio = next(iter(match.ratios.items()))
             ratios.setdefault(axis.name, []).append(log(ratio * abs(scale / scales.get(match, 1.0))))
@@ -222,7 +227,7 @@ def _drag(scaling: Scaling, compared: Sequence[_Match], guessed: Sequence[str]) 
 def _customary(match: _Match, compared: Sequence[_Match], light: Collection[Axis]) -> Iterator[float]:
     """Yield the scales of knots and feet, where something speaks for them."""
     quantity = match.channel.quantity
-    others = [other for other in compared if other.channel.quantity.axis is quantity.axis and 1.0 in other.ratios]
+    others = [other for other in compared if other.axis is quantity.axis and 1.0 in other.ratios]
     for scale in _CUSTOMARY if quantity.axis and not quantity.axis.is_rotation and 1.0 in match.ratios else ():
         differs = any(abs(log(match.ratios[1.0] / other.ratios[1.0] / scale)) < _SAME for other in others)
         if (quantity.axis in light or differs) and (quantity.is_velocity or scale != _KNOTS):
@@ -254,10 +259,10 @@ def _frames(compared: Sequence[_Match]) -> Iterator[Scaling]:
 
     At least one of them is suspected of the other sign, and none moves like the vehicle of the priors as it stands.
     """
-    turned = [m for m in compared if m.channel.quantity.axis in _MIRRORED]
+    turned = [m for m in compared if m.axis in _MIRRORED]
     sources = grouped(((m.file, source), m) for m in turned for source in (m.channel.source, ""))
     for some in sources.values():
-        has_two = len({m.channel.quantity.axis for m in some}) > 1
+        has_two = len({m.axis for m in some}) > 1
         if has_two and any(-1.0 in m.scales for m in some) and not any(1.0 in m.ratios for m in some):
             yield frozenset((m, -1.0) for m in some)
 
@@ -288,7 +293,7 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
     except DivergedError:
         return
     for n, m in enumerate(sampled.measured):
-        at, used = record.sensor == n, (m.channel.quantity, m.channel.source)
+        at, used = record.sensor == n, (m.quantity, m.channel.source)
         channel = next(c for c in sampled.log.channels if not c.unused and (c.quantity, c.source) == used)
         time, raw = channel.samples
         units = _ANGLES if channel.quantity.unit.startswith("rad") else _LENGTHS
@@ -298,7 +303,7 @@ def _matches(objective: Objective, number: int, guessed: Sequence[str]) -> Itera
             likenesses[scale] = _likeness(m, record.time[at], np.interp(record.time[at], time, values), simulated[at])
         most = 1.0 - _ALIKE**2, _WORSE * min(unexplained for _, unexplained in likenesses.values())
         ratios = {k: ratio for k, (ratio, unexplained) in likenesses.items() if ratio > 0.0 and unexplained < min(most)}
-        yield _Match(sampled.log.file, channel, int(np.sum(sampled.thinned.sensor == n)), ratios)
+        yield _Match(sampled.file, channel, int(np.sum(sampled.thinned.sensor == n)), ratios)
 
 
 def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Array:
@@ -316,7 +321,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
         for end in ("", REVERSE):
             usual |= {axis.coefficient(f"a_d{end}"): drag, axis.coefficient(f"b_d{end}"): _SLOWEST * drag}
     parameters = replace(parameters, coefficients=usual)
-    is_angle = np.array([m.channel.quantity.unit == "rad" for m in sampled.measured])
+    is_angle = np.array([m.quantity.unit == "rad" for m in sampled.measured])
     parameters = replace(parameters, gain=Slow())
     heeding = replace(parameters, white=tuple(np.where(is_angle, 1.0, _UNHEEDED) * parameters.white))
     run = objective.filters[number].run
@@ -327,7 +332,7 @@ def _simulated(objective: Objective, number: int, guessed: Sequence[str]) -> Arr
 def _likeness(m: SampledChannel, time: Array, measured: Array, simulated: Array) -> tuple[float, float]:
     """Return the ratio of measured to simulated motion, and the share of the variance that it leaves unexplained."""
     if not m.sensor.is_velocity:
-        simulated = np.unwrap(simulated) if m.channel.quantity.wraps else simulated
+        simulated = np.unwrap(simulated) if m.quantity.wraps else simulated
         measured, simulated = changes(time, measured), changes(time, simulated)
     if len(measured) < 2 or not np.ptp(measured) or not np.ptp(simulated):
         return 0.0, 1.0
