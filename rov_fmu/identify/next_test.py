@@ -1,7 +1,6 @@
 """The test that would tell most: add the information of a proposed test, and compare the intervals."""
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 from math import inf, isfinite
 
@@ -12,7 +11,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.identify.assess import EXACT, beyond_tests
 from rov_fmu.identify.likelihood.curves import Motions
 from rov_fmu.identify.likelihood.filter import DivergedError, Record
-from rov_fmu.identify.likelihood.objective import Data, Objective
+from rov_fmu.identify.likelihood.objective import Data, DataPart, Objective
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, variances_of
 from rov_fmu.identify.result import Answer, NextTest, Tested, half_width
 from rov_fmu.tank.arrays import Array
@@ -143,18 +142,17 @@ def _information(objective: Objective, number: int, z: Array, axis: Axis, streng
         layout.at_rest,
         sampled.record.errors,
     )
-    proposed = copy(objective)
-    proposed.logs = [replace(other, record=record) if other is sampled else other for other in objective.logs]
-    proposed.records = [other.record for other in proposed.logs]
-    free = proposed.run(z, number, begin=0.0)
-    proposed.records[number] = replace(record, value=-free.innovations)
-    run = proposed.run(z, number)
+    proposed = objective.of(DataPart([number], []))
+    proposed.logs, proposed.records = [replace(sampled, record=record)], [record]
+    free = proposed.run(z, 0, begin=0.0)
+    proposed.records = [replace(record, value=-free.innovations)]
+    run = proposed.run(z, 0)
     parameters = enumerate(objective.table.parameters)
     concerned = [k for k, p in parameters if p.of_motion and p.log is None and objective.concerns(p, number)]
     steps = np.array([objective.table.parameters[k].step for k in concerned])
     # Where all innovations are 0, it does not matter that the gains of the filter would change, too.
     inside = z.copy()
     inside[concerned] = np.maximum(z[concerned], objective.low[concerned] + steps)
-    slopes = proposed.changes(inside, number, concerned, steps, run, begin=-1.0, span=inf)
+    slopes = proposed.changes(inside, 0, concerned, steps, run, begin=-1.0, span=inf)
     data = Data(run.innovations, run.variances, slopes, np.zeros_like(slopes), concerned, len(z))
     return data.information(slice(None))[1]

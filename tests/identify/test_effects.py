@@ -130,7 +130,8 @@ def test_a_made_up_kind_goes_through_fit_result_sentence_and_file(
         ". Nobody knows why",
         keys=("alpha",),
         is_coefficient=True,
-        of_axis=lambda _, form: {} if form.axis is HEAVE else None,
+        of_axis=("alpha",),
+        own=lambda _, form: {} if form.axis is HEAVE else {"deviation": 0.0},
         mean=1.0,
         null=1.0,
     )

@@ -8,9 +8,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
-from math import exp, inf, pi, radians
+from math import inf, pi, radians
 
 import numpy as np
+from scipy.special import expit
 
 from rov_fmu.equation.catalogue import COUPLED_AXES, CURVE, REVERSE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
@@ -46,6 +47,7 @@ Start = float | Acting | None
 Starts = Mapping[Suspect, Start]
 """Hypotheses that hold together, and where each begins or ends."""
 Change = Callable[[Prior, Logs, Of, Start], tuple[Prior, Logs]]
+Suspects = Callable[[Prior, Logs], Iterator[Of]]
 InWords = Callable[[Prior, Logs, Of, Start], dict[str, str]]
 
 
@@ -55,7 +57,7 @@ class Hypothesis:
 
     probability: float
     """The prior probability that it is true of any thrusters or files: how many folders have it."""
-    suspects: Callable[[Prior, Logs], Iterator[Of]]
+    suspects: Suspects
     """What may have it: thrusters, or files."""
     change: Change = lambda known, logs, _of, _start: (known, logs)
     """The model with it, beside its row."""
@@ -69,9 +71,6 @@ class Hypothesis:
     """If the number of its row is nearer than this to where it is absent, it is told as an effect alone."""
     ends: tuple[float, ...] = ()
     """The bounds of its row at which its number may be, because nothing lies beyond."""
-    why_no_null: str = ""
-    """Why nothing within its bounds is the model without it; empty if it is where its row has its null, or with
-    times that leave out nothing."""
     alarm: float = ALARM
     """The error over 10 s, relative to the noise, above which it is tried."""
     changes_thrust: bool = True
@@ -91,17 +90,13 @@ class Hypothesis:
 # ---- The changes of what the filter reads ----------------------------------------------------------------------------
 
 
-def _momentary(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-    coefficients, full = known.coefficients, known.full
-    return known, [one.with_lines(coefficients, full) if one.file in of else one for one in logs]
+def _in_logs(changed: Callable[[Prior, SampledLog], SampledLog]) -> Change:
+    """Return the change of each log of some files, or of all logs if it is about none."""
 
+    def change(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
+        return known, [one if of and one.file not in of else changed(known, one) for one in logs]
 
-def _settled(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-    return known, [one.settled_at(at) if one.file in of and (at := one.jump) is not None else one for one in logs]
-
-
-def _averaged(known: Prior, logs: Logs, of: Of, _: Start) -> tuple[Prior, Logs]:
-    return known, [one.with_means() if one.file in of else one for one in logs]
+    return change
 
 
 def _without_idle(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
@@ -186,10 +181,6 @@ def _differing(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, L
     ), logs
 
 
-def _slewing(known: Prior, logs: Logs, _of: Of, _start: Start) -> tuple[Prior, Logs]:
-    return known, [one if one.log.follows_axis else one.refined(_FINEST) for one in logs]
-
-
 # ---- What may have them ----------------------------------------------------------------------------------------------
 
 
@@ -204,30 +195,24 @@ def dive_commands(sampled: SampledLog) -> dict[str, Array]:
     return {t.name: sampled.record.inputs[:, names.index(f"u_{t.name}")] for t in sampled.layout.thrusters}
 
 
-def _momentary_files(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield the files with momentary commands."""
-    files = [one.file for one in logs if one.lost and not one.is_momentary]
-    if files:
-        yield tuple(files)
+def _files(may_have: Callable[[SampledLog], bool]) -> Suspects:
+    """Return the function that yields one suspect, about all logs that may have something, if there are any."""
+
+    def suspects(_: Prior, logs: Logs) -> Iterator[Of]:
+        if files := tuple(one.file for one in logs if may_have(one)):
+            yield files
+
+    return suspects
 
 
-def _with_commands_at_ends(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield the files whose first or last row has a command."""
-    files = [one.file for one in logs if np.abs(one.record.inputs[[0, -1]]).max() > LEAST_COMMAND]
-    if files:
-        yield tuple(files)
+def _has_commands_at_ends(sampled: SampledLog) -> bool:
+    """Return True if the first or the last row has a command."""
+    return bool(np.abs(sampled.record.inputs[[0, -1]]).max() > LEAST_COMMAND)
 
 
 def _with_jumps(_: Prior, logs: Logs) -> Iterator[Of]:
     """Yield each file in whose first half a horizontal velocity jumps. Beyond, too little is left to judge it by."""
     yield from ((one.file,) for one in logs if one.jump is not None and one.jump < np.mean(one.record.time[[0, -1]]))
-
-
-def _slow_tables(_: Prior, logs: Logs) -> Iterator[Of]:
-    """Yield one suspect, about all tables with rows far apart, if there are any."""
-    files = [one.file for one in logs if one.is_slow_table]
-    if files:
-        yield tuple(files)
 
 
 def _with_both_velocities(_: Prior, logs: Logs) -> Iterator[Of]:
@@ -355,7 +340,7 @@ HYPOTHESES = {
     "unsettled velocity": Hypothesis(
         0.05,
         _with_jumps,
-        _settled,
+        _in_logs(lambda _, one: one if (at := one.jump) is None else one.settled_at(at)),
         sentence=(
             "{of}: the measured velocity is not that of the vehicle before it jumps, as of an estimator without a "
             "position{odds}. It is left out until then. Begin a dive when the estimator has its position"
@@ -367,8 +352,8 @@ HYPOTHESES = {
     ),
     "means of rows": Hypothesis(
         0.03,
-        _slow_tables,
-        _averaged,
+        _files(lambda one: one.is_slow_table),
+        _in_logs(lambda _, one: one.with_means()),
         sentence=(
             "{of}: each row has the means of its interval{odds}. They are compared with means, and angles whose mean "
             "may contain a jump by a full turn are left out. Log values of a moment, at 10 Hz or more"
@@ -376,11 +361,11 @@ HYPOTHESES = {
         alarm=0.0,  # rows far apart seem to have so much noise that no error is large
         changes_thrust=False,
         is_first=True,
-        why_no_null="a row has a mean or the value of a moment, and nothing lies between",
+        # no null: a row has a mean or the value of a moment, and nothing lies between
     ),
     "idle commands": Hypothesis(
         0.05,
-        _with_commands_at_ends,
+        _files(_has_commands_at_ends),
         _without_idle,
         sentence=(
             "{of}: the commands do not act before and after, as if the thrusters were off{odds}. They count as 0 "
@@ -408,7 +393,7 @@ HYPOTHESES = {
             "surge, sway and yaw: a motion along one turns or moves the vehicle along the others, by the Coriolis and "
             "Munk forces{odds}. The vehicle file says so by coupling = true"
         ),
-        why_no_null="these forces follow from the mass and the inertia, and nothing makes them smaller",
+        # no null: these forces follow from the mass and the inertia, and nothing makes them smaller
     ),
     "reversed commands": Hypothesis(
         0.03,
@@ -420,7 +405,7 @@ HYPOTHESES = {
         ),
         in_words=_of_twins,
         is_contrast=True,
-        why_no_null="a thruster pushes ahead or astern, and nothing lies between",
+        # no null: a thruster pushes ahead or astern, and nothing lies between
     ),
     "swapped commands": Hypothesis(
         0.03,
@@ -428,7 +413,7 @@ HYPOTHESES = {
         _permuted(lambda of: (of[::-1], 1.0)),
         sentence="thrusters {of}: their commands are swapped in the logs{odds}. Check the order of their columns",
         is_contrast=True,
-        why_no_null="two commands are swapped or not, and nothing lies between",
+        # no null: two commands are swapped or not, and nothing lies between
     ),
     "rotor lag": Hypothesis(
         0.07,
@@ -440,19 +425,19 @@ HYPOTHESES = {
         ),
         alarm=1.0,
         changes_thrust=False,
-        why_no_null="a lag of the speed and one of the force are the same only where both are 0, below their bounds",
+        # no null: a lag of the speed and one of the force are the same only where both are 0, below their bounds
     ),
     "momentary commands": Hypothesis(
         0.15,
-        _momentary_files,
-        _momentary,
+        _files(lambda one: bool(one.lost) and not one.is_momentary),
+        _in_logs(lambda known, one: one.with_lines(known.coefficients, known.full)),
         sentence=(
             "{of}: the log has momentary commands: about {share} of the {axis} command is lost between its rows "
             "({rate} per second). Fly in MANUAL, or log at 50 Hz, which ArduSub's own log cannot"
         ),
         in_words=_of_lost,
         changes_thrust=False,
-        why_no_null="a straight line between two rows is not a command that holds, however small the short force is",
+        # no null: a straight line between two rows is not a command that holds, however small the short force is
     ),
     "health": Hypothesis(
         0.1,
@@ -494,7 +479,7 @@ HYPOTHESES = {
     "slew limit": Hypothesis(
         0.03,
         _commanded,
-        _slewing,
+        _in_logs(lambda _, one: one if one.log.follows_axis else one.refined(_FINEST)),
         (3.0, 1.0, 0.3),
         "all thrusters: commands act as ramps, which take {value} from rest to full command{odds}. Check the ramp of "
         "the speed controllers, or a limit in the autopilot",
@@ -572,4 +557,4 @@ def apart(plain: Objective, z: Array) -> dict[str, bool]:
 
 def probability(odds: float) -> float:
     """Return the probability for 2 ln of the odds."""
-    return 1.0 / (1.0 + exp(min(max(-0.5 * odds, -50.0), 50.0)))
+    return float(expit(0.5 * odds))

@@ -111,8 +111,13 @@ class Kind(Coordinate):
     """The keys of the coefficients that only a vehicle with the effect has."""
     is_coefficient: bool = False
     """True if its number is the coefficient with the first of these keys."""
-    of_axis: Callable[[Prior, VehicleAxis], Mapping[str, Any] | None] = lambda *_: None
-    """What its parameter of an axis has in place of the fields above; None where the axis has no such parameter."""
+    of_axis: tuple[str, ...] = ()
+    """The keys of the coefficients that the fit may change of each axis that has such a parameter; empty if none has.
+    """
+    is_of_fitted: bool = False
+    """True if only the axes have one whose motion is tested."""
+    own: Callable[[Prior, VehicleAxis], Mapping[str, Any]] = lambda *_: {}
+    """What the parameter of an axis has in place of the fields above."""
     told_by: tuple[str, ...] = ()
     """The tests of an axis that tell it, which replace a coefficient of the base: `log`, `steady`, `astern` (steady
     velocities of negative commands) and `time_constant`."""
@@ -157,6 +162,12 @@ class Kind(Coordinate):
     differs_by_log: bool = False
     """True if it differs from log to log, but is about as large in all of them."""
 
+    def concerns(self, prior: Prior, form: VehicleAxis) -> bool:
+        """Return True if an axis has such a parameter."""
+        names, axis = {form.axis.coefficient(key) for key in self.of_axis}, form.axis
+        is_free = bool(names) and names <= {*prior.layout.coefficients} - prior.exact
+        return is_free and (axis in prior.fitted or not self.is_of_fitted)
+
 
 _of_noise = partial(Kind, is_log=True, of_motion=False)
 """Make the kind of a size or a time of noise or of a slow process."""
@@ -183,29 +194,19 @@ def _slow(prior: Deviation, slow: Process, usual: float, least: float, largest: 
 # ---- What the parameters of an axis have -----------------------------------------------------------------------------
 
 
-def _free(prior: Prior, form: VehicleAxis, key: str) -> bool:
-    """Return True if the fit may change a coefficient of an axis."""
-    name = form.axis.coefficient(key)
-    return name in prior.layout.coefficients and name not in prior.exact
-
-
-def _inertia(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
-    return {} if _free(prior, form, "beta") else None
-
-
 def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
     """Return the kind of a drag coefficient of an axis, ahead."""
 
-    def of_axis(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
-        free = _free(prior, form, key)
-        return {"mean": log(max(prior.coefficients[form.axis.coefficient(key)], 1e-9))} if free else None
+    def own_mean(prior: Prior, form: VehicleAxis) -> Mapping[str, Any]:
+        return {"mean": log(max(prior.coefficients[form.axis.coefficient(key)], 1e-9))}
 
     return Kind(
         deviation,
         keys=(key,),
         is_coefficient=True,
         told_by=("log", "steady"),
-        of_axis=of_axis,
+        of_axis=(key,),
+        own=own_mean,
         is_log=True,
         force_power=1.0,
         adapts=True,
@@ -216,14 +217,19 @@ def _drag(key: str, deviation: Deviation, **own: Any) -> Kind:
 def _power_of_drag(prior: Deviation, end: str = "", **own: Any) -> Kind:
     """Return the kind of the power of drag ahead, or of how much larger it is astern, of an axis that is fitted."""
 
-    def of_axis(known: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
-        free = form.axis in known.fitted and all(_free(known, form, f"{key}{end}") for key in ("a_d", "b_d"))
-        return {} if free else None
-
     note = ". The vehicle file has the linear and the quadratic drag that are nearest to it at the tested speeds"
     words = prior.words.removeprefix("the ")
     return Kind(
-        prior, words, note, of_axis=of_axis, low=-0.8, null=0.0, is_usual_if_right=True, needs_evidence=True, **own
+        prior,
+        words,
+        note,
+        of_axis=(f"a_d{end}", f"b_d{end}"),
+        is_of_fitted=True,
+        low=-0.8,
+        null=0.0,
+        is_usual_if_right=True,
+        needs_evidence=True,
+        **own,
     )
 
 
@@ -232,14 +238,10 @@ def _astern(prior: Deviation, words: str, **own: Any) -> Kind:
     return Kind(prior, words, is_ratio=True, null=0.0, **own)
 
 
-def _drag_astern(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
-    return {} if form.axis in prior.fitted and _free(prior, form, f"a_d{REVERSE}") else None
-
-
-def _load(prior: Prior, form: VehicleAxis) -> Mapping[str, Any] | None:
+def _load(prior: Prior, form: VehicleAxis) -> Mapping[str, Any]:
     full = prior.full[form.axis.name]
-    if not (full and _free(prior, form, "F_0")):
-        return None
+    if not full:
+        return {"deviation": 0.0}  # none
     given = prior.coefficients[form.axis.coefficient("F_0")]
     return {"null": -given / full, "factor": full, "offset": given, "unit": form.axis.load}
 
@@ -335,7 +337,7 @@ KINDS = {
         is_log=True,
         keys=("beta",),
         told_by=("log", "time_constant"),
-        of_axis=_inertia,
+        of_axis=("beta",),
         force_power=1.0,
         speed_power=-1.0,
         starts=(0.0, 0.0, 1.0),
@@ -362,7 +364,8 @@ KINDS = {
         "drag astern relative to drag ahead",
         keys=("a_d_reverse", "b_d_reverse"),
         told_by=("log", "astern"),
-        of_axis=_drag_astern,
+        of_axis=("a_d_reverse",),
+        is_of_fitted=True,
         adapts=True,
     ),
     POWER: _power_of_drag(
@@ -397,7 +400,8 @@ KINDS = {
         keys=("F_0",),
         is_coefficient=True,
         told_by=("log",),
-        of_axis=_load,
+        of_axis=("F_0",),
+        own=_load,
         finest=0.001,
         null=0.0,
         force_power=1.0,

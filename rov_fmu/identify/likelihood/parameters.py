@@ -583,8 +583,8 @@ def _of_axes(known: Prior, make: Make) -> Iterator[Parameter]:
     for axis in (*known.fitted, *known.unseen):
         form = known.layout.by_name[axis.name]
         for name, kind in KINDS.items():
-            if (own := kind.of_axis(known, form)) is not None:
-                yield make(name, axis.name, parts=[form], **own)
+            if kind.concerns(known, form):
+                yield make(name, axis.name, parts=[form], **kind.own(known, form))
 
 
 def _of_one_log(sampled: SampledLog, number: int, make: Make) -> Iterator[Parameter]:

@@ -485,13 +485,6 @@ class StructureFit:
         return {one: self.starts[one] for one, n in rows.items() if n is None or self.posterior.evidence(n) > WINS}
 
 
-def _fit_of(starts: Starts, objective: Objective, end: Minimum, prior: float, quick: float) -> StructureFit:
-    """Return the fit with some hypotheses, whose rows are where it ends."""
-    rows = {suspect: row_of(objective, suspect) for suspect in starts}
-    ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
-    return StructureFit(ends, objective, end, evidence(objective, end) + prior, quick)
-
-
 def fitted(
     near: StructureFit, plain: Objective, starts: Starts, prior: float, enough: float = -inf
 ) -> StructureFit | None:
@@ -518,7 +511,10 @@ def fitted(
         quick = evidence(thinned, end)
         if quick > enough:
             objective = applied(plain, starts)
-            return _fit_of(starts, objective, minimise(objective, scaled(objective, end.z), last=False), prior, quick)
+            end = minimise(objective, scaled(objective, end.z), last=False)
+            rows = {suspect: row_of(objective, suspect) for suspect in starts}
+            ends = {one: starts[one] if n is None else float(end.z[n]) for one, n in rows.items()}
+            return StructureFit(ends, objective, end, evidence(objective, end) + prior, quick)
     return None
 
 
@@ -765,9 +761,7 @@ class StructureSearch:
         The best of those that change the thrust come first, and then all others, whose fall is -inf: J hardly tells it.
         """
         now = self.now
-        predicted = filtered = now.predicted
-        if any(one.lost and not one.is_momentary for one in now.objective.logs):
-            filtered = worst(now.misfits)
+        predicted, filtered = now.predicted, worst(now.misfits)
         shown, others = list[Starts](), list[Starts]()
         # A hypothesis that won first may not be needed beside one that won later, and then no alarm tells it.
         (shown if filtered > ALARM else others).extend(self._smaller[1:])

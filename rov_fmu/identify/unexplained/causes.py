@@ -119,12 +119,9 @@ def _evidence(pieces: Sequence[_Piece], name: str, time_constant: float, effecti
     N ln r + k², with the share r of the power of f that is left by k c. The prior of k has the deviation 1 if c has the
     power of f. The variance of the rest, which is estimated in both models, costs the same in both.
     """
-    slow: list[Array] = []
-    cause: list[Array] = []
-    for piece in pieces:
-        for values, into in ((piece.slow, slow), (piece.causes[name] - piece.causes[name].mean(), cause)):
-            into.append(independent(piece.time, values, time_constant))
-    f, c = np.concatenate(slow), np.concatenate(cause)
+    beside_mean = ((one.time, one.causes[name] - one.causes[name].mean()) for one in pieces)
+    f = np.concatenate([independent(one.time, one.slow, time_constant) for one in pieces])
+    c = np.concatenate([independent(*one, time_constant) for one in beside_mean])
     power = float(c @ c) * float(f @ f)
     if power <= 0.0:
         return 0.0
