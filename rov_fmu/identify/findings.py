@@ -5,7 +5,7 @@ A finding is never read back: it only becomes a sentence in the terminal, in the
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import floor, inf, isfinite, log, log10
+from math import floor, inf, log, log10
 
 import numpy as np
 
@@ -293,7 +293,7 @@ def findings_of(identification: Identification) -> tuple[Finding, ...]:
 def prediction_name(p: Prediction) -> str:
     """Return the name of what is predicted: `heave depth, 10 s ahead`."""
     quantity = p.quantity if p.axis.name in p.quantity else f"{p.axis.name} {p.quantity}"
-    return f"{quantity}, {p.span:g} s ahead" if isfinite(p.span) else quantity
+    return f"{quantity}{p.ahead}"
 
 
 def _errors(p: Prediction) -> tuple[str, str]:

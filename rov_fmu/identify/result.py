@@ -188,6 +188,11 @@ class Prediction:
         return None if self.compared is None else rms(self.measured - self.compared)
 
     @property
+    def ahead(self) -> str:
+        """The span in words, `, 10 s ahead`; empty for a whole log. Rows 0.0999999 s apart make no other one."""
+        return f", {self.span:.3g} s ahead" if isfinite(self.span) else ""
+
+    @property
     def is_judged(self) -> bool:
         """True where the band says something: not of a position over a recording, whose errors add up."""
         return not self.is_position or self.span < inf

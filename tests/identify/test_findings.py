@@ -16,6 +16,7 @@ from rov_fmu.identify.findings import (
     extrapolated,
     findings_of,
     next_tests,
+    prediction_name,
     repairs,
     result_sentences,
     told,
@@ -404,6 +405,11 @@ def test_a_quiet_result_tells_nothing_but_its_verdict_and_its_errors() -> None:
         "surge distance, 10 s ahead: off by 0.050 m (RMS) in log_2.csv, and a prediction of no change by 0.70 m; 95% "
         "of the samples are inside the 95% band"
     )
+
+
+@pytest.mark.parametrize(("span", "words"), [(0.999999, ", 1 s ahead"), (0.25, ", 0.25 s ahead"), (np.inf, "")])
+def test_the_span_of_a_prediction_is_told_in_three_digits(span: float, words: str) -> None:
+    assert prediction_name(replace(DISTANCE, span=span)) == f"surge distance{words}"
 
 
 def test_the_main_prediction_is_that_of_a_position_over_10_s_with_the_largest_error_beside_its_noise() -> None:

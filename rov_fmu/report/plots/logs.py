@@ -1,7 +1,6 @@
 """The plot of a log: the commands, what was measured, and, after an identification, what was predicted."""
 
 from collections.abc import Sequence
-from math import isfinite
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -101,8 +100,7 @@ def _draw_prediction(ax: Axes, shown: Prediction, since: float, *, is_named: boo
     if shown.compared is not None:
         ax.plot(time, factor * shown.compared[some], "--", color=LIGHT["grey"], label=names[2])
     ax.margins(x=0.0, y=0.12)
-    ahead = f", {shown.span:g} s ahead" if isfinite(shown.span) else ""
-    name_axes(ax, f"{shown.quantity}{ahead}", unit)
+    name_axes(ax, f"{shown.quantity}{shown.ahead}", unit)
 
 
 def fill_band(ax: Axes, x: Array, low: Array, high: Array, color: str = "blue") -> None:
