@@ -6,10 +6,11 @@ So a command acts one step after the depth that it answers to.
 Each function gives the outputs at the end of every step, named as "rov.z".
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -118,10 +119,18 @@ def libcosim(folder: Path, parameters: str, *, osp: bool = False) -> Trajectory:
     return by_libcosim(system_files(folder, parameters)[osp], NAMES, STEPS, osp=osp)
 
 
-def by_libcosim(file: Path, names: Sequence[tuple[str, str]], steps: int, *, osp: bool = False) -> Trajectory:
+def by_libcosim(
+    file: Path,
+    names: Sequence[tuple[str, str]],
+    steps: int,
+    *,
+    osp: bool = False,
+    starts: Mapping[tuple[str, str], float] = MappingProxyType({}),
+) -> Trajectory:
     """Return some outputs of a system by libcosim, which knows the step.
 
-    It counts time in nanoseconds, so its steps are off by the last bits, and with them the results.
+    It counts time in nanoseconds, so its steps are off by the last bits, and with them the results. It ignores the
+    start values of outputs in an SSP, so they are given by `starts`.
     """
     from libcosimpy.CosimExecution import CosimExecution
     from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
@@ -132,6 +141,8 @@ def by_libcosim(file: Path, names: Sequence[tuple[str, str]], steps: int, *, osp
     execution = open_file(str(file))
     index = {component: execution.slave_index_from_instance_name(component) for component, _ in names}
     reference = {c: {v.name.decode(): v.reference for v in execution.slave_variables(i)} for c, i in index.items()}
+    for (component, name), value in starts.items():
+        assert execution.real_initial_value(index[component], reference[component][name], value)
     observer = CosimObserver.create_last_value()
     execution.add_observer(observer)
     rows = []

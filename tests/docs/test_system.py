@@ -22,12 +22,14 @@ from examples.system.system import (
     parameter_sets,
     system_files,
 )
+from examples.system.with_fmpy import fly
 from examples.tether import draw
 from rov_fmu.bridges.system import system
 from rov_fmu.bridges.system.plan import load_system_plan
 from rov_fmu.bridges.system.run import recorded_names
 from rov_fmu.bridges.system.ssp import PARAMETER_SET, read_ssp
 from rov_fmu.cli import main
+from rov_fmu.vehicle.shipped import SHIPPED
 from tests.bridges.system.fmus import undescribed_build
 from tests.commands import ROOT
 from tests.conftest import Made, without_page
@@ -169,26 +171,79 @@ def test_the_plan_of_the_page_is_a_system(tmp_path: Path, monkeypatch: pytest.Mo
     ]
 
 
+HEAVY = (ROOT / "examples" / "system" / "heavy.toml").read_text(encoding="utf-8")
+
+
+def _tethered(folder: Path) -> None:
+    """Write the system of the page, which runs for 20 s."""
+    (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
+    (folder / "plan.toml").write_text(block.replace("stop_time = 60", "stop_time = 20"), encoding="utf-8")
+
+
+def _with_battery(folder: Path, plan: str = HEAVY, waves: str = "false") -> None:
+    """Write the system of the Heavy, whose thrust falls with the voltage of the battery."""
+    vehicle = SHIPPED["bluerov2_heavy"].read_text(encoding="utf-8")
+    for before, more in (
+        ("format", f"waves = {waves}\n"),
+        ("c_0", 'V_0 = { value = 16.0, unit = "V", source = "s" }\nn_V = { value = 1.2, unit = "1", source = "s" }\n'),
+        ("[surface]", '[battery]\nvoltage = { value = 16.0, unit = "V", source = "s" }\n'),
+    ):
+        vehicle = vehicle.replace(f"\n{before}", f"\n{more}{before}", 1)
+    (folder / "rov.toml").write_text(vehicle, encoding="utf-8")
+    plan = plan.replace('"bluerov2_heavy"', '"rov.toml"').replace(
+        "connect = [", 'connect = [["battery.battery", "rov.battery"],'
+    )
+    (folder / "plan.toml").write_text(plan.replace("stop_time = 20", "stop_time = 8"), encoding="utf-8")
+
+
+def _in_a_seaway(folder: Path) -> None:
+    """Write the same in a seaway, which moves the tether, too."""
+    ends = ("water.current", "sea.steady"), ("sea.current", "rov.current"), ("sea.waves", "rov.waves")
+    sea = ", ".join(f'["{a}", "{b}"]' for a, b in [*ends, ("sea.waves", "tether.waves")])
+    plan = HEAVY.replace('["water.current", "rov.current"]', sea)
+    values = "{ H_s = 0.5, T_p = 6, spreading = 4, seed = 1 }"
+    _with_battery(folder, f'{plan}[component.sea]\ncompanion = "seaway"\nstart = {values}\n', "true")
+
+
+@pytest.fixture(scope="module", params=[_tethered, _with_battery, _in_a_seaway])
+def tethered(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The SSP of a system with a tether, beside which is its motion by the command."""
+    pytest.importorskip("moordyn")
+    folder = tmp_path_factory.mktemp("tethered")
+    request.param(folder)
+    with without_page():
+        assert main(["system", str(folder / "plan.toml"), "-o", str(folder / "plan.ssp"), "--run"]) == 0
+    return folder / "plan.ssp"
+
+
 @pytest.mark.interop
-@pytest.mark.parametrize("engine", ["libcosim, SSP", "Ecos, SSP"])
-def test_engines_agree_on_the_tether_of_the_page(engine: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize("engine", ["libcosim, SSP", "Ecos, SSP", "FMPy, 30 lines"])
+def test_engines_agree_on_tethers(engine: str, tethered: Path) -> None:
     """All states and forces; a tether is stiff, and shows steps that differ in their last bits."""
     if reason := ENGINES[engine].missing():
         pytest.skip(f"{engine}: {reason}")
-    pytest.importorskip("moordyn")
-    (block,) = re.findall(r"^```toml\n(.*?)^```", PAGE, re.MULTILINE | re.DOTALL)
-    (tmp_path / "tether.toml").write_text(block.replace("stop_time = 60", "stop_time = 20"), encoding="utf-8")
-    ssp = tmp_path / "tether.ssp"
-    with without_page():
-        assert main(["system", str(tmp_path / "tether.toml"), "-o", str(ssp), "--run"]) == 0
-    motion = np.genfromtxt(ssp.with_suffix(".csv"), delimiter=",", names=True, deletechars="")
-    structure = read_ssp(ssp)
+    motion = np.genfromtxt(tethered.with_suffix(".csv"), delimiter=",", names=True, deletechars="")
+    system, steps = read_ssp(tethered), len(motion) - 1
     # Those that follow an input at once are of the next step in Ecos.
-    names = [(c, name) for c, name in recorded_names(structure) if name not in structure.parts[c].direct]
+    names = [
+        (c, name)
+        for c, name in recorded_names(system)
+        if not system.parts[c].direct.get(name) and system.parts[c].variables[name].kind == "Real"
+    ]
+    assert {c for c, _ in names} == {*system.parts}
     if engine.startswith("Ecos"):
-        found = engines.by_ecos(ssp, names, 1000, 0.02)
+        found = engines.by_ecos(tethered, names, steps, 0.02)
+    elif engine.startswith("libcosim"):
+        outputs = {
+            (c, name): v
+            for c, values in system.values.items()
+            for name, v in values.items()
+            if name in system.parts[c].names("output")
+        }
+        found = engines.by_libcosim(tethered, names, steps, starts=outputs)
     else:
-        found = engines.by_libcosim(ssp, names, 1000)
+        rows = list(fly(str(tethered), 0.02, steps))
+        found = {name: np.array([row[name] for row in rows]) for name in map(".".join, names)}
     for name, values in found.items():
         np.testing.assert_allclose(values, motion[name][1:], rtol=0.0, atol=1e-9, err_msg=name)
 

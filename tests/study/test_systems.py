@@ -93,17 +93,27 @@ def test_a_damaged_system_is_one_line(folder: Path) -> None:
             run_study(folder / "plan.toml", folder / "results")
 
 
-def test_the_name_of_a_component_leads_out_of_no_folder(folder: Path) -> None:
-    """A stranger's system may have any names; the FMUs are unpacked into folders with numbers."""
+def rename(folder: Path, old: bytes, new: bytes) -> None:
+    """Give a component of the system another name."""
     with zipfile.ZipFile(folder / "my.ssp") as packed:
         files = {name: packed.read(name) for name in packed.namelist()}
     structure = "SystemStructure.ssd"
-    files[structure] = files[structure].replace(b'name="a"', b'name="../../a"').replace(b'"a"', b'"../../a"')
+    files[structure] = files[structure].replace(b'"%s"' % old, b'"%s"' % new)
     (folder / "my.ssp").write_bytes(archive(files))
-    before = {*folder.rglob("*")}
+
+
+def test_the_name_of_a_component_leads_out_of_no_folder(folder: Path) -> None:
+    """A stranger's system may have such names; the FMUs are unpacked into folders with numbers."""
+    rename(folder, b"a", b"/a")
     model = read_system(folder / "my.ssp")
-    assert "../../a.V_N" in model.variables
-    model.unpack(folder / "in" / "own")
-    new = {*folder.rglob("*")} - before
-    assert all(path.is_relative_to(folder / "in") for path in new)
-    assert {path.name for path in (folder / "in" / "own").iterdir()} == {"0", "1"}
+    assert "/a.V_N" in model.variables
+    model.unpack(folder / "own")
+    assert {path.name for path in (folder / "own").iterdir()} == {"0", "1"}
+    assert not Path("/a").exists()
+
+
+@pytest.mark.parametrize("name", ["a.1", "", "b"])
+def test_a_component_whose_variables_have_no_name_of_their_own_is_refused(name: str, folder: Path) -> None:
+    rename(folder, b"a", name.encode())
+    with pytest.raises(FileError, match=f"my.ssp: SystemStructure.ssd: the name of a component, '{name}', must not be"):
+        run_study(folder / "plan.toml", folder / "results")

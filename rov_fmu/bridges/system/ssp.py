@@ -148,6 +148,9 @@ def _structure(folder: Path, path: Path) -> SystemStructure:
         name = element.get("name", "")
         if etree.QName(element).localname != "Component":
             raise ValueError(f"{_STRUCTURE}: {shown(name)} is no component: systems in systems are not read")
+        if not name or "." in name or name in parts:  # a.b is the variable b of the component a
+            rule = "must not be empty, have a point, or be that of another component"
+            raise ValueError(f"{_STRUCTURE}: the name of a component, {shown(name)}, {rule}")
         source = sources[name] = element.get("source", "")
         if source not in read:
             read[source] = Part.open(Path(f"{path}: {name}"), _file(folder, source).read_bytes())

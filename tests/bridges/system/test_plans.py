@@ -161,6 +161,7 @@ WRONG = {
     ),
     "a start that is text": ("length = 20.0", 'length = "20"', "must be a number"),
     "a start out of bounds": ('fmu = "foreign.fmu"', 'fmu = "foreign.fmu"\nstart = { k = 11 }', "must be within 0"),
+    "a component with a point": ("component.water]", 'component."a.b"]', "component.a.b = 'a.b': must be at most 30"),
     "a file that is no FMU": ("foreign.fmu", "broken.fmu", "broken.fmu: is not an FMU, or is damaged"),
     "damaged terminals": ("foreign.fmu", "ports.fmu", "ports.fmu: terminalsAndIcons/terminalsAndIcons.xml: not XML"),
     "a file that is not there": ("foreign.fmu", "gone.fmu", "gone.fmu: there is no such file"),
