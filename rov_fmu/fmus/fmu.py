@@ -6,10 +6,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from lxml import etree
+from typing_extensions import Self
 
 from rov_fmu.fmu.terminals import FOLDER
 from rov_fmu.fmus.description import TIME_LIMIT, budget, described, read_description

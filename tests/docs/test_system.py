@@ -238,7 +238,7 @@ def test_engines_agree_on_tethers(engine: str, tethered: Path) -> None:
             (c, name): v
             for c, values in system.values.items()
             for name, v in values.items()
-            if name in system.parts[c].names("output")
+            if name in system.parts[c].names("output") and isinstance(v, float)
         }
         found = engines.by_libcosim(tethered, names, steps, starts=outputs)
     else:
