@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from typing_extensions import Self
 from rov_fmu.fmu.terminals import FOLDER
 from rov_fmu.fmus.description import TIME_LIMIT, budget, described, read_description
 from rov_fmu.fmus.instance import Array, LoadError, RunError
-from rov_fmu.fmus.simulation import Simulation
+from rov_fmu.fmus.simulation import Exchange, Simulation
 from rov_fmu.fmus.unpacking import opened_archive, unpack_fmu
 from rov_fmu.fmus.variable import Variable, variables_of
 from rov_fmu.io.child_process import ChildError, ChildProcess
@@ -42,7 +42,8 @@ class Fmu:
     def open(cls, path: Path, content: bytes | None = None, *, is_ours: bool = False) -> Self:
         """Read an FMU: the file at a path, or its content, of which messages say the path. Raises FileError.
 
-        `is_ours` is True for one that this process has just made, so that it needs no child process to read it.
+        `is_ours` is True for one that this process has just made, so that it needs no child process to read it, and may
+        be for Model Exchange alone.
         """
         content = read_bytes(path) if content is None else content
         with temporary_folder("fmu-") as folder:
@@ -50,7 +51,7 @@ class Fmu:
             description = described(folder) if is_ours else read_description(path, Path(folder))
         if description.fmiVersion[:1] not in ("2", "3"):
             raise FileError(f"{path}: is of FMI {description.fmiVersion}, and not of 2.0 or 3.0")
-        if description.coSimulation is None:
+        if description.coSimulation is None and not is_ours:
             raise FileError(f"{path}: is not for Co-Simulation")
         return cls(path, content, description)
 
@@ -97,6 +98,7 @@ class Fmu:
 
         - `times`: the communication points, s, at equal distances.
         - `inputs`: the value of each input, or its values at each time but the last one, which are held from there on.
+          In an FMU for Model Exchange alone, they are constant.
         - `record`, `start`: the variables that are read at each time, and the start values.
 
         Raises FileError, and RunError with the reason, also if the FMU ends its process or exceeds a limit.
@@ -105,9 +107,13 @@ class Fmu:
         held = {name: np.broadcast_to(np.asarray(values, np.float64), steps) for name, values in inputs.items()}
         with temporary_folder("fmu-") as folder:
             self.unpack(Path(folder))
-            run = (times, (times[-1] - times[0]) / steps, start, held, record)
+            step = (times[-1] - times[0]) / steps
+            run = partial(ChildProcess, Simulation, folder, times, step, start, held, record)
+            if self.description.coSimulation is None:
+                constant = {name: float(values) for name, values in inputs.items()}
+                run = partial(ChildProcess, Exchange, folder, times, {**start, **constant}, record)
             try:
-                with closing(ChildProcess(Simulation, folder, *run, limits=budget(time_limit))) as child:
+                with closing(run(limits=budget(time_limit))) as child:
                     found: dict[str, Array] = child.call("run", ())
             except ChildError as error:
                 raise RunError(f"it {error}") from error

@@ -1,4 +1,4 @@
-"""Runs of an unpacked FMU in one instance, where it can be reset."""
+"""Runs of an unpacked FMU: for Co-Simulation in one instance, where it can be reset, or else with FMPy's solver."""
 
 from collections import defaultdict
 from collections.abc import Callable, Mapping, Sequence
@@ -7,7 +7,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from rov_fmu.fmus.instance import WARNING, Array, CallError, Instance, RunError, Unpacked, check, last_message
+from rov_fmu.fmus.instance import (
+    WARNING,
+    Array,
+    CallError,
+    Instance,
+    LoadError,
+    RunError,
+    Unpacked,
+    check,
+    forget_message,
+    keep_message,
+    last_message,
+)
 from rov_fmu.io.messages import brief
 
 
@@ -115,3 +127,31 @@ class Simulation:
         except CallError as failed:
             return f"{failed}{last_message()}"
         return ""
+
+
+class Exchange:
+    """An FMU for Model Exchange alone, which FMPy integrates by CVODE, in a process of its own."""
+
+    def __init__(self, folder: str, times: Array, start: Mapping[str, float], record: Sequence[str]) -> None:
+        """What is recorded is read at each of the times."""
+        self._unpacked, self._times, self._start, self._record = Unpacked(folder), times, start, record
+
+    def run(self, _values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
+        """Run once and return every recorded variable at every time. Raises LoadError with FMPy's reason."""
+        import fmpy
+
+        forget_message()
+        try:
+            result = fmpy.simulate_fmu(
+                self._unpacked.folder,
+                validate=False,
+                start_time=self._times[0],
+                stop_time=self._times[-1],
+                output_interval=self._times[1] - self._times[0],
+                start_values=dict(self._start),
+                output=list(self._record),
+                logger=keep_message,
+            )
+        except Exception as error:  # FMPy raises that itself
+            raise LoadError(brief(f"{self._unpacked.without_folder(error)}{last_message()}", 240)) from error
+        return {name: np.interp(self._times, result["time"], result[name]) for name in self._record}
