@@ -179,7 +179,7 @@ def test_a_finger_on_a_stick_steers_until_it_is_lifted(browser: Any, address: Ca
 
 
 def test_a_step_test_stands_beside_what_was_measured_and_stops_at_its_end(page: Any, vehicle: Vehicle) -> None:
-    assert not page.locator("#live-measured").is_visible(), "the legend tells it only where something was measured"
+    page.locator("#live-measured").wait_for(state="hidden")  # the legend tells it only where something was measured
     (heave,) = (table for table in load_tables(vehicle) if table.axis is HEAVE)
     page.evaluate("live.speed = 10")
     for row in heave.rows:
