@@ -1,4 +1,4 @@
-"""An FMU for Co-Simulation that may come from anyone: what it has, and runs of it in a process with limits."""
+"""An FMU that may come from anyone: what it has, and runs of it in a process with limits."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import closing
@@ -30,7 +30,7 @@ _MOST_BYTES = 4_000_000
 
 @dataclass(frozen=True)
 class Fmu:
-    """An FMU for Co-Simulation of FMI 2.0 or 3.0."""
+    """An FMU of FMI 2.0 or 3.0 for Co-Simulation, or one of ours for Model Exchange alone."""
 
     path: Path
     """Where it is from, for messages."""

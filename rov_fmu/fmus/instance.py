@@ -7,9 +7,10 @@ arrays for each call, so that a step of the VideoRay with three inputs and seven
 import ctypes
 import os
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from dataclasses import dataclass
 from functools import cache, partial
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,21 @@ class Unpacked:
         self.folder = folder
         self.description = fmpy.read_model_description(folder, validate=False)
         self.variables = variables_of(self.description)
+
+    def simulated(self, **how: Any) -> Any:
+        """Run the FMU by FMPy, whose solver Model Exchange needs, and return its table. It raises what FMPy raises."""
+        import fmpy
+
+        forget_message()
+        with redirect_stdout(StringIO()):  # FMPy's warnings
+            return fmpy.simulate_fmu(
+                self.folder,
+                validate=False,
+                model_description=self.description,
+                remote_platform=None,
+                logger=keep_message,
+                **how,
+            )
 
     def without_folder(self, error: BaseException) -> str:
         """Return the reason of an exception, without the folder, which means nothing to a user."""

@@ -12,12 +12,9 @@ from rov_fmu.fmus.instance import (
     Array,
     CallError,
     Instance,
-    LoadError,
     RunError,
     Unpacked,
     check,
-    forget_message,
-    keep_message,
     last_message,
 )
 from rov_fmu.io.messages import brief
@@ -137,21 +134,15 @@ class Exchange:
         self._unpacked, self._times, self._start, self._record = Unpacked(folder), times, start, record
 
     def run(self, _values: Sequence[float]) -> dict[str, npt.NDArray[Any]]:
-        """Run once and return every recorded variable at every time. Raises LoadError with FMPy's reason."""
-        import fmpy
-
-        forget_message()
+        """Run once and return every recorded variable at every time. Raises RunError with FMPy's reason."""
         try:
-            result = fmpy.simulate_fmu(
-                self._unpacked.folder,
-                validate=False,
+            result = self._unpacked.simulated(
                 start_time=self._times[0],
                 stop_time=self._times[-1],
                 output_interval=self._times[1] - self._times[0],
                 start_values=dict(self._start),
                 output=list(self._record),
-                logger=keep_message,
             )
         except Exception as error:  # FMPy raises that itself
-            raise LoadError(brief(f"{self._unpacked.without_folder(error)}{last_message()}", 240)) from error
+            raise RunError(brief(f"{self._unpacked.without_folder(error)}{last_message()}", 240)) from error
         return {name: np.interp(self._times, result["time"], result[name]) for name in self._record}

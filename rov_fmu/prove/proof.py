@@ -1,8 +1,6 @@
 """Prove an FMU: run the experiments that it contains with FMPy, and compare the results with the expected ones."""
 
-import io
 from collections.abc import Sequence
-from contextlib import redirect_stdout
 from dataclasses import dataclass, replace
 from math import inf, isnan
 from pathlib import Path
@@ -11,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from rov_fmu.fmus.description import TIME_LIMIT
-from rov_fmu.fmus.instance import forget_message, keep_message, last_message
+from rov_fmu.fmus.instance import last_message
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.child_process import ChildError, LimitError
 from rov_fmu.io.csv_table import Series
@@ -77,7 +75,7 @@ def prove_fmu(
 
 
 def compare(subject: Subject, on_experiment: Progress = silent) -> list[ProofFinding]:
-    """Run the experiments of an FMU and compare the results, as `prove` does."""
+    """Run the experiments of an FMU and compare the results, as `prove_fmu` does."""
     fmu, wanted = subject.path, subject.interface
     has = [name for name, of in INTERFACES.items() if getattr(subject.description, of)]
     if not has or (wanted and wanted not in has):
@@ -114,7 +112,6 @@ class _Experiments(Runs):
             return [_failed(experiment, "has no expected results, so nothing is compared")]
         times, *expected = map(np.array, experiment.references.values())
         _, *names = experiment.references
-        forget_message()
         try:
             result = self._result(experiment, interface, names)
         except Exception as error:  # FMPy raises that itself, and the FMU may fail in any way
@@ -129,26 +126,18 @@ class _Experiments(Runs):
 
     def _result(self, experiment: Experiment, interface: str, names: Sequence[str]) -> Any:
         """Run an experiment with FMPy, Model Exchange with a tighter tolerance, and return its table."""
-        import fmpy
-
         share = _TOLERANCE_OF_SOLVER if interface == "model-exchange" else 1.0
-        with redirect_stdout(io.StringIO()):  # FMPy's warnings
-            return fmpy.simulate_fmu(
-                self.folder,
-                validate=False,
-                start_time=experiment.start,
-                stop_time=experiment.stop,
-                relative_tolerance=experiment.tolerance * share,
-                output_interval=experiment.step,
-                fmi_type=interface.title().replace("-", ""),
-                start_values=dict(experiment.parameters),
-                input=_signals(experiment.stimuli),
-                output=names,
-                model_description=self.description,
-                remote_platform=None,
-                debug_logging=True,
-                logger=keep_message,
-            )
+        return self.simulated(
+            start_time=experiment.start,
+            stop_time=experiment.stop,
+            relative_tolerance=experiment.tolerance * share,
+            output_interval=experiment.step,
+            fmi_type=interface.title().replace("-", ""),
+            start_values=dict(experiment.parameters),
+            input=_signals(experiment.stimuli),
+            output=names,
+            debug_logging=True,
+        )
 
 
 def _failed(experiment: Experiment, reason: str) -> ProofFinding:

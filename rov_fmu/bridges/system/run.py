@@ -26,8 +26,8 @@ _COLORS = (*LINES, "grey")
 """The colours of the lines of a panel."""
 _QUANTITIES = {"N": "force", "m": "place", "rad": "angle", "m/s": "velocity", "rad/s": "rate"}
 """The words for what a panel shows, by its unit."""
-_NODE = re.compile("_p[0-9]+$")
-"""The end of the names of what a tether has for a seaway at each node."""
+_NODE, _LEVEL = "_p[0-9]+$", "_[0-9]+$"
+"""The ends of members of terminals: of a tether's at each node, and of a profile's at each level."""
 _CALL = 0.5
 """The time that some steps should take, s. They are one call of the child process, and one step of the progress."""
 
@@ -54,11 +54,22 @@ def recorded_names(structure: SystemStructure) -> list[Name]:
     ]
 
 
+def _members(structure: SystemStructure, end: str) -> set[Name]:
+    """Return the variables that are members of terminals whose names have such an end."""
+    return {
+        (component, name)
+        for component, part in structure.parts.items()
+        for members in part.terminals.values()
+        for member, name in members.items()
+        if re.search(end, member)
+    }
+
+
 def _shown_starts(structure: SystemStructure) -> dict[Name, None]:
     """Return the outputs that are connected, without those by which a seaway and the nodes of a tether tell each other
     where they are and how the water moves."""
-    joined = structure.connections
-    return {one.start: None for one in joined if not (_NODE.search(one.start[1]) or _NODE.search(one.end[1]))}
+    nodes = _members(structure, _NODE)
+    return {one.start: None for one in structure.connections if one.start not in nodes}
 
 
 def passed(structure: SystemStructure) -> list[Name]:
@@ -149,10 +160,10 @@ def _panels(
 
     The levels of a profile are left out unless somebody chose the variables: `V_N_3` is beside `V_N`.
     """
-    parts = structure.parts
+    parts, levels = structure.parts, _members(structure, _LEVEL)
     of = {name: (parts[name[0]].variables[name[1]].unit, name[0], _end(name[1])) for name in names}
     for (unit, component, end), own in grouped((key, name) for name, key in of.items()).items():
-        plain = [name for name in own if not re.search(r"_[0-9]+$", name[1])]
+        plain = [name for name in own if name not in levels]
         shown = own if is_chosen or not plain else plain
         owner = ", ".join(filter(None, [component, end]))
         is_place = unit != "m" or own[0][1][0] in "xyz"  # and not the elevation of a sea

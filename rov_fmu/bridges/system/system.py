@@ -347,13 +347,14 @@ def _seabeds(
     parts: Mapping[str, Part], values: Mapping[str, dict[str, Value]], connections: Sequence[Connection]
 ) -> Iterator[str]:
     """Give what moves a tether the seabed that only the tether was told, and yield a line where they differ."""
-    for one in connections:
-        (water, _), (tether, name) = one.start, one.end
-        if (
-            name in ("depth_1", "V_N_p0")
-            and "seabed" in parts[water].variables
-            and (depth := values[tether].get("seabed"))
-        ):
+    moved = {
+        (one.start[0], one.end[0]): None
+        for one in connections
+        for terminal in ("profile", "waves")
+        if one.end[1] in parts[one.end[0]].terminals.get(terminal, {}).values()
+    }
+    for water, tether in moved:
+        if "seabed" in parts[water].variables and (depth := values[tether].get("seabed")):
             other = values[water].setdefault("seabed", depth)
             if other != depth:
                 reason = f"component.{water}.start.seabed is {other}: there is one seabed, which one of them is told"
