@@ -23,8 +23,15 @@ def undescribed_build(vehicle: Vehicle, path: Path, **_: Any) -> Any:
 
 
 @cache
-def foreign(unit: str = "m", kind: str = "Real", follows: bool = True, terminals: str = "", **attributes: str) -> bytes:
-    """Return the FMU of an amplifier in XML alone: its output y follows its input u, at once or after a step.
+def foreign(
+    unit: str = "m",
+    kind: str = "Real",
+    follows: bool = True,
+    terminals: str = "",
+    output: str = "y",
+    **attributes: str,
+) -> bytes:
+    """Return the FMU of an amplifier in XML alone: its output follows its input u, at once or after a step.
 
     The attributes are those of the units: the exponents and the factor.
     """
@@ -42,7 +49,7 @@ def foreign(unit: str = "m", kind: str = "Real", follows: bool = True, terminals
     <ScalarVariable name="u" valueReference="0" causality="input" variability="{changes}">
       <{kind}{has} start="{start}"/>
     </ScalarVariable>
-    <ScalarVariable name="y" valueReference="1" causality="output" variability="{changes}">
+    <ScalarVariable name="{output}" valueReference="1" causality="output" variability="{changes}">
       <{kind}{has}/>
     </ScalarVariable>
     <ScalarVariable name="k" valueReference="2" causality="parameter" variability="fixed">

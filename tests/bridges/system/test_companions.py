@@ -21,7 +21,7 @@ from rov_fmu.bridges.system.companions.current import Current
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.part import Part
-from rov_fmu.bridges.system.run import picture, recorded_names, run_system
+from rov_fmu.bridges.system.run import passed, picture, recorded_names, run_system
 from rov_fmu.bridges.system.ssp import SystemStructure
 from rov_fmu.cli import main
 from rov_fmu.equation.catalogue import SURGE
@@ -340,6 +340,15 @@ def test_a_plot_has_a_panel_for_each_quantity_and_few_lines_in_it() -> None:
     drawn = picture(structure, read, chosen, 1.0, rows)
     assert re.findall(r"font-weight:700[^>]*>([^<]+)<", drawn) == ["Velocity of water (m/s)"] * 2
     assert all(f">{name.partition('.')[2]}<" in drawn for name in chosen)
+
+
+def test_a_stranger_may_number_its_outputs() -> None:
+    """Nodes and levels are members of terminals; another output whose name ends like theirs is drawn and compared."""
+    parts = {name: Part.open(Path(name), foreign(output="y_p1")) for name in ("a", "b")}
+    structure = SystemStructure(parts, {}, [Connection(("a", "y_p1"), ("b", "u"))])
+    read = recorded_names(structure)
+    assert passed(structure) == [("a", "y_p1")]
+    assert ">y_p1<" in picture(structure, read, [], 1.0, np.arange(4.0)[:, None] + np.arange(len(read)))
 
 
 def test_a_file_that_a_plan_reads_is_not_replaced_by_force(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
