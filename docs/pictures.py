@@ -116,16 +116,14 @@ _IN_WAVES = ["sea.elevation", "rov.x", "rov.y", "rov.z", "autopilot.u_1", "autop
 
 
 def _flight(folder: Path) -> bytes:
-    """The plots of a flight of ArduSub in its simulator."""
-    log = os.environ.get(_LOG)
+    """The plots of a flight of ArduSub in its simulator, whose log is in the folder."""
+    log = next(folder.iterdir(), None)
     if not log:
         raise click.UsageError("ardusub.webp shows a flight of ArduSub: add --flight LOG")
     page = folder / "flight.html"
     _rov_fmu("inspect", log, "--report", page, folder=folder)
     return _webp(_screen(page, 900, part="figure.picture .broad"))
 
-
-_LOG = "ROV_FMU_FLIGHT"
 
 # ---- The page that flies, as a moving picture ------------------------------------------------------------------------
 
@@ -205,7 +203,8 @@ def _webp(picture: bytes) -> bytes:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture: what makes it in an empty folder, and the files that draw it, as patterns in the checkout."""
+    """A picture: what makes it in a folder that has at most the log of --flight, and the files that draw it, as
+    patterns in the checkout."""
 
     make: Callable[[Path], bytes]
     drawn_by: tuple[str, ...]
@@ -283,11 +282,11 @@ def _note(names: Iterable[str]) -> None:
 @click.option("--flight", type=click.Path(path_type=Path, exists=True), help="Log of a flight of ArduSub.")
 def main(names: tuple[str, ...], same: bool, flight: Path | None) -> None:
     """Make pictures."""
-    if flight:
-        os.environ[_LOG] = str(flight.resolve())
     for name in names or changed():
         if not same:
             with tempfile.TemporaryDirectory() as folder:
+                if flight:
+                    shutil.copy(flight, folder)
                 (HERE / name).write_bytes(PICTURES[name].make(Path(folder)))
         _note([name])
         click.echo(f"docs/{name}")

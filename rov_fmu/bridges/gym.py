@@ -22,7 +22,6 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from rov_fmu.autopilot.gains import autopilot_of
-from rov_fmu.autopilot.law import pulse_of
 from rov_fmu.autopilot.pilot import PLACES, Pilot
 from rov_fmu.c.stepper import LaneStepper
 from rov_fmu.io.messages import InputError, shown
@@ -152,7 +151,6 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
         Raises InputError if the thrusters cannot hold any axis.
         """
         layout = self.vehicle.layout
-        neutral, ahead, astern = pulse_of(layout)
         actions = np.empty((self.num_envs, len(self.commands)))
         for n in range(self.num_envs):
             if n not in self._pilots:
@@ -161,8 +159,7 @@ class RovVectorEnv(VectorEnv[Array, Array, Any]):
                 held -= set() if {"north", "east"} <= held else {"north", "east"}
                 self._pilots[n] = Pilot(made).hold(**dict.fromkeys(held, 0.0))
             now = dict(zip(layout.places, self._stepper.variables(n).tolist(), strict=True))
-            off = np.array([*self._pilots[n].step(now, self.length).values()]) - neutral
-            actions[n] = off / np.where(off > 0.0, ahead, astern)
+            actions[n] = [*map(layout.fraction_of, self._pilots[n].step(now, self.length).values())]
         return actions
 
     def _begin(self, which: NDArray[np.bool_]) -> None:

@@ -113,11 +113,11 @@ def reference_results(vehicle: Vehicle) -> dict[str, bytes]:
 
 
 def expected_files(
-    name_of: str, proofs: Sequence[ExpectedRun], variants: Sequence[ExpectedRun] = ()
+    subject: str, proofs: Sequence[ExpectedRun], variants: Sequence[ExpectedRun] = ()
 ) -> tuple[dict[str, bytes], list[Related]]:
     """Return the files of experiments by their path in the FMU, and as the manifest lists them.
 
-    `name_of` is the name of what the FMU is of. Those of `variants` have no expected results.
+    `subject` is the name of what the FMU models, in the descriptions. `variants` have no expected results.
     """
     sets = dict(one.parameters for one in (*proofs, *variants) if one.parameters)
     text = {
@@ -147,7 +147,7 @@ def expected_files(
                 tolerance=f"{TOLERANCE:g}",
                 steps=_STEPS,
                 seconds=_text,
-                description=f"{name_of}: {words}",
+                description=f"{subject}: {words}",
             )
             related.append(Related(f"{name}.exp", f"experiment/{purpose}", "application/x-ma-hs-experiments", title))
     return {f"{FOLDER}/{name}": content.encode() for name, content in text.items()}, related

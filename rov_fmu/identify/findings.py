@@ -643,7 +643,7 @@ def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
             return
         commands = dive.commands.in_rows
         ahead = [np.abs(push_along(layout, axis, commands)).max() for axis in (SURGE, SWAY) if layout.has(axis)]
-        (alone if max(ahead, default=0.0) < _ON_THE_SPOT else others).add(dive.file.partition(" (from ")[0])
+        (alone if max(ahead, default=0.0) < _ON_THE_SPOT else others).add(dive.whole_file)
     if others:
         yield about(
             "",

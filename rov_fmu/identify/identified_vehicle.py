@@ -19,7 +19,7 @@ from rov_fmu.equation.parts import EVERY_COMMAND, Curve, Part, Range
 from rov_fmu.identify.given import Tests
 from rov_fmu.identify.likelihood.curves import Quadratic, nearest
 from rov_fmu.identify.likelihood.fit import Fit
-from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND
+from rov_fmu.identify.likelihood.kinds import ABSENT, EFFECTS, EXACT_BAND, OWN_KEYS
 from rov_fmu.identify.likelihood.objective import changed
 from rov_fmu.identify.likelihood.posterior import QUANTILE, Posterior, around, hull
 from rov_fmu.identify.result import Identification, IdentifiedCoefficient, Interval
@@ -38,8 +38,6 @@ from rov_fmu.vehicle.writer import vehicle_text
 
 _DEAD_BAND = ("c_0", f"c_0{REVERSE}")
 """The keys of dead bands."""
-_OF_THRUSTER = ("a_t", "b_t", "c_0")
-"""What a thruster with a curve of its own has, ahead and astern, beside what it shares."""
 _WITHOUT_OUTLIERS = (0.005, 0.995)
 """The quantiles between which a quantity counts as tested."""
 _DIGITS = (6, 9, 17)
@@ -307,7 +305,7 @@ def _layout(tests: Tests, fit: Fit) -> Layout:
     def has(part: Part, key: str) -> bool:
         if isinstance(part, Curve) and part.name in table.known.own_curves:
             shared = table.layout.curves_by_name[table.known.own_curves[part.name][0]]
-            return key in part.keys and (key.removesuffix(REVERSE) in _OF_THRUSTER or has(shared, key))
+            return key in part.keys and (key.removesuffix(REVERSE) in OWN_KEYS or has(shared, key))
         name = part.coefficient(key)
         if key not in part.keys or name in given:
             return key in part.keys

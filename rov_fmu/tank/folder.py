@@ -159,7 +159,7 @@ class Folder:
         if self.mistakes or not (self.logs or self.rows):
             self.mistakes += self.unreadable
         left_out = self.rov_file.tables.leave_out
-        self.logs = [log.without(left_out.get(log.file.partition(" (from ")[0], ())) for log in self.logs]
+        self.logs = [log.without(left_out.get(log.whole_file, ())) for log in self.logs]
         self.logs = [piece for log in self.logs for piece in uninterrupted(checked_log(log))]
         if self.layout and self.layout.has_wrench:
             self._relate_to_full_force()

@@ -195,6 +195,11 @@ class Log:
     names: frozenset[str] = frozenset()
     """The keys that the tables [columns], [topics] and [valid] of rov.toml may have for this log."""
 
+    @property
+    def whole_file(self) -> str:
+        """The name of the file, also of a part of it."""
+        return self.file.partition(" (from ")[0]
+
     def used(self, name: str) -> Channel | None:
         """Return the channel that is used for a quantity, by the quantity's name, or None if nothing measures it."""
         return next((c for c in self.channels if c.quantity.name == name and not c.unused and c.count), None)

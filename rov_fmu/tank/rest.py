@@ -78,13 +78,7 @@ def _rests(depth: Channel, commands: Commands, layout: Layout, height: float) ->
     near, slow, agrees = 2.0 * height, shares < _SLOW, shares > _AGREES
     for start, end in _runs(slow):  # shorter ones come from pushes that change within a window
         slow[start : end + 1] = end - start >= _HALF // 2
-    stays, anchor = np.zeros(len(time), bool), np.inf
-    for n in np.flatnonzero(slow).tolist():
-        if not stays[n] or abs(place[n] - anchor) > _STILL:
-            anchor = float(place[n])
-            left = np.flatnonzero(np.abs(place - anchor) >= near)
-            k = int(np.searchsorted(left, n))
-            stays[left[k - 1] + 1 if k else 0 : left[k] if k < len(left) else None] = True
+    stays = _stays(place, slow, near)
 
     def side_of(at: float) -> float:
         """Return 1 at the surface, below which a vehicle is free, -1 at the bottom, and 0 between."""
@@ -112,6 +106,19 @@ def _rests(depth: Channel, commands: Commands, layout: Layout, height: float) ->
         where = f"at a depth of {at:.3g} m, hardly moving by a push that moves it elsewhere"
         where = "on deck" if at < -height else "at the surface" if at < near else where
         yield float(time[start]), float(time[end]), where
+
+
+def _stays(place: Array, slow: Flags, near: float) -> Flags:
+    """Return when the vehicle is within a distance, m, of a place where its motion contradicts the push, from when it
+    comes there until it leaves."""
+    stays, anchor = np.zeros(len(place), bool), np.inf
+    for n in np.flatnonzero(slow).tolist():
+        if not stays[n] or abs(place[n] - anchor) > _STILL:
+            anchor = float(place[n])
+            left = np.flatnonzero(np.abs(place - anchor) >= near)
+            k = int(np.searchsorted(left, n))
+            stays[left[k - 1] + 1 if k else 0 : left[k] if k < len(left) else None] = True
+    return stays
 
 
 def _shares(time: Array, place: Array, rows: Array, push: Array, times: Array) -> tuple[Array, Array]:

@@ -1,8 +1,8 @@
 """The expected results in the FMU of an autopilot, in the form of the standard FMI-LS-REF.
 
-They are a flight of its vehicle, of whose equation the solver in Python makes what the sensors tell, and the commands
-of the law in C that Python calls. So they test the binary, the interface and the order of the variables, and not the
-law.
+They are a flight of its vehicle. The solver in Python computes the motion, which the sensors tell. Python calls the law
+in C for the commands, which the FMU must repeat. So the results test the binary, the interface and the order of the
+variables, and not the law.
 """
 
 from collections.abc import Iterator, Sequence
@@ -68,17 +68,16 @@ def _flown(autopilot: Autopilot, names: Sequence[str]) -> Iterator[tuple[float, 
             if axis in autopilot.axes:
                 mode = PLACE if axis in (ROLL, PITCH) or (kind == RATE and axis not in (SURGE, SWAY)) else kind
                 pilot.modes[AXES.index(axis)] = mode
-                own = {"stick": 0.3, "ref": 0.1}
                 aims |= {f"mode_{axis.velocity}": mode, f"ref_{place}": _AIMS[place]}
-                aims |= {f"{name}_{axis.velocity}": value for name, value in own.items()}
+                aims |= {f"stick_{axis.velocity}": 0.3, f"ref_{axis.velocity}": 0.1}
                 pilot.aims[AXES.index(axis)] = {STICK: 0.3, RATE: 0.1, PLACE: _AIMS[place]}[mode]
         told = {**state, **vehicle.calculated({**others, **commands}, state), **aims}
         seen = {name: as_written(told[name]) for name in names}
         attitude = {name: seen[name] for name in QUATERNION if name in seen}
         angles: dict[str, float] = {}
         if attitude:  # as the FMU computes them from what it is told
-            own = vehicle.calculated({**others, **commands}, {**state, **attitude})
-            angles = {name: own[name] for name in vehicle.layout.angles if name in own}
+            computed = vehicle.calculated({**others, **commands}, {**state, **attitude})
+            angles = {name: computed[name] for name in vehicle.layout.angles if name in computed}
         now = angles | seen
         for _ in range(_HELD):
             commands = pilot.step(now, h, 1.0 - seen["sag"])

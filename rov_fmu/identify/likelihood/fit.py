@@ -134,8 +134,8 @@ def fit_all(
     that it bends. An assumed curve never bends: its shape would explain what a weak or reversed thruster does.
 
     Where predictions raise the alarm, `is_mistaken` tells for J, a point and its errors whether a mistake in a log is
-    the reason, and not the structure. Such a fit is not refined, because nobody should use it, nor one whose errors are
-    clearly wrong along all axes. Beyond _PATIENCE, the search for a cause of these ends after one round.
+    the reason, and not the structure. Such a fit is not refined, because nobody should use it. Neither is a fit that is
+    clearly wrong along all axes: after _PATIENCE, the search for its cause ends with the round.
     """
     began = process_time()
     work = work or ProgressReport()

@@ -16,7 +16,7 @@ from scipy.special import expit
 from rov_fmu.equation.catalogue import COUPLED_AXES, CURVE, REVERSE, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.identify.likelihood.filter import DivergedError
-from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OWN_BANDS, OWN_CURVE, PRIORS, TURN
+from rov_fmu.identify.likelihood.kinds import KINDS, LAG, OWN_BANDS, OWN_CURVE, OWN_KEYS, PRIORS, TURN
 from rov_fmu.identify.likelihood.objective import Objective
 from rov_fmu.identify.likelihood.prior import Prior
 from rov_fmu.identify.likelihood.records import LEAST_COMMAND, SampledLog
@@ -157,7 +157,7 @@ def _with_own_curve(layout: Layout, of: Of) -> Layout:
     if name not in layout.curve_of:
         return layout
     shared, own = layout.curve_of[name], _name_of_own(layout, name)
-    wanted = {*shared.keys, *(f"{key}{end}" for key in ("a_t", "b_t", "c_0") for end in ("", REVERSE))}
+    wanted = {*shared.keys, *(f"{key}{end}" for key in OWN_KEYS for end in ("", REVERSE))}
     current = shared.electric_current and replace(shared.electric_current, name=own)
     keys = tuple(key for key in CURVE if key in wanted)
     curve = replace(shared, name=own, keys=keys, electric_current=current)
@@ -166,6 +166,7 @@ def _with_own_curve(layout: Layout, of: Of) -> Layout:
 
 
 def _differing(known: Prior, logs: Logs, of: Of, start: Start) -> tuple[Prior, Logs]:
+    """Give one thruster a curve of its own, with the numbers of the one that it shared. Those astern may differ."""
     (name,), shared = of, known.layout.curve_of[of[0]]
     own = _name_of_own(known.layout, name)
     known, logs = _of_layout(_with_own_curve)(known, logs, of, start)

@@ -32,6 +32,8 @@ TURN = "turned velocity sensor"
 OWN_CURVE, OWN_BANDS = "curve of its own", ("dead band of its own", "dead band of its own astern")
 SENSOR_SCALE, SENSOR_OFFSET = "sensor scale", "sensor offset"
 """Kinds whose parameters are looked up by their name."""
+OWN_KEYS = ("a_t", "b_t", "c_0")
+"""What a thruster with a curve of its own has, ahead and astern, beside what it shares."""
 EXACT_BAND = 0.01
 """A dead band is never claimed to better than this command: thrust begins gradually."""
 

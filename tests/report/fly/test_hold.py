@@ -1,6 +1,6 @@
 """The page holds a vehicle by its own gains or as ArduSub does, by the law in C, and what a pilot does with it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from math import degrees
 from types import SimpleNamespace
 from typing import Any, cast
@@ -89,15 +89,20 @@ def test_the_heavy_flies_ahead_at_full_thrust_without_turning_over(page: Any, la
     assert abs(get(page, "theta")[0]) < 0.05, "it levels when the key is released"
 
 
-def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None:
-    """The heading swings by 0.16 rad in 25 s, because the thrusters have a dead band. So the test looks at 30 s."""
+def moved_by_keys(page: Any) -> Iterator[tuple[str, float]]:
+    """Dive and turn by keys, and yield the variable that exceeds 1 m or rad, and the time when its key is released."""
     page.evaluate("live.speed = 5")
     page.focus("#live-stage")
     for key, name in (("KeyF", "z"), ("KeyD", "psi")):
         page.keyboard.down(key)
         until(page, f"live.flight.pilot.model.get('{name}') > 1")
         page.keyboard.up(key)
-        time = page.evaluate("live.flight.time")
+        yield name, page.evaluate("live.flight.time")
+
+
+def test_it_dives_and_turns_by_keys_and_holds_what_it_reached(page: Any) -> None:
+    """The heading swings by 0.16 rad in 25 s, because the thrusters have a dead band. So the test looks at 30 s."""
+    for name, time in moved_by_keys(page):
         until(page, f"live.flight.time > {time + 45}")
         held = page.evaluate(
             """([name, from]) => live.flight.times.flatMap(
@@ -131,13 +136,7 @@ def test_a_vehicle_that_keeps_level_is_held_if_the_pilot_asks_for_it(fly: Callab
     assert page.input_value("#live-hold") == ""
     page.select_option("#live-hold", "own")
     assert "Depth and heading are held with gains that are made for this vehicle." in page.inner_text("#live-message")
-    page.evaluate("live.speed = 5")
-    page.focus("#live-stage")
-    for key, name in (("KeyF", "z"), ("KeyD", "psi")):
-        page.keyboard.down(key)
-        until(page, f"live.flight.pilot.model.get('{name}') > 1")
-        page.keyboard.up(key)
-        time = page.evaluate("live.flight.time")
+    for name, time in moved_by_keys(page):
         until(page, f"live.flight.time > {time + 15}")
         (before,) = get(page, name)
         until(page, f"live.flight.time > {time + 20}")
