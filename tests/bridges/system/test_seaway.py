@@ -80,6 +80,17 @@ def test_waves_of_any_depth_obey_airys_equations(depth: float) -> None:
     assert -water(made, t, *place[:2], 0.0)[2] == pytest.approx(surface[6], abs=1e-7)
 
 
+def test_a_sea_that_rises_is_calm_at_first_and_then_the_sea_without_a_rise() -> None:
+    rising, full, h, place = sea(rise=4.0, spreading=2.0), sea(spreading=2.0), 1e-4, (2.0, -1.0, 1.5)
+    assert water(rising, 0.0, *place)[[0, 1, 2, 6]] == pytest.approx(0.0, abs=1e-15)
+    for t in (0.5, 3.9):
+        rate = (water(rising, t + h, *place) - water(rising, t - h, *place)) / (2.0 * h)
+        assert rate[:3] == pytest.approx(water(rising, t, *place)[3:6], abs=1e-7), "A is the change of V"
+        assert water(rising, t, *place)[6] == pytest.approx(t / 4.0 * water(full, t, *place)[6])
+    for t in (4.0, 7.0):
+        assert (water(rising, t, *place) == water(full, t, *place)).all()
+
+
 def test_the_wave_number_has_its_deep_and_shallow_limits() -> None:
     omega = 2.0 * pi / 8.0
     assert sea(components=1, T_p=8.0, seabed=1e4).waves[0][2] == pytest.approx(omega**2 / G, rel=1e-12)
@@ -246,7 +257,7 @@ def test_a_neutral_tether_moves_with_the_water(tmp_path: Path) -> None:
     assert np.abs(of_line - of_water).max() < 0.03 * np.abs(of_water).max()
 
 
-@pytest.mark.parametrize(("name", "value"), [("T_p", 0.0), ("H_s", -1.0), ("seabed", float("nan"))])
+@pytest.mark.parametrize(("name", "value"), [("T_p", 0.0), ("H_s", -1.0), ("seabed", float("nan")), ("rise", -1.0)])
 def test_a_sea_that_cannot_be_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{name} must be from"):
         sea(**{name: value})

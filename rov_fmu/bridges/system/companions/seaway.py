@@ -42,6 +42,7 @@ VARIABLES: Variables = {
     "components": ("parameter", 100.0, "1", f"Number of components, 1 to {MOST}; 1 is a regular wave"),
     "seed": ("parameter", 1.0, "1", "Which sea of this spectrum: a whole number"),
     "seabed": ("parameter", 1000.0, "m", "Depth of the water"),
+    "rise": ("parameter", 0.0, "s", "Time in which the waves grow from a calm sea"),
     "step": ("parameter", 0.02, "s", "Step at the start, of whose middle the first values are"),
 }
 
@@ -84,6 +85,7 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
         "spreading": (0.0, 1e3),
         "components": (1.0, MOST),
         "seabed": (0.01, 1e6),
+        "rise": (0.0, 1e6),
         "step": (0.0, 1e3),
     }
 
@@ -95,6 +97,7 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
     components: float
     seed: float
     seabed: float
+    rise: float
     step: float
 
     def __init__(self, **arguments: object) -> None:
@@ -199,7 +202,8 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
                 V[n] += omega * share * value
                 A[n] += omega**2 * share * rate
             elevation += c
+        share, growth = (t / self.rise, 1.0 / self.rise) if t < self.rise else (1.0, 0.0)
         for n, (velocity, acceleration, steady) in enumerate(zip(VELOCITY, ACCELERATION, STEADY, strict=True)):
-            setattr(self, f"{velocity}{suffix}", getattr(self, f"{steady}{suffix}", 0.0) + V[n])
-            setattr(self, f"{acceleration}{suffix}", A[n])
-        setattr(self, f"elevation{suffix}", elevation)  # of a point of a tether it is no output
+            setattr(self, f"{velocity}{suffix}", getattr(self, f"{steady}{suffix}", 0.0) + share * V[n])
+            setattr(self, f"{acceleration}{suffix}", share * A[n] + growth * V[n])
+        setattr(self, f"elevation{suffix}", share * elevation)  # of a point of a tether it is no output
