@@ -44,7 +44,7 @@ def study_plan(
     if run is not None and not vehicle:
         raise FileError(f"{plan}: --mcap {run}: the plan must have `vehicle`, whose picture the file shows")
     with parts() as shown:
-        spent, store = do_study(
+        work = do_study(
             plan,
             output,
             workers,
@@ -56,8 +56,8 @@ def study_plan(
             **how,
         )
     if part:
-        words = f"part {part[0]} of {part[1]} is complete: {spent.runs} runs now, {spent.failed} failed"
-        paragraph(console(), f"{shell_words(store.folder)}: {words}")
+        words = f"part {part[0]} of {part[1]} is complete: {work.runs} runs now, {work.failed} failed"
+        paragraph(console(), f"{shell_words(output)}: {words}")
         return
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.results import Results
@@ -65,7 +65,7 @@ def study_plan(
 
     results = Results(output)
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
-    print_summary(results, spent)
+    print_summary(results, work.runs, work.elapsed)
     if vehicle and run is not None:
         content = _motion_of(results, run, named_in(plan, "vehicle", vehicle, PlanError))
         files |= write_whole(Output(motion, content), force=force)

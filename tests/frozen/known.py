@@ -179,11 +179,10 @@ def _study(folder: Path) -> str:
     from rov_fmu import Results
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.summary import print_summary
-    from rov_fmu.study.run.work import Spent
 
     with TemporaryDirectory() as temporary, _without_plots("study.results.plots"):
         results = Results(shutil.copytree(folder, Path(temporary, folder.name)))
-        summary = _said(lambda: print_summary(results, Spent(runs=len(results.runs), elapsed=2.0)))
+        summary = _said(lambda: print_summary(results, len(results.runs), 2.0))
         page = _text(study_page(results))
     return f"{summary}\n{page}".replace(f"{temporary}/", "")
 

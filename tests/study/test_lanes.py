@@ -1,7 +1,7 @@
 """A vehicle runs in lanes as its FMU does, whatever it has."""
 
 import shutil
-from contextlib import ExitStack
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,13 +14,15 @@ import pytest
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.equation.attitude import QUATERNION
+from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.fmus.variable import variables_of
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import vehicle_model
 from rov_fmu.study.plan.plan import Plan
-from rov_fmu.study.plan.prepared import Prepared, prepare
-from rov_fmu.study.run.child import simulation
-from rov_fmu.study.run.lanes import _Runs, simulated
+from rov_fmu.study.plan.prepared import Study, prepare
+from rov_fmu.study.plan.sampling import Design
+from rov_fmu.study.run.child import Child, simulator
+from rov_fmu.study.run.lanes import runs, simulated
 from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
@@ -40,7 +42,7 @@ KINDS: dict[str, Vehicle] = {
 RUNS = 11
 
 
-def _prepared(rov: Vehicle, **keys: Any) -> Prepared:
+def _prepared(rov: Vehicle, **keys: Any) -> tuple[Study, Design]:
     """Return a plan in which all inputs change, and states, inputs and coefficients vary; every variable is kept."""
     layout, model = rov.layout, vehicle_model(rov)
     signals = {}
@@ -71,14 +73,14 @@ def _prepared(rov: Vehicle, **keys: Any) -> Prepared:
 def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: pytest.FixtureRequest) -> None:
     """They are read before the first step and after each one, with the inputs of the step that ends there."""
     rov, folder = KINDS[kind], str(request.getfixturevalue(f"{kind}_dir"))
-    prepared = _prepared(rov)
-    job, values = prepared.job, prepared.design.rows(0, RUNS)
-    fmu = simulation(folder, job)
-    outputs, ended = simulated(job, rov, values)
+    study, design = _prepared(rov)
+    values, fmu = design.rows(0, RUNS), simulator(folder, study)
+    assert isinstance(fmu, Simulation)
+    outputs, ended = simulated(study, rov, values)
     assert ended.all()
     worst: dict[str, float] = {}
     for own, row in zip(outputs, values.tolist(), strict=True):
-        for name, found, told in zip(job.recorded, own, fmu.run(row).values(), strict=True):
+        for name, found, told in zip(study.recorded, own, fmu.run(row).values(), strict=True):
             worst[name] = max(worst.get(name, 0.0), np.abs(found - told).max() / max(1.0, np.abs(told).max()))
         fmu.reset()
     fmu.free()
@@ -87,11 +89,11 @@ def test_each_variable_of_a_run_in_lanes_is_that_of_the_fmu(kind: str, request: 
 
 @pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
 def test_a_run_has_the_same_bits_whatever_runs_beside_it(kind: str) -> None:
-    prepared, rov = _prepared(KINDS[kind]), KINDS[kind]
-    values = prepared.design.rows(0, RUNS)
-    together, _ = simulated(prepared.job, rov, values, 1)
+    (study, design), rov = _prepared(KINDS[kind]), KINDS[kind]
+    values = design.rows(0, RUNS)
+    together, _ = simulated(study, rov, values, 1)
     for order in ([0], [7, 3], [*range(RUNS)][::-1]):
-        assert np.array_equal(simulated(prepared.job, rov, values[order], 2)[0], together[order])
+        assert np.array_equal(simulated(study, rov, values[order], 2)[0], together[order])
 
 
 @pytest.mark.parametrize("kind", spread(KINDS, ("videoray", "everything"), ("passed", "rotors", "six")))
@@ -212,11 +214,9 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
 
 
 @pytest.mark.long
-def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(
-    six_dir: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(six_dir: Path) -> None:
     rov = KINDS["six"]
-    prepared = _prepared(
+    study, design = _prepared(
         rov,
         vary={"m_a_uq": {"values": [rov["m_a_uq"], 1e3]}, "u": {"values": [0.1, 1e200]}},
         sampler="grid",
@@ -224,12 +224,10 @@ def test_a_run_that_diverges_or_has_no_mass_matrix_has_the_reason_of_the_fmu(
         keep={"outputs": ["x"]},
         figures={"end": "x[-1]"},
     )
-    values = prepared.design.rows(0, 4)
-    with ExitStack() as stack:
-        runs = _Runs(prepared.job, rov, None, stack)
-        monkeypatch.setattr(runs, "_unpacked", lambda: six_dir)
-        found = runs.do(values)
+    with closing(Child(str(six_dir), study)) as fmu:
+        found = runs(study, rov, design.rows(0, 4), None, lambda: fmu)
     assert [run.status for run in found] == ["done", "failed", "failed", "failed"]
-    assert found[1].reason.startswith("the step at 0 s: ")
-    assert found[2].reason == found[3].reason
-    assert "the mass matrix of these parameters is not positive definite" in found[2].reason
+    reasons = [run.reason or "" for run in found]
+    assert reasons[1].startswith("the step at 0 s: ")
+    assert reasons[2] == reasons[3]
+    assert "the mass matrix of these parameters is not positive definite" in reasons[2]

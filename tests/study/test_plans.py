@@ -13,7 +13,7 @@ from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model
 from rov_fmu.study.plan.plan import load_plan
-from rov_fmu.study.plan.prepared import Prepared, prepare
+from rov_fmu.study.plan.prepared import Study, prepare
 from tests.folders import beside
 from tests.io.test_paths import WRONG as WRONG_PATHS
 
@@ -196,22 +196,23 @@ def test_angles_of_an_attitude_are_recorded_and_a_plan_is_the_same_whatever_does
     head = 'fmu = "v.fmu"\nstop_time = 1.0\nstep = 0.1\n'
     tail = '[vary]\na.uniform = [0.0, 1.0]\n[figures]\nend = "b[-1]"\n'
 
-    def prepared(lines: str, names: Sequence[str] = "ab") -> Prepared:
+    def prepared(lines: str, names: Sequence[str] = "ab") -> Study:
         plan.write_text(head + lines + tail)
         has = {name: replace(kind, name=name) for name in names}
-        return prepare(load_plan(plan), plan, Model("v.fmu", b"", has))
+        return prepare(load_plan(plan), plan, Model("v.fmu", b"", has))[0]
 
-    with_attitude = prepared("runs = 9\n", [*"ab", "phi", "theta", "psi"]).job
+    with_attitude = prepared("runs = 9\n", [*"ab", "phi", "theta", "psi"])
     assert (with_attitude.angles, with_attitude.recorded) == (("phi", "theta"), ["b", "phi", "theta"])
-    assert prepared("runs = 9\n", [*"ab", "phi", "theta"]).job.angles == ()
+    assert prepared("runs = 9\n", [*"ab", "phi", "theta"]).angles == ()
     found = prepared("runs = 9\n")
-    assert (len(found.job.trials), *found.warnings) == (
+    assert (len(found.trials), *found.about["warnings"]) == (
         8,
         "v.fmu has no inputs: its parameters and start values alone determine its runs",
     )
-    assert prepared('runs = 5\ntitle = "T"\ntime_limit = 1\n').mark == found.mark
+    assert prepared('runs = 5\ntitle = "T"\ntime_limit = 1\n').about["plan"] == found.about["plan"]
     hypercube = 'sampler = "latin-hypercube"\n'
-    assert prepared(f"runs = 5\n{hypercube}").mark != prepared(f"runs = 9\n{hypercube}").mark
+    five, nine = (prepared(f"runs = {runs}\n{hypercube}").about["plan"] for runs in (5, 9))
+    assert five != nine
 
 
 def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
@@ -266,5 +267,5 @@ def test_inputs_are_held_or_straight_by_the_middle_of_a_step_and_jump_where_two_
     for text, values in expected.items():
         path = tmp_path / "plan.toml"
         path.write_text(head + text)
-        job = prepare(load_plan(path), path, model).job
-        assert job.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text
+        study, _ = prepare(load_plan(path), path, model)
+        assert study.inputs["u"].tolist() == pytest.approx(values, abs=1e-12), text

@@ -150,19 +150,19 @@ class Figures:
         self._expressions = {name: FigureExpression(text, functions) for name, text in expressions.items()}
         self._constants = {**CONSTANTS, TIME: times}
 
-    def of(self, run: Mapping[str, Any]) -> tuple[list[float], str]:
+    def of(self, run: Mapping[str, Any]) -> tuple[list[float | None], str]:
         """Compute the figures from the outputs and parameters of a run.
 
-        A figure without a value is NaN, and the text has the reason.
+        A figure without a value is None, and the text has the reason.
         """
         values = {**self._constants, **run}
-        found, reasons = [], []
+        found, reasons = list[float | None](), []
         with np.errstate(all="ignore"):
             for name, expression in self._expressions.items():
                 try:
                     found.append(_number(expression, values))
                 except _NoNumberError as error:
-                    found.append(nan)
+                    found.append(None)
                     reasons.append(f"{name}: {error}")
         return found, "; ".join(reasons)
 

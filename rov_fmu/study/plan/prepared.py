@@ -1,12 +1,13 @@
 """Combine a plan with its FMU: report what does not fit, and collect what the workers must know."""
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
 import numpy as np
+from typing_extensions import Self
 
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.csv_table import read_series
@@ -40,8 +41,8 @@ _TRIALS = 8
 
 
 @dataclass(frozen=True)
-class Job:
-    """Everything that a worker must know about a study; it is sent to each worker once."""
+class Study:
+    """A plan that fits its FMU: everything that a worker must know, sent to each worker once."""
 
     key: str
     """Distinguishes this study from others on the same workers."""
@@ -57,26 +58,20 @@ class Job:
     """The recorded angles that tell whether a vehicle turns over; none for an FMU without an attitude."""
     trials: Array
     """The values of the first runs, with which it is found out whether the FMU can be reset."""
-    study: Mapping[str, Any] = field(default_factory=dict)
-    """Everything that the rows depend on, which their files name."""
+    about: Mapping[str, Any]
+    """The description of the study in its results, as JSON values."""
+
+    def unpacked(self, folder: Path) -> Self:
+        """Unpack the FMU into a folder, and return the study without its content. Raises FileError."""
+        self.model.unpack(folder)
+        return replace(self, model=replace(self.model, content=b""))
 
 
-@dataclass(frozen=True)
-class Prepared:
-    """A plan that fits its FMU."""
-
-    job: Job
-    design: Design
-    mark: Mapping[str, Any]
-    """Everything that the results depend on."""
-    warnings: Sequence[str]
-    """Sentences about properties of the results that a reader may not expect."""
-
-
-def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
+def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
     """Check that a plan, read from `path`, fits an FMU. Raises PlanError with every reason."""
+    has = model.variables
     vehicle = load_vehicle(named_in(path, "vary_from", plan.vary_from, PlanError)) if plan.vary_from else None
-    estimates = Estimates(plan, vehicle, model.variables)
+    estimates = Estimates(plan, vehicle, has)
     own, unread = [*check_plan(plan)], []
     from_file: Mapping[str, InputSignal] = {}
     lines: Sequence[int] = ()
@@ -89,20 +84,38 @@ def prepare(plan: Plan, path: Path, model: Model) -> Prepared:
     wrong = lines_on(path, words) + unread
     if plan.input_file:
         file = path.parent / plan.input_file.path
-        wrong += [f"{file}: {line}" for line in _check_rows(plan, model.variables, from_file, lines)]
+        wrong += [f"{file}: {line}" for line in _check_rows(plan, has, from_file, lines)]
     if wrong:
         raise PlanError(*wrong)
-    design = Design(plan, model.variables, estimates.known)
+    design = Design(plan, has, estimates.known)
     whole = plan.model_copy(update={"inputs": {**plan.inputs, **from_file}})
     middles = times[:-1] + 0.5 * plan.step
-    inputs = {name: _sampled(signal, middles, model.variables[name].start) for name, signal in whole.inputs.items()}
-    named = {name for text in plan.figures.values() for name in read_expression(text).names} & model.variables.keys()
-    angles = ("phi", "theta") if {"phi", "theta", "psi"} <= model.variables.keys() - {*design.names} else ()
+    inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in whole.inputs.items()}
+    named = {name for text in plan.figures.values() for name in read_expression(text).names} & has.keys()
+    angles = ("phi", "theta") if {"phi", "theta", "psi"} <= has.keys() - {*design.names} else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
+    shown = [has[name] for name in (*design.names, *recorded)]
+    about = {
+        "runs": design.runs,
+        "plan": whole.mark | estimates.mark,
+        "fmu": model.digest,
+        "engine": "lanes" if model.vehicle else "fmu",
+        "vehicle": plan.vehicle,
+        "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
+        "model": model.name,
+        "title": plan.title,
+        "units": {variable.name: variable.unit or "1" for variable in shown},
+        "descriptions": {variable.name: variable.description for variable in shown},
+        "groups": design.groups,
+        "warnings": [
+            *_without_inputs(model, {*inputs, *design.names, *plan.set}),
+            *estimates.warnings(),
+            *design.warnings(),
+        ],
+    }
     trials = design.rows(0, min(_TRIALS, design.runs))
-    job = Job(f"rov-fmu-{uuid4().hex}", model, plan, design.names, inputs, recorded, angles, trials)
-    warnings = [*_without_inputs(model, {*inputs, *design.names, *plan.set}), *estimates.warnings(), *design.warnings()]
-    return Prepared(job, design, whole.mark | estimates.mark, warnings)
+    key = f"rov-fmu-{uuid4().hex}"
+    return Study(key, model, plan, design.names, inputs, recorded, angles, trials, about), design
 
 
 def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:

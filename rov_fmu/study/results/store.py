@@ -15,8 +15,6 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 import pandas as pd  # noqa: F401 (PyArrow would import it at the first table, which takes a third of a second)
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -47,21 +45,13 @@ def identity(study: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def parquet(table: pa.Table, study: Mapping[str, Any], first: int) -> bytes:
-    """Return the file with the rows of runs from a first one on, which belong to a study of an identity."""
-    about = {"digest": _digest(study), "first": first, "end": first + len(table), "study": study}
+    """Return the file with the rows of runs from a first one on, which belong to a study."""
+    own = identity(study)
+    about = {"digest": _digest(own), "first": first, "end": first + len(table), "study": own}
     sink = pa.BufferOutputStream()
     told = table.replace_schema_metadata({_ABOUT: json.dumps(about)})
     pq.write_table(told, sink, compression="zstd", write_page_checksum=True)
     return sink.getvalue().to_pybytes()  # type: ignore[no-any-return]
-
-
-def nested(ended: npt.NDArray[np.bool_], columns: Mapping[str, Any]) -> pa.StructArray:
-    """Return lists of equal length in the rows of those runs that ended, and null in the others, from columns with the
-    lists one after another."""
-    length = len(next(iter(columns.values()))) // max(ended.sum(), 1)
-    ends = pa.array(np.cumsum([0, *np.where(ended, length, 0)]).astype(np.int32))
-    lists = [pa.ListArray.from_arrays(ends, pa.array(own)) for own in columns.values()]
-    return pa.StructArray.from_arrays(lists, [*columns], mask=pa.array(~ended))
 
 
 def old_rows(folder: Path, outputs: Sequence[str]) -> pa.Table:
@@ -70,8 +60,10 @@ def old_rows(folder: Path, outputs: Sequence[str]) -> pa.Table:
     if not outputs:
         return table
     long = pq.read_table(folder / "trajectories").sort_by([(RUN, "ascending"), (TIME, "ascending")])
-    ended = np.isin(table[RUN].to_numpy(), long[RUN].to_numpy())
-    return table.append_column(TRAJECTORY, nested(ended, {name: long[name].to_numpy() for name in (TIME, *outputs)}))
+    names = (TIME, *outputs)
+    lists = long.group_by(RUN, use_threads=False).aggregate([(name, "list") for name in names])
+    by_run = {row[RUN]: {name: row[f"{name}_list"] for name in names} for row in lists.to_pylist()}
+    return table.append_column(TRAJECTORY, pa.array([by_run.get(run) for run in table[RUN].to_pylist()]))
 
 
 def _digest(study: Mapping[str, Any]) -> str:
@@ -191,9 +183,9 @@ class Store:
         """Return the ranges of runs from a first one to the one before the last one that are not done."""
         return _gaps(self.done(), first, last)
 
-    def write(self, first: int, end: int, rows: bytes) -> None:
+    def write(self, span: Span, rows: bytes) -> None:
         """Write the file with the rows of some runs, whole or not at all. Raises WriteError."""
-        put_whole(Output(self.folder / RUNS / f"part-{first:09d}-{end - 1:09d}.parquet", rows))
+        put_whole(Output(self.folder / RUNS / f"part-{span[0]:09d}-{span[1] - 1:09d}.parquet", rows))
 
 
 # ---- One file --------------------------------------------------------------------------------------------------------

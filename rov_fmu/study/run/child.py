@@ -1,6 +1,5 @@
 """Runs in a child process: when the FMU ends the process, or does not return, only that run fails."""
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,8 +9,8 @@ from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import Array, LoadError, RunError
 from rov_fmu.fmus.simulation import Simulation
 from rov_fmu.io.child_process import ChildError, ChildProcess, LimitError
-from rov_fmu.study.plan.prepared import Job
-from rov_fmu.study.run.run import Evaluation, Run, failed_run
+from rov_fmu.study.plan.prepared import Study
+from rov_fmu.study.run.run import FAILED, Evaluation, Run
 from rov_fmu.study.run.system import SystemModel, SystemSimulator
 
 _MANY = 10.0
@@ -21,20 +20,20 @@ _MANY = 10.0
 class Child:
     """An instance of the FMU in a child process, which is started again when it ends. Raises LoadError."""
 
-    def __init__(self, folder: str, job: Job) -> None:
-        self._folder, self._job = folder, job
+    def __init__(self, folder: str, study: Study) -> None:
+        self._folder, self._study = folder, study
         self._process: ChildProcess | None = None
         self._resets = self._can_be_reset()
 
     def runs(self, rows: Array) -> list[Run]:
         """Run once with each row of values. If the process ends, each row is run alone."""
-        limit = self._job.plan.time_limit
+        limit = self._study.plan.time_limit
         try:
             found: list[Run] = self._call("runs", rows, self._resets, time=limit + (len(rows) > 1) * _MANY)
         except ChildError as error:
             if len(rows) > 1:
                 return [run for n in range(len(rows)) for run in self.runs(rows[n : n + 1])]
-            return [failed_run(self._job, self._words(error, limit))]
+            return [Run(FAILED, self._words(error, limit))]
         return found
 
     def close(self) -> None:
@@ -47,11 +46,10 @@ class Child:
 
         A system gets new instances for each run.
         """
-        if isinstance(self._job.model, SystemModel):
-            return False
-        for values in self._job.trials:
+        study = self._study
+        for values in () if isinstance(study.model, SystemModel) else study.trials:
             try:
-                return bool(self._call("can_be_reset", values, self._job.trials[-1], time=self._job.plan.time_limit))
+                return bool(self._call("can_be_reset", values, study.trials[-1], time=study.plan.time_limit))
             except (RunError, ChildError):
                 continue
         return False
@@ -62,7 +60,7 @@ class Child:
             try:
                 # In the folder of the worker, which the study removes even where Dask kills the worker.
                 beside = str(Path(self._folder).parent)
-                self._process = ChildProcess(_Runner, self._folder, self._job, limits=limits, temporary=beside)
+                self._process = ChildProcess(_Runner, self._folder, self._study, limits=limits, temporary=beside)
             except ChildError as error:
                 raise LoadError(self._words(error, time)) from error
         try:
@@ -75,31 +73,26 @@ class Child:
         """Return what an FMU did."""
         exceeds_time = isinstance(error, LimitError) and error.limit == "time"
         did = f"did not return within time_limit = {limit:g} s" if exceeds_time else error
-        return f"{self._job.model.running(self._folder)} {did}"
+        return f"{self._study.model.running(self._folder)} {did}"
 
 
-def simulation(folder: str, job: Job) -> Simulation:
-    """Return the runs of an unpacked FMU. Raises LoadError."""
-    plan = job.plan
-    given = (plan.set, job.inputs, job.recorded, job.varied, plan.tolerance)
+def simulator(folder: str, study: Study) -> Simulation | SystemSimulator:
+    """Return the runs of an unpacked FMU or system. Raises LoadError."""
+    if isinstance(study.model, SystemModel):
+        return SystemSimulator(folder, study, study.model)
+    plan = study.plan
+    given = (plan.set, study.inputs, study.recorded, study.varied, plan.tolerance)
     return Simulation(folder, plan.times, plan.step, *given)
 
 
 class _Runner:
     """The object in the child process: an instance of the FMU, and the figures."""
 
-    def __init__(self, folder: str, job: Job) -> None:
-        self._job = job
-        self._simulator: Simulation | SystemSimulator
-        if isinstance(job.model, SystemModel):
-            self._simulator = SystemSimulator(folder, job, job.model)
-        else:
-            self._simulator = simulation(folder, job)
-        self._evaluation = Evaluation(job)
+    def __init__(self, folder: str, study: Study) -> None:
+        self._simulator, self._evaluation = simulator(folder, study), Evaluation(study)
 
     def can_be_reset(self, values: Array, others: Array) -> bool:
         """Repeat a run in the same instance, after a run with other values, and compare it. Raises RunError."""
-        self._simulator.renew()
         first = {name: recorded.copy() for name, recorded in self._simulator.run(values.tolist()).items()}
         for row in (others, values):
             self._simulator.reset()
@@ -109,16 +102,12 @@ class _Runner:
 
     def runs(self, rows: Array, resets: bool) -> list[Run]:
         """Run once with each row of values."""
-        return [self._run(values, resets) for values in rows.tolist()]
-
-    def _run(self, values: Sequence[float], resets: bool) -> Run:
-        try:
-            outputs = self._simulator.run(values)
-        except RunError as error:
-            return failed_run(self._job, str(error))
-        run = self._evaluation.run(values, outputs)
-        if resets:
-            self._simulator.reset()
-        else:
-            self._simulator.renew()
-        return run
+        found = []
+        for values in rows.tolist():
+            try:
+                found.append(self._evaluation.run(values, self._simulator.run(values)))
+            except RunError as error:
+                found.append(Run(FAILED, str(error)))
+            else:
+                (self._simulator.reset if resets else self._simulator.renew)()
+        return found

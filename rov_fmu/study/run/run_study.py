@@ -2,20 +2,19 @@
 
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from multiprocessing import current_process
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 from rov_fmu.fmus.instance import LoadError
 from rov_fmu.io.messages import FileError
 from rov_fmu.study.plan.model import Model, read_model, vehicle_fmu, vehicle_model
 from rov_fmu.study.plan.plan import Plan, PlanError, load_plan
-from rov_fmu.study.plan.prepared import Prepared, prepare
-from rov_fmu.study.results.store import Store, identity
+from rov_fmu.study.plan.prepared import prepare
+from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.lanes import do_in_lanes
 from rov_fmu.study.run.system import SystemModel, half_step_words, read_system
-from rov_fmu.study.run.work import Progress, Spent, Work
+from rov_fmu.study.run.work import Progress, Work
 from rov_fmu.vehicle.shipped import named_in
 from rov_fmu.vehicle.vehicle import load_vehicle
 
@@ -58,17 +57,8 @@ def run_study(
         sys.exit(1)  # a worker imports a script without that line; its parent prints the message
     from rov_fmu.study.results.results import Results
 
-    _, store = do_study(
-        Path(plan),
-        Path(folder),
-        workers,
-        scheduler,
-        on_progress,
-        engine=engine,
-        part=part,
-        merge=merge,
-    )
-    return Results(store.folder)
+    work = do_study(Path(plan), Path(folder), workers, scheduler, on_progress, engine=engine, part=part, merge=merge)
+    return Results(work.store.folder)
 
 
 def do_study(
@@ -83,65 +73,38 @@ def do_study(
     part: tuple[int, int] | None = None,
     merge: bool = False,
     force: bool = False,
-) -> tuple[Spent, Store]:
-    """Do the missing runs, or merge parts; return the times, and the folder of the results.
+) -> Work:
+    """Do the missing runs, or merge parts; return what was done.
 
     `on_warning` is called with each warning. `force` allows replacing the work of others that has the name of a file of
     the results.
     """
     plan = load_plan(path)
-    engine = engine or ("lanes" if plan.vehicle and scheduler is None else "fmu")
-    model = _model(plan, path, engine)
-    prepared = prepare(plan, path, model)
-    for warning in prepared.warnings:
+    model = _model(plan, path, engine or ("lanes" if plan.vehicle and scheduler is None else "fmu"))
+    study, design = prepare(plan, path, model)
+    for warning in study.about["warnings"]:
         on_warning(warning)
     store, (number, parts) = Store(folder, force=force), part or (1, 1)
-    first, last = ((number - at) * prepared.design.runs // parts for at in (1, 0))
-    description = _description(plan, prepared, model, engine)
+    span = (number - 1) * design.runs // parts, number * design.runs // parts
     with store.held(f"-{number}-of-{parts}" if part else ""):
-        store.describe(description, (first, last))
+        store.describe(study.about, span)
         if merge:
-            store.check_complete(description)
-            return Spent(), store
-        job = replace(prepared.job, study=identity(description))
-        work = Work(job, prepared.design, store, first, last, on_progress)
+            store.check_complete(study.about)
+        work = Work(study, design, store, span, on_progress)
         try:
-            if not work.missing:
-                pass
-            elif model.vehicle:
+            if work.missing and model.vehicle:
                 do_in_lanes(work, model.vehicle, workers)
-            else:
+            elif work.missing:
                 from rov_fmu.study.run.cluster import do_on_cluster
 
                 do_on_cluster(work, workers, scheduler)
         except LoadError as error:
             raise FileError(f"{model.name}: cannot be run: {error}") from error
-    if work.spent.turned:
-        count = f"in {work.spent.turned} of {work.spent.runs} runs"
-        on_warning(f"{count} the vehicle turned over: phi or theta passed 90 degrees")
-    if isinstance(model, SystemModel) and work.spent.runs and (words := half_step_words(prepared.job, model)):
+    if work.turned:
+        on_warning(f"in {work.turned} of {work.runs} runs the vehicle turned over: phi or theta passed 90 degrees")
+    if isinstance(model, SystemModel) and work.runs and (words := half_step_words(study, model)):
         on_warning(words)
-    return work.spent, store
-
-
-def _description(plan: Plan, prepared: Prepared, model: Model, engine: Engine) -> dict[str, Any]:
-    """Return the description of the study in its results, as JSON values."""
-    job, design = prepared.job, prepared.design
-    named = [model.variables[name] for name in (*design.names, *job.recorded)]
-    return {
-        "runs": design.runs,
-        "plan": dict(prepared.mark),
-        "fmu": model.digest,
-        "engine": engine,
-        "vehicle": plan.vehicle,
-        "columns": {"parameters": design.names, "figures": [*plan.figures], "outputs": plan.kept},
-        "model": model.name,
-        "title": plan.title,
-        "units": {variable.name: variable.unit or "1" for variable in named},
-        "descriptions": {variable.name: variable.description for variable in named},
-        "groups": design.groups,
-        "warnings": prepared.warnings,
-    }
+    return work
 
 
 def _model(plan: Plan, path: Path, engine: Engine) -> Model:

@@ -25,7 +25,7 @@ from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.reading import read_bytes
 from rov_fmu.study.plan.model import Model
-from rov_fmu.study.plan.prepared import Job
+from rov_fmu.study.plan.prepared import Study
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,27 +95,29 @@ def _variable(component: str, part: Part, name: str, values: Mapping[str, Value]
 class SystemSimulator:
     """An unpacked system, in a process of its own, with new instances for each run."""
 
-    def __init__(self, folder: str, job: Job, model: SystemModel) -> None:
-        self._job, self._model = job, model
-        self._master = Master(folder, [*model.sources], model.connections, [split(name) for name in job.recorded])
+    def __init__(self, folder: str, study: Study, model: SystemModel) -> None:
+        self._study, self._model = study, model
+        self._master = Master(folder, [*model.sources], model.connections, [split(name) for name in study.recorded])
 
     def run(self, values: Sequence[float], parts: int = 1) -> dict[str, npt.NDArray[Any]]:
         """Run once and return every recorded variable at every communication point. Raises RunError.
 
-        `values` are those of the varied variables. Each step of the job is made of some `parts`, between which the
+        `values` are those of the varied variables. Each step of the study is made of some `parts`, between which the
         FMUs exchange values, too.
         """
-        plan = self._job.plan
-        inputs = {split(name): np.repeat(signal, parts) for name, signal in self._job.inputs.items()}
+        plan = self._study.plan
+        inputs = {split(name): np.repeat(signal, parts) for name, signal in self._study.inputs.items()}
         start = {component: dict(own) for component, own in self._model.values.items()}
-        for name, value in {**plan.set, **dict(zip(self._job.varied, values, strict=True))}.items():
+        for name, value in {**plan.set, **dict(zip(self._study.varied, values, strict=True))}.items():
             component, own = split(name)
             start[component][own] = value
         rows = [self._master.begin(start, plan.step / parts, plan.stop_time, plan.start_time, inputs)]
         rows += self._master.step(plan.steps * parts)[parts - 1 :: parts]
         columns = np.array(rows, np.float64).reshape(plan.steps + 1, -1).T
         has = self._model.variables
-        return {name: column.astype(has[name].dtype) for name, column in zip(self._job.recorded, columns, strict=True)}
+        return {
+            name: column.astype(has[name].dtype) for name, column in zip(self._study.recorded, columns, strict=True)
+        }
 
     def renew(self) -> None:
         """End the instances."""
@@ -124,17 +126,17 @@ class SystemSimulator:
     reset = renew
 
 
-def half_step_words(job: Job, model: SystemModel) -> str:
+def half_step_words(study: Study, model: SystemModel) -> str:
     """Return a line about what half the step changes in one run of a study; none if nothing is connected."""
     starts = dict.fromkeys(".".join(one.start) for one in model.connections)
     if not (names := [name for name in starts if name in model.variables]):
         return ""
-    alike, limits = replace(job, recorded=names), budget(2.0 * job.plan.time_limit)
+    alike, limits = replace(study, recorded=names), budget(2.0 * study.plan.time_limit)
     with temporary_folder("system-") as folder:
         model.unpack(Path(folder))
         try:
             with closing(ChildProcess(SystemSimulator, folder, alike, model, limits=limits)) as child:
-                runs = [child.call("run", job.trials[0], parts) for parts in (1, 2)]
+                runs = [child.call("run", study.trials[0], parts) for parts in (1, 2)]
                 child.call("renew")
         except (ChildError, RunError) as error:
             who = f"{model.running(folder)} " if isinstance(error, ChildError) else ""
