@@ -89,7 +89,7 @@ def autopilot_of(vehicle: Vehicle, step: float = STEP, delay: float = DELAY) -> 
 
 def _lag(vehicle: Vehicle, axis: Axis) -> float:
     curves = [vehicle.layout.curve_of[one.name] for one in vehicle.layout.thrusters_along(axis)]
-    dead = vehicle["T_d"] if vehicle.layout.has_dead_time else 0.0
+    dead = vehicle.coefficients.get("T_d", 0.0)
     return dead + max((vehicle[curve.coefficient("T")] for curve in curves if curve.has_lag), default=0.0)
 
 
@@ -101,8 +101,7 @@ def _sharing(vehicle: Vehicle, axes: tuple[Axis, ...], matrix: Array) -> Sharing
     of_axis[:, places], to_axis[:, places] = np.linalg.pinv(matrix), matrix.T
     commands = np.eye(count)
     if layout.mix:
-        gains = [[layout.gains[t.name].get(u, 0.0) for u in layout.commands] for t in layout.thrusters]
-        commands = np.linalg.pinv(np.array(gains))
+        commands = np.linalg.pinv(np.array(layout.gain_rows(t.name for t in layout.thrusters)))
     curves = list(layout.curves)
     return Sharing(
         *(of_axis, to_axis, commands, tuple(_PRIORITY[axis] for axis in AXES)),

@@ -9,24 +9,10 @@ health of the thrusters are in B, so F are the forces of whole ones.
 import numpy as np
 
 from rov_fmu.autopilot.allocation import allocation_matrix, thrust_rows, voltages
-from rov_fmu.bridges.sdf import Array, rendered_model
-from rov_fmu.equation.forces import (
-    COUPLING,
-    DEAD_BAND,
-    LIFT,
-    LINEAR,
-    LOAD,
-    QUADRATIC,
-    RESTORING,
-    THRUST,
-    WEIGHT,
-    left_out,
-)
+from rov_fmu.bridges.sdf import BESIDE_THRUST, Array, rendered_model
+from rov_fmu.equation.forces import left_out
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.vehicle import Vehicle
-
-_HAS = (THRUST, DEAD_BAND, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING)
-"""The effects that the files have, and those that act on the body whatever its thrusters do."""
 
 
 def allocation_files(vehicle: Vehicle) -> dict[str, str]:
@@ -51,7 +37,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
         "tables": tables,
         "command_of": command_of,
         "row": _row,
-        "left_out": left_out(layout, _HAS),
+        "left_out": left_out(layout, BESIDE_THRUST),
     }
     lines = ["curve,voltage_V,force_N,command"]
     for curve, by_voltage in tables.items():
@@ -63,8 +49,7 @@ def allocation_files(vehicle: Vehicle) -> dict[str, str]:
 
 def _gains(vehicle: Vehicle) -> Array:
     """Return the gains of the inputs, thrusters x inputs."""
-    layout = vehicle.layout
-    return np.array([[layout.gains[t.name].get(u, 0.0) for u in layout.commands] for t in layout.thrusters])
+    return np.array(vehicle.layout.gain_rows(thruster.name for thruster in vehicle.layout.thrusters))
 
 
 def _check(vehicle: Vehicle) -> None:

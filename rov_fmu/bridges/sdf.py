@@ -11,7 +11,7 @@ becomes a note of the model. Sources: gz-sim, src/systems; the specification of 
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
+from itertools import combinations_with_replacement, product
 from math import pi
 from pathlib import Path
 
@@ -20,7 +20,7 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from rov_fmu import __version__
-from rov_fmu.equation.catalogue import AXES, BODY, HEAVE, REVERSE, UPWARD, cross_name
+from rov_fmu.equation.catalogue import AXES, BODY, BY_VELOCITY, HEAVE, REVERSE, UPWARD, cross_name
 from rov_fmu.equation.forces import (
     COUPLING,
     DEAD_BAND,
@@ -46,8 +46,8 @@ _GRAVITY = 9.8
 """Gravity where a vehicle file has no weight, m/s2, the default of SDFormat."""
 _SIGNS = np.array(UPWARD)
 """The signs of the components along and about the axes in Gazebo's frame, by those in the vehicle's frame."""
-_VELOCITIES, _FORCES = "uvwpqr", "xyzkmn"
-"""The letters of the axes: of velocities, and of forces in the Hydrodynamics plugin."""
+_PLACES = {v: n for n, v in enumerate(BY_VELOCITY)}
+"""The rows of the axes in a vector or a matrix of six, by their velocities."""
 _HELD_TIME = 0.02
 """The time constant, s, with which an axis that the vehicle lacks comes to rest."""
 _HELD_INERTIA = 1000.0
@@ -58,8 +58,8 @@ _COMMANDS = tuple(n / 4.0 for n in range(-4, 5))
 """The commands whose thrust the file lists."""
 
 
-IN_GAZEBO = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING, DEAD_BAND)
-"""The effects that Gazebo or the sender of its thrust has, or that have notes of their own."""
+BESIDE_THRUST = (THRUST, LOAD, WEIGHT, LINEAR, QUADRATIC, LIFT, RESTORING, COUPLING, DEAD_BAND)
+"""The effects that a simulator of bodies or the sender of its thrust has, or that have notes of their own."""
 
 
 @dataclass(frozen=True)
@@ -240,20 +240,20 @@ def added_mass(vehicle: Vehicle, rigid: Array) -> Array:
     """Return the 6x6 matrix that the rigid body lacks to the vehicle's effective mass matrix, in Gazebo's frame."""
     added = np.zeros((6, 6))
     forms, entries = vehicle.layout.by_velocity, vehicle.parameters
-    for i, a in enumerate(_VELOCITIES):
-        for j, b in enumerate(_VELOCITIES):
-            if a in forms and b in forms:
-                mass = entries.get(f"mass_{a}{b}", entries.get(f"mass_{b}{a}", 0.0))
-                mass = vehicle.effective_inertia(forms[a]) if a == b else mass
-                added[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
+    for a, b in product(forms, repeat=2):
+        i, j = _PLACES[a], _PLACES[b]
+        mass = entries.get(f"mass_{a}{b}", entries.get(f"mass_{b}{a}", 0.0))
+        mass = vehicle.effective_inertia(forms[a]) if a == b else mass
+        added[i, j] = _SIGNS[i] * _SIGNS[j] * mass - rigid[i, j]
     size = np.sqrt(np.diag(rigid))
     return np.where(np.abs(added) < FAINT * np.outer(size, size), 0.0, added)
 
 
 def in_plugin(added: Array) -> Iterator[tuple[str, float]]:
     """Yield the added mass for the Hydrodynamics plugin, which has Fossen's sign: xDotU is -m_a."""
+    axes = [*BY_VELOCITY.values()]
     for i, j in np.argwhere(added):
-        yield f"{_FORCES[i]}Dot{_VELOCITIES[j].upper()}", -added[i, j]
+        yield f"{axes[i].letter.lower()}Dot{axes[j].velocity.upper()}", -added[i, j]
 
 
 def _divergence(added: Array, rigid: Array) -> Iterator[str]:
@@ -288,11 +288,12 @@ def hydrodynamics(vehicle: Vehicle, link: Link) -> dict[str, float]:
 
     def add(axis: str, value: float, first: str, second: str = "", *, magnitude: bool = False) -> None:
         """Add a force along an axis: a value times a velocity, and times another or its magnitude."""
-        signs = [_SIGNS[_VELOCITIES.index(v)] for v in (axis, first, *([] if magnitude else second))]
-        name = f"{_FORCES[_VELOCITIES.index(axis)]}{first.upper()}{'abs' if magnitude else ''}{second.upper()}"
+        signs = [_SIGNS[_PLACES[v]] for v in (axis, first, *([] if magnitude else second))]
+        letter = BY_VELOCITY[axis].letter.lower()
+        name = f"{letter}{first.upper()}{'abs' if magnitude else ''}{second.upper()}"
         terms[name] = terms.get(name, 0.0) + value * np.prod(signs)
 
-    for n, v in enumerate(_VELOCITIES):
+    for v, n in _PLACES.items():
         part = vehicle.layout.by_velocity.get(v)
         if part is None:
             add(v, -link.matrix[n, n] / _HELD_TIME, v)
@@ -328,7 +329,7 @@ def _propeller(vehicle: Vehicle, thruster: Thruster) -> _Propeller | None:
     an axis that the vehicle lacks is 0. The thruster stands at the place where the force has these moments.
     """
     effects = np.zeros(6)
-    for n, (v, axis) in enumerate(zip(_VELOCITIES, AXES.values(), strict=True)):
+    for n, (v, axis) in enumerate(BY_VELOCITY.items()):
         if v in vehicle.layout.by_velocity:
             effects[n] = vehicle[axis.coefficient("alpha")] * vehicle.effect(thruster, axis)
         elif not axis.is_rotation:
@@ -368,7 +369,7 @@ def _notes_of_tuning(vehicle: Vehicle, added: Array, propellers: list[_Propeller
     for part in vehicle.layout.axes:
         axis, beta = part.axis, part.axis.coefficient("beta")
         if vehicle[beta] != 1.0:
-            n, unit = _VELOCITIES.index(axis.velocity), BODY[axis.inertia].unit
+            n, unit = _PLACES[axis.velocity], BODY[axis.inertia].unit
             yield (
                 f"{beta} = {vehicle[beta]:g}: the effective inertia in {axis.name} "
                 f"is {vehicle.effective_inertia(part):.4g} {unit}, of which {place} has {added[n, n]:.4g} {unit}"
@@ -389,7 +390,7 @@ def _notes_of_commands(vehicle: Vehicle) -> Iterator[str]:
     }
     has = [part for part, is_there in parts.items() if is_there]
     yield f"the Thruster plugin takes newtons, so these are left to the sender: {', '.join(has)}"
-    yield from (f"left out: {words}" for words in left_out(layout, IN_GAZEBO))
+    yield from (f"left out: {words}" for words in left_out(layout, BESIDE_THRUST))
 
 
 def _notes_of_motion(vehicle: Vehicle, propellers: list[_Propeller], *, explicit: bool) -> Iterator[str]:

@@ -9,12 +9,9 @@ frame (forward, left, up). A matrix of six axes has only its diagonal in the fir
 from collections.abc import Iterator
 
 from rov_fmu.bridges import sdf
-from rov_fmu.equation.catalogue import AXES, BODY, REVERSE
+from rov_fmu.equation.catalogue import AXES, BODY, BY_VELOCITY, REVERSE
 from rov_fmu.equation.forces import DEAD_TIME, LAG, ROTOR_LAG, left_out
 from rov_fmu.vehicle.vehicle import Vehicle
-
-_LETTERS = {"u": "X", "v": "Y", "w": "Z", "p": "K", "q": "M", "r": "N"}
-"""The letters of the forces and moments, by the velocities."""
 
 
 def urdf_model(vehicle: Vehicle) -> sdf.GazeboModel:
@@ -42,7 +39,7 @@ def urdf_model(vehicle: Vehicle) -> sdf.GazeboModel:
         weight=weight,
         buoyancy=weight - sdf.net_weight(vehicle),
         moments=moments,
-        letters=_LETTERS,
+        letters={v: axis.letter for v, axis in BY_VELOCITY.items()},
         axes=axes,
         added=added,
         drag=drag,
@@ -51,7 +48,7 @@ def urdf_model(vehicle: Vehicle) -> sdf.GazeboModel:
     return sdf.GazeboModel(text, notes, ())
 
 
-_IN_URDF = (*sdf.IN_GAZEBO, DEAD_TIME, LAG, ROTOR_LAG)
+_IN_URDF = (*sdf.BESIDE_THRUST, DEAD_TIME, LAG, ROTOR_LAG)
 """The effects that the reader of the file has, and those that are left to the controller of the thrusters."""
 
 

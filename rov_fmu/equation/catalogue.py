@@ -65,6 +65,11 @@ class Axis:
         return self.unit == "rad/s"
 
     @property
+    def letter(self) -> str:
+        """Fossen's letter of the force or moment along the axis: X, Y, Z, K, M or N."""
+        return self.external[0]
+
+    @property
     def push(self) -> str:
         """The word for the effect of thrusters along the axis: thrust or torque."""
         return "torque" if self.is_rotation else "thrust"
@@ -106,6 +111,10 @@ YAW = Axis(
 )
 AXES = {axis.name: axis for axis in (SURGE, SWAY, HEAVE, ROLL, PITCH, YAW)}
 """All kinds of axes by name, in the order of their states."""
+BY_VELOCITY = {axis.velocity: axis for axis in AXES.values()}
+"""The same by the symbols of their velocities."""
+BY_LETTER = {axis.letter: axis for axis in AXES.values()}
+"""The same by the letters of their forces and moments."""
 EXTERNAL = frozenset(axis.external for axis in AXES.values())
 """The names of the forces and moments on the body: X_ext ..."""
 COUPLED_AXES = (SURGE, SWAY, YAW)
@@ -138,7 +147,7 @@ def cross_name(key: str, *velocities: str) -> str:
     """Return the name in the FMU of a coefficient of two or three axes: m_a_uq, or Y_ur for lift."""
     if key == "lift":
         along, *factors = velocities
-        return f"{dict(zip('uvwpqr', 'XYZKMN', strict=True))[along]}_{''.join(factors)}"
+        return f"{BY_VELOCITY[along].letter}_{''.join(factors)}"
     return f"{key}_{''.join(velocities)}"
 
 
@@ -147,14 +156,13 @@ def cross_of(name: str) -> tuple[str, ...] | None:
     if match := re.fullmatch(r"(m_a|b_d|a_d)_([uvwpqr])([uvwpqr])", name):
         return match.groups()
     if match := re.fullmatch(r"([XYZKMN])_([uvwpqr])([uvwpqr])", name):
-        return ("lift", "uvwpqr"["XYZKMN".index(match[1])], match[2], match[3])
+        return "lift", BY_LETTER[match[1]].velocity, match[2], match[3]
     return None
 
 
 def cross_declaration(key: str, *velocities: str) -> "Declaration":
     """Return the declaration of a coefficient of two or three axes."""
-    axes = {axis.velocity: axis for axis in AXES.values()}
-    first, *others = (axes[velocity] for velocity in velocities)
+    first, *others = map(BY_VELOCITY.__getitem__, velocities)
     rotations = sum(axis.is_rotation for axis in (first, *others))
     lengths = ".".join(axis.position_unit for axis in others)
     return CROSS[key].filled(

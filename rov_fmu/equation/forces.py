@@ -12,8 +12,8 @@ from itertools import chain
 
 from .attitude import ROTATION, TURN, entry
 from .catalogue import (
-    AXES,
     BELOW_SURFACE,
+    BY_VELOCITY,
     GRAVITY,
     HEADING,
     HEAVE,
@@ -63,9 +63,7 @@ EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
 
-STATES = frozenset(
-    [*(axis.velocity for axis in AXES.values()), *POSITION, *HEADING, *TURN, *ROTATION, BELOW_SURFACE, OUT_OF_WATER]
-)
+STATES = frozenset([*BY_VELOCITY, *POSITION, *HEADING, *TURN, *ROTATION, BELOW_SURFACE, OUT_OF_WATER])
 """The states of the table of terms that a force may contain."""
 
 

@@ -243,6 +243,10 @@ class Layout:
             for one in self.actuators
         }
 
+    def gain_rows(self, actuators: Iterable[str]) -> list[list[float]]:
+        """Return the gains of all commands in each of some thrusters or fins, which are given by name."""
+        return [[self.gains[name].get(command, 0.0) for command in self.commands] for name in actuators]
+
     def thrusters_along(self, axis: Axis) -> list[Thruster]:
         """Return the thrusters that act on an axis."""
         return [t for t in self.thrusters if abs(t.effect(axis)) > FAINT]

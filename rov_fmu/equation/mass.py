@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
+from .catalogue import BY_VELOCITY
 from .expression import Expression, Formulas, Name, Names, product, total
 
 _KIRCHHOFF = {
@@ -24,7 +25,6 @@ _KIRCHHOFF = {
     "r": ((1, "p", "q"), (-1, "q", "p"), (1, "u", "v"), (-1, "v", "u")),
 }
 """For each axis, the products of a momentum and a velocity: the sign, the axis of the momentum, and the velocity."""
-_ORDER = "uvwpqr"
 _Pair = tuple[str, str]
 """Two axes, by their velocities."""
 
@@ -155,8 +155,8 @@ class MassMatrix:
 
 
 def _sorted(a: str, b: str) -> _Pair:
-    return (a, b) if _ORDER.index(a) <= _ORDER.index(b) else (b, a)
+    return (a, b) if _places(a) <= _places(b) else (b, a)
 
 
 def _places(names: Iterable[str]) -> tuple[int, ...]:
-    return tuple(map(_ORDER.index, names))
+    return tuple(map([*BY_VELOCITY].index, names))

@@ -21,7 +21,7 @@ Result = Literal["holds", "fails", "measured", "does not apply"]
 _STEPS = (2, 5, 10, 50)
 """The numbers of communication steps in each piece of a simulation that are compared with one step."""
 _RUNS, _PROCESSES, _STEPS_OF_RUN = 100, 2, 10
-_COST_SECONDS, _COST_STEPS = 1.0, 100
+_COST_SECONDS = 1.0
 _WAIT = 5.0
 """The longest time for an answer to something impossible, s."""
 

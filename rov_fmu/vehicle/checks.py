@@ -9,6 +9,7 @@ from rov_fmu.equation.catalogue import (
     AXES,
     AXIS,
     BODY,
+    BY_VELOCITY,
     COUPLED_AXES,
     CURVE,
     HEAVE,
@@ -375,7 +376,7 @@ def _check_cross(parts: Tables) -> Iterator[str]:
         kind, *velocities = row
         missing = [axis.name for axis in AXES.values() if axis.velocity in velocities and axis.velocity not in has]
         free = 1 if kind == "lift" else 0 if kind == "m_a" else 2
-        ordered = cross_name(kind, *velocities[:free], *sorted(velocities[free:], key="uvwpqr".index))
+        ordered = cross_name(kind, *velocities[:free], *sorted(velocities[free:], key=[*BY_VELOCITY].index))
         if missing:
             yield key_line(key, f"the vehicle has no {' and no '.join(missing)}: remove this key, or add the axis")
         elif ordered != name:

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, ValidationInfo, WithJsonSchema
 
-from rov_fmu.equation.catalogue import AXES, Axis, Declaration, cross_name
+from rov_fmu.equation.catalogue import BY_LETTER, BY_VELOCITY, Axis, Declaration, cross_name
 from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, table_of
 
 
@@ -82,8 +82,6 @@ def quantity(name: str, declaration: Declaration, negative: str = "") -> Any:
 
 # ---- Fossen's notation -----------------------------------------------------------------------------------------------
 
-_LETTERS = "XYZKMN"
-_AXES = {axis.velocity: axis for axis in AXES.values()}
 _VELOCITY = "([uvwpqr])"
 _BARS = r"(?:_?\|_?|_?abs_?)"
 _FORMS = {
@@ -100,7 +98,7 @@ _FORMS = {
 def derivative(key: str, axis: Axis) -> str:
     """Return the derivative of an axis that m_a, a_d or b_d replaces, in Fossen's notation: X_udot, X_u|u| or X_u."""
     v = axis.velocity
-    return f"{_LETTERS['uvwpqr'.index(v)]}_{v}{ {'m_a': 'dot', 'a_d': f'|{v}|', 'b_d': ''}[key] }"
+    return f"{axis.letter}_{v}{ {'m_a': 'dot', 'a_d': f'|{v}|', 'b_d': ''}[key] }"
 
 
 def derivative_hint(key: str) -> str:
@@ -113,13 +111,13 @@ def derivative_hint(key: str) -> str:
     for name, form in _FORMS.items():
         if not (match := form.fullmatch(key)):
             continue
-        along = _AXES["uvwpqr"[_LETTERS.index(match[1])]]
+        along = BY_LETTER[match[1]]
         velocities = [velocity for velocity in match.groups()[1:] if velocity]
         if {*velocities} == {along.velocity}:
             return f"; give -{derivative(name, along)}, which is positive, as {name} of [axes.{along.name}]"
         pair = [along.velocity, velocities[-1]]
         if name == "m_a":
-            pair.sort(key="uvwpqr".index)
+            pair.sort(key=[*BY_VELOCITY].index)
         elif len({*velocities}) > 1:
             return ""
         return f"; give its negative as {cross_name(name, *pair)} in [cross]"

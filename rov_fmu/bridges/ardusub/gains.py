@@ -191,7 +191,7 @@ def _rule(vehicle: Vehicle, mixer: Mixer, axis: Axis, share: float) -> dict[str,
     curves = {vehicle.layout.curve_of[thruster.name] for thruster in vehicle.layout.thrusters_along(axis)}
     lag = max(vehicle[curve.coefficient("T")] for curve in curves)
     lowered = f"; {share:.0%} of it, so that it does not chatter" if share < 1.0 else ""
-    dead = vehicle["T_d"] if vehicle.layout.has_dead_time else 0.0
+    dead = vehicle.coefficients.get("T_d", 0.0)
     behind = f", T = {lag:.3g} s" + (f", T_d = {dead:.3g} s" if dead else "")
     if axis is HEAVE:
         p, climb = share * 0.8 * inertia / (0.2 * k), min(FIRMWARE["PSC_VELZ_P"], 0.88 / (lag + dead))

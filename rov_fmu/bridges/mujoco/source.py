@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from rov_fmu.c.compile import C_SOURCES
 from rov_fmu.equation.attitude import ROTATION
-from rov_fmu.equation.catalogue import AXES, CURRENT, CURRENT_DOWN
+from rov_fmu.equation.catalogue import BY_VELOCITY, CURRENT, CURRENT_DOWN
 from rov_fmu.equation.expression import ZERO, Expression, to_c
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import CommandTable
@@ -18,8 +18,7 @@ from rov_fmu.equation.python.printed import TIME, accelerations_of, arrived, lag
 from rov_fmu.io.paths import FMU_SRC
 
 WATER = FMU_SRC / "mujoco" / "water.c"
-_VELOCITIES = tuple(axis.velocity for axis in AXES.values())
-_BODY = {name: n for n, name in enumerate((*_VELOCITIES, *ROTATION))}
+_BODY = {name: n for n, name in enumerate((*BY_VELOCITY, *ROTATION))}
 """The places of what the body does."""
 
 
@@ -42,7 +41,7 @@ def memory_size(layout: Layout) -> tuple[int, int]:
 
     These are N_KEPT and N_CHANGE of water.c. Without a dead time, nothing waits.
     """
-    kept = 1 + len(_VELOCITIES) + len(lagging(accelerations_of(layout).equation))
+    kept = 1 + len(BY_VELOCITY) + len(lagging(accelerations_of(layout).equation))
     commands = len(layout.commands)
     return (kept + commands + 1, 2 + commands) if layout.has_dead_time else (kept, 0)
 
@@ -72,7 +71,7 @@ def _equation(layout: Layout) -> str:
         "N_FORCES": len(layout.thrusters),
         "N_NUMBERS": len(places),
         "N_BODY": len(_BODY),
-        "BODY_ROTATION": len(_VELOCITIES),
+        "BODY_ROTATION": len(BY_VELOCITY),
     }
     current = [given.index(name) if name in given else -1 for name in (*CURRENT, *CURRENT_DOWN)]
     after = {f"after_{n}": formula for n, formula in enumerate(lagging(equation).values())}
@@ -84,7 +83,7 @@ enum {{ {", ".join(f"{name} = {n}" for name, n in sizes.items())} }};
 {_array("int", "DIRECTIONS", (_BODY[name] for name in directions))} /* their places in the body */
 {_array("int", "FORCES", (f"V_F_{thruster.name}" for thruster in layout.thrusters))}
 {_array("int", "CURRENT", current)} /* the places of the current, or -1 */
-{_array("int", "LACKS", (int(name not in layout.velocities) for name in _VELOCITIES))} /* 1 along axes that it lacks */
+{_array("int", "LACKS", (int(name not in layout.velocities) for name in BY_VELOCITY))} /* 1 along axes that it lacks */
 {_array("double", "STARTS", (layout.usual_inputs[name] for name in layout.commands))} /* of the commands */
 {_tables(equation.thrust_tables)}
 /* Compute the numbers that follow from coefficients, inputs and directions of motion. */
@@ -111,7 +110,7 @@ static void equation_rates(const double v[], double _time, const double y[], dou
     (void)v, (void)_time, (void)y;
 {_lines({f"const double {name}": x for name, x in fractions.items()})}\
 {"".join(f"    (void){name};{chr(10)}" for name in fractions)}\
-{_lines({f"rate[{n}]": rates.get(name, ZERO) for n, name in enumerate(_VELOCITIES)}, in_rates)}}}
+{_lines({f"rate[{n}]": rates.get(name, ZERO) for n, name in enumerate(BY_VELOCITY)}, in_rates)}}}
 
 /* Replace the forces and the speeds of rotors that lag by those some seconds after the numbers. */
 static void equation_lag(double v[], double _time)

@@ -10,7 +10,7 @@ from types import ModuleType
 from typing import NamedTuple
 
 from ..attitude import QUATERNION, ROTATION, quaternion_rates, start_formulas
-from ..catalogue import AXES
+from ..catalogue import BY_VELOCITY
 from ..expression import FUNCTIONS, PYTHON, Expression, Name, call, of, total, written
 from ..layout import Layout
 from ..parts import CommandTable
@@ -42,7 +42,7 @@ def equation_text(layout: Layout) -> str:
     def places(names: Iterable[str]) -> dict[str, int]:
         return {name: states.index(name) for name in names}
 
-    alike = ("uvwpqr", ("x", "y", *(() if "z" in equation.used else "z"), "psi"), ROTATION, quaternion)
+    alike = (BY_VELOCITY, ("x", "y", *(() if "z" in equation.used else "z"), "psi"), ROTATION, quaternion)
     groups = [[states.index(name) for name in names if name in states] for names in alike]
     numbers = {**equation.program, **equation.forces}
     shifted = (f'    v.setdefault("{name}", {written(x, PYTHON, _value)})\n' for name, x in equation.shifted.items())
@@ -100,7 +100,7 @@ def printed_model(layout: Layout) -> ModuleType:
 # ---- For a simulator that moves the body itself ----------------------------------------------------------------------
 
 
-_KNOWN = (*(axis.velocity for axis in AXES.values()), *ROTATION[6:])
+_KNOWN = (*BY_VELOCITY, *ROTATION[6:])
 """The states that the simulator gives: the velocities through the water, and the third row of the rotation matrix."""
 
 
@@ -132,7 +132,6 @@ class Accelerations(NamedTuple):
 def accelerations_of(layout: Layout) -> Accelerations:
     """Return the formulas for a simulator that moves the body itself."""
     equation = equation_of(layout)
-    every = [axis.velocity for axis in AXES.values()]
     terms, _ = _terms_of_known(equation, layout)
     rates = {v: rate_formula(own) for v, own in terms.items()}
     formulas = {**equation.program, **equation.forces}
@@ -142,7 +141,9 @@ def accelerations_of(layout: Layout) -> Accelerations:
     masses: dict[tuple[str, str], Expression] = {(v, v): 1.0 / equation.names("gain", v) for v in mass.gains}
     for a, b in (pair for pair in mass.entries if {*pair} <= {*mass.gains}):
         masses[a, b] = masses[b, a] = equation.names("mass", a + b)
-    return Accelerations(equation, numbers, [[masses.get((a, b), of(0.0)) for b in every] for a in every], rates)
+    return Accelerations(
+        equation, numbers, [[masses.get((a, b), of(0.0)) for b in BY_VELOCITY] for a in BY_VELOCITY], rates
+    )
 
 
 # ---- What lags ----

@@ -251,11 +251,9 @@ def _shares(vehicle: Vehicle, axis: Axis) -> dict[str, float]:
     if not layout.has_attitude:
         return layout.signs(axis)
     axes = layout.bare_axes
+    gains = [*zip(*layout.gain_rows(t.name for t in layout.thrusters), strict=True)]
     effects = [
-        [
-            sum(vehicle.effect(t, other) * layout.gains[t.name].get(name, 0.0) for t in layout.thrusters)
-            for name in layout.commands
-        ]
+        [sum(vehicle.effect(t, other) * gain for t, gain in zip(layout.thrusters, own, strict=True)) for own in gains]
         for other in axes
     ]
     shares = np.linalg.pinv(np.array(effects), rcond=1e-9)[:, axes.index(axis)]

@@ -81,8 +81,8 @@ def _commands(log: Log, layout: Layout) -> tuple[Array, dict[str, list[float]]]:
         signs = layout.signs(log.axis)
         values = given @ np.array([[signs.get(name, 0.0) for name in layout.commands]])
     else:
-        mix = [[layout.gains[name].get(one, 0.0) for one in layout.commands] for name in commands.thrusters]
-        values = given @ np.linalg.pinv(np.array(mix), rcond=1e-9).T
+        mix = np.array(layout.gain_rows(commands.thrusters))
+        values = given @ np.linalg.pinv(mix, rcond=1e-9).T
     columns = np.clip(values, -1.0, 1.0).T
     return times, {name: _rounded(column) for name, column in zip(layout.commands, columns, strict=True)}
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import atan2, copysign, cos, hypot, sin
 
-from rov_fmu.equation.catalogue import AXES, HEAVE, SURGE, SWAY, YAW, Axis
+from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -19,8 +19,6 @@ _Box = tuple[Place, Place]
 VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
 """For each view: the axis that points down, the axis along the line of sight, and 1 if this axis points toward the
 viewer, else -1."""
-_LETTERS = {SURGE: "x", SWAY: "y", HEAVE: "z"}
-_INDEX = {axis: n for n, axis in enumerate(AXES.values())}
 _SMALLEST = 0.05
 """The least size of a vehicle, m."""
 _HEIGHT = 0.17
@@ -70,9 +68,9 @@ def marks_of(vehicle: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator
     seen: dict[tuple[float, ...], list[str]] = {}
     for thruster in vehicle.layout.thrusters:
         at, d = thruster_place(vehicle, thruster), thruster.direction.value
-        along = d[0], d[_INDEX[down]]
-        hidden = toward * d[_INDEX[sight]] if hypot(*along) < 0.1 else 0.0
-        key = tuple(round(part, 3) + 0.0 for part in (at[0], at[_INDEX[down]], *along, hidden))
+        along = d[0], d[down.place]
+        hidden = toward * d[sight.place] if hypot(*along) < 0.1 else 0.0
+        key = tuple(round(part, 3) + 0.0 for part in (at[0], at[down.place], *along, hidden))
         seen.setdefault(key, []).append(thruster.name)
     for (x, y, dx, dy, hidden), names in seen.items():
         label = ", ".join("$F_{" + name.replace("_", r"\_") + "}$" for name in names)
@@ -152,7 +150,8 @@ def _arranged(vehicle: Vehicle, view: str, inch: float) -> Scene:
         at = -far * cos(gamma / 2.0), side * far * sin(gamma / 2.0)
         name(r"$\gamma$", 0.1, "muted", at, 0.0, (0.0, 0.0))
     for axis, end in ((SURGE, (1.4 * size, 0.0)), (down, (0.0, 0.9 * size))):
-        words = rf"${_LETTERS[axis]}, {axis.velocity}$" if vehicle.layout.has(axis) else f"${_LETTERS[axis]}$"
+        letter = "xyz"[axis.place]
+        words = f"${letter}, {axis.velocity}$" if vehicle.layout.has(axis) else f"${letter}$"
         name(words, 0.3 if "," in words else 0.1, "ink", end, 0.0, (end[0] and 1.0, end[1] and 1.0), *_AROUND)
     if from_above and vehicle.layout.has(YAW):
         name(r"$\psi, r$", 0.3, "ink", turn(size)[1], 0.0, (0.0, 1.0), *_AROUND)
