@@ -8,13 +8,14 @@ east, down), the rotation from `base_link` to `map` is
 
 where R is the rotation from the FMU's body frame to its earth frame. Positions and orientations use Foxglove's
 schemas; all other variables are JSON with the names and units of the FMU, with north, east, and down as there.
+
+Its import raises InputError where foxglove-sdk is not installed.
 """
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from io import BytesIO
 from math import inf
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -23,18 +24,34 @@ from rov_fmu.c.simulation import Array
 from rov_fmu.equation.attitude import QUATERNION
 from rov_fmu.equation.catalogue import UPWARD
 from rov_fmu.io.messages import InputError
-from rov_fmu.report.plots.geometry import thruster_place
+from rov_fmu.report.plots.geometry import hull_size, thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
 
-if TYPE_CHECKING:
-    from foxglove import Context
-    from foxglove.messages import ArrowPrimitive, Color, Pose, Quaternion, SceneEntity, Timestamp, Vector3
+try:
+    from foxglove import Channel, Context, open_mcap
+    from foxglove.channels import FrameTransformsChannel, PoseInFrameChannel, SceneUpdateChannel
+    from foxglove.mcap import MCAPWriteOptions
+    from foxglove.messages import (
+        ArrowPrimitive,
+        Color,
+        CubePrimitive,
+        FrameTransform,
+        FrameTransforms,
+        Pose,
+        PoseInFrame,
+        Quaternion,
+        SceneEntity,
+        SceneUpdate,
+        Timestamp,
+        Vector3,
+    )
+except ImportError as error:
+    raise InputError("MCAP needs foxglove-sdk: pip install 'rov-fmu[ros]'") from error
 
 EARTH = "map"
 """The name of the frame that is fixed to the earth: east, north, up."""
 BODY = "base_link"
 """The name of the frame of the vehicle: forward, left, up. It is the same for all vehicles, so layouts fit all."""
-MISSING = "MCAP needs foxglove-sdk: pip install 'rov-fmu[ros]'"
 _TO_ENU = Rotation.from_matrix([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
 """The rotation from north-east-down to east-north-up."""
 _TO_FRD = Rotation.from_matrix(np.diag(UPWARD[:3]))
@@ -43,8 +60,6 @@ _SCENE_INTERVAL = 0.04
 """The least time between two pictures of the vehicle, s: 25 pictures a second look smooth."""
 _LONGEST_JET = 1.5
 """The length of the longest jet, relative to the size of the vehicle."""
-_LEAST_HULL = (0.2, 0.15, 0.1)
-"""The least length, width and height of the hull, m."""
 _HULL, _JET = (0.93, 0.69, 0.13, 0.8), (0.34, 0.71, 0.91, 0.9)
 """The colours of the hull and of the jets: red, green, blue and opacity."""
 
@@ -60,15 +75,10 @@ class NumberField:
 
 
 class Recording:
-    """An MCAP file in memory. Raises InputError where foxglove-sdk is not installed."""
+    """An MCAP file in memory."""
 
     def __init__(self, about: Mapping[str, str], profile: str = "") -> None:
         """Begin a file with metadata about the vehicle, and with a profile, which tells what kind of file it is."""
-        try:
-            from foxglove import Context, open_mcap
-            from foxglove.mcap import MCAPWriteOptions
-        except ImportError as error:
-            raise InputError(MISSING) from error
         self.context, self._stream = Context(), BytesIO()
         options = MCAPWriteOptions(profile=profile, compression_threads=0)  # the bytes do not depend on the machine
         self._writer = open_mcap(self._stream, context=self.context, writer_options=options)
@@ -76,8 +86,6 @@ class Recording:
 
     def topic(self, name: str, numbers: Mapping[str, NumberField]) -> Callable[[int, Mapping[str, float]], None]:
         """Return the function that writes a message of a topic with numbers by name, at a time in ns."""
-        from foxglove import Channel
-
         schema = {
             "title": name.removeprefix("/"),
             "type": "object",
@@ -91,9 +99,6 @@ class Recording:
 
     def poses(self, name: str, values: Mapping[str, Array]) -> Callable[[int, int], None]:
         """Return the function that writes the n-th pose of a topic, with its stamp in ns, from values as in `poses`."""
-        from foxglove.channels import PoseInFrameChannel
-        from foxglove.messages import PoseInFrame
-
         channel = PoseInFrameChannel(name, context=self.context)
         positions, orientations = poses(values)
 
@@ -121,8 +126,6 @@ def motion_mcap(vehicle: Vehicle, time: Array, values: Mapping[str, Array]) -> b
     its units. The topics are `/tf`, `/pose` and `/scene` with Foxglove's schemas, and `/inputs` and `/outputs` with
     numbers by name. A coordinate of the pose that the vehicle does not have, such as the depth without heave, is 0.
     Inputs are held, so they are written when one of them changes.
-
-    Raises InputError where foxglove-sdk is not installed.
     """
     recording = Recording(about_vehicle(vehicle))
     layout = vehicle.layout
@@ -166,11 +169,8 @@ def poses(values: Mapping[str, Array]) -> tuple[Array, Rotation]:
     return np.stack([east, north, 0.0 - down], axis=-1), _TO_ENU * turned * _TO_FRD
 
 
-def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Context") -> Callable[[int, int], None]:
+def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: Context) -> Callable[[int, int], None]:
     """Return the function that writes frame and picture of the vehicle at the n-th time, with its stamp in ns."""
-    from foxglove.channels import FrameTransformsChannel, SceneUpdateChannel
-    from foxglove.messages import FrameTransform, FrameTransforms, SceneUpdate
-
     tf = FrameTransformsChannel("/tf", context=context)
     scene = SceneUpdateChannel("/scene", context=context)
     positions, orientations = poses(values)
@@ -197,13 +197,11 @@ def _picture_writer(vehicle: Vehicle, values: Mapping[str, Array], context: "Con
     return write
 
 
-def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "SceneEntity":
+def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> SceneEntity:
     """Return a picture of the vehicle: a hull of some size, and for each thruster its jet against the force.
 
     `shares` are the forces relative to the strongest one.
     """
-    from foxglove.messages import CubePrimitive, SceneEntity
-
     middle = _pose(np.zeros(3), Rotation.identity())
     return SceneEntity(
         frame_id=BODY,
@@ -214,17 +212,8 @@ def _picture(vehicle: Vehicle, size: Array, shares: Mapping[str, float]) -> "Sce
     )
 
 
-def hull_size(vehicle: Vehicle) -> Array:
-    """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
-    corners = np.abs([(0.0, 0.0, 0.0), *(thruster_place(vehicle, thruster) for thruster in vehicle.layout.thrusters)])
-    size: Array = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
-    return size
-
-
-def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator["ArrowPrimitive"]:
+def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iterator[ArrowPrimitive]:
     """Yield the jets as arrows in the frame of the vehicle. An arrow of Foxglove points along its own x axis."""
-    from foxglove.messages import ArrowPrimitive
-
     for thruster in vehicle.layout.thrusters:
         share = shares.get(thruster.name, 0.0)
         if share == 0.0:
@@ -242,31 +231,21 @@ def _jets(vehicle: Vehicle, shares: Mapping[str, float], longest: float) -> Iter
         )
 
 
-def _timestamp(stamp: int) -> "Timestamp":
-    from foxglove.messages import Timestamp
-
+def _timestamp(stamp: int) -> Timestamp:
     return Timestamp(*divmod(stamp, 1_000_000_000))
 
 
-def _pose(position: Array, orientation: Rotation) -> "Pose":
-    from foxglove.messages import Pose
-
+def _pose(position: Array, orientation: Rotation) -> Pose:
     return Pose(position=_vector(position), orientation=_quaternion(orientation))
 
 
-def _vector(of: Array) -> "Vector3":
-    from foxglove.messages import Vector3
-
+def _vector(of: Array) -> Vector3:
     return Vector3(**dict(zip("xyz", of.tolist(), strict=True)))
 
 
-def _quaternion(of: Rotation) -> "Quaternion":
-    from foxglove.messages import Quaternion
-
+def _quaternion(of: Rotation) -> Quaternion:
     return Quaternion(**dict(zip("xyzw", of.as_quat().tolist(), strict=True)))
 
 
-def _colour(of: tuple[float, float, float, float]) -> "Color":
-    from foxglove.messages import Color
-
+def _colour(of: tuple[float, float, float, float]) -> Color:
     return Color(**dict(zip("rgba", of, strict=True)))

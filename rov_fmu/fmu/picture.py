@@ -4,7 +4,6 @@ import warnings
 from io import BytesIO
 from pathlib import Path
 
-from lxml import etree
 from PIL import Image, UnidentifiedImageError
 
 from rov_fmu.io.messages import FileError
@@ -37,8 +36,8 @@ def read_svg(path: Path) -> bytes:
     content = read_bytes(path, most=_LARGEST)
     try:
         root = root_of_xml(content)
-    except etree.XMLSyntaxError as error:
-        raise FileError(f"{path}: not an SVG picture: {error.msg}") from error
+    except ValueError as error:
+        raise FileError(f"{path}: not an SVG picture: {error}") from error
     if root.tag != "{http://www.w3.org/2000/svg}svg":
         raise FileError(f"{path}: not an SVG picture: its root is {root.tag} and not svg of http://www.w3.org/2000/svg")
     return content

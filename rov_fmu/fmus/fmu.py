@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from lxml import etree
 from typing_extensions import Self
 
 from rov_fmu.fmu.terminals import FOLDER
@@ -20,7 +19,7 @@ from rov_fmu.fmus.unpacking import opened_archive, unpack_fmu
 from rov_fmu.fmus.variable import Variable, variables_of
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, brief
+from rov_fmu.io.messages import FileError
 from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
 
 _TERMINALS = f"{FOLDER}/terminalsAndIcons.xml"
@@ -72,8 +71,8 @@ class Fmu:
             content = zipped.read(_TERMINALS)
         try:
             root = root_of_xml(content)
-        except etree.XMLSyntaxError as error:
-            raise FileError(f"{where}: not XML: {brief(error.msg)}") from error
+        except ValueError as error:
+            raise FileError(f"{where}: {error}") from error
         return {
             terminal.get("name", ""): {
                 member.get("memberName", ""): member.get("variableName", "")

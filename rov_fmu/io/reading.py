@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
-from rov_fmu.io.messages import NO_FILE, FileError
+from rov_fmu.io.messages import NO_FILE, FileError, brief
 
 _MOST_BYTES = 1_000_000_000
 """The largest file that is read as a whole, in bytes, where nothing else is said."""
@@ -88,10 +88,13 @@ def text_of(path: Path, content: bytes, kind: type[FileError] = FileError) -> st
 
 
 def root_of_xml(content: bytes) -> Any:
-    """Return the root element of XML that may come from a stranger. Raises `lxml.etree.XMLSyntaxError`.
+    """Return the root element of XML that may come from a stranger. Raises ValueError with only the reason.
 
     An entity could stand for another file or for gigabytes of text, so none is replaced, and nothing is fetched.
     """
     from lxml import etree  # most commands read no XML
 
-    return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+    try:
+        return etree.fromstring(content, etree.XMLParser(resolve_entities=False, no_network=True))
+    except etree.XMLSyntaxError as error:
+        raise ValueError(f"not XML: {brief(error.msg.partition(', try XML_PARSE_HUGE')[0], 240)}") from error

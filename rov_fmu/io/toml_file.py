@@ -155,6 +155,15 @@ AS_TUPLE = Field(strict=False)
 """An array of TOML becomes a tuple."""
 
 
+TEXT_SCHEMA = WithJsonSchema({"type": "string"})
+"""What editors are told of a text that becomes something else."""
+
+
+def numbers_schema(count: int) -> WithJsonSchema:
+    """Return what editors are told of a list of so many numbers."""
+    return WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": count, "maxItems": count})
+
+
 def printable(text: str) -> str:
     """Return the text if it has no control characters. Raises ValueError."""
     if control := re.search(r"[^\n\t -~\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", text):

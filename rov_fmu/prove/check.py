@@ -5,8 +5,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from lxml import etree
-
 from rov_fmu.fmu.archive import META_DATA, directory, local_header
 from rov_fmu.fmu.meta_data import ARCHIVE, BEFORE, FILES, GENERATOR, INPUTS, own_hash
 from rov_fmu.fmus.unpacking import check_order, opened_archive
@@ -70,8 +68,8 @@ def _read(fmu: Path, archive: zipfile.ZipFile) -> MetaData:
         raise FileError(f"{where}: {too_large(size, _MOST_BYTES)}")
     try:
         root = root_of_xml(archive.read(META_DATA))
-    except (etree.XMLSyntaxError, zipfile.BadZipFile) as error:
-        raise ProofError(f"{where}: was altered after the FMU was built: {brief(str(error.args[0]))}") from error
+    except (ValueError, zipfile.BadZipFile) as error:
+        raise ProofError(f"{where}: was altered after the FMU was built: {brief(str(error))}") from error
     entries = {
         classification.get("type"): {
             entry.get("keyword", ""): (entry.text or "").strip()

@@ -94,10 +94,11 @@ class _Member:
 
     def xml(self, root: str) -> Any:
         """Return the root element of this file, which must have the name `root`."""
+        content = self.text().encode()
         try:
-            element = root_of_xml(self.text().encode())
-        except etree.XMLSyntaxError as error:
-            raise self.error(f"not XML: {error}") from error
+            element = root_of_xml(content)
+        except ValueError as error:
+            raise self.error(str(error)) from error
         if (name := etree.QName(element).localname) != root:
             raise self.error(f"must begin with <{root}>, and not with <{name}>")
         return element

@@ -2,11 +2,11 @@
 
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from itertools import chain
 from math import inf
 from pathlib import Path
-from typing import Annotated, Literal, TypeVar, get_args
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, WithJsonSchema
 
@@ -14,7 +14,7 @@ from rov_fmu.equation.catalogue import AXES
 from rov_fmu.equation.parts import EVERY_COMMAND, Range
 from rov_fmu.io.output import is_same
 from rov_fmu.io.paths import inside, inside_or_shipped, is_portable
-from rov_fmu.io.toml_file import AS_TUPLE, Finite, Name, Strict, Text, folder_of, printable, rule
+from rov_fmu.io.toml_file import AS_TUPLE, TEXT_SCHEMA, Finite, Name, Strict, Text, folder_of, printable, rule
 from rov_fmu.vehicle.quantity import Interval
 
 _KEYWORDS = re.compile(
@@ -91,17 +91,16 @@ def _folder(files: Iterable[str]) -> BeforeValidator:
     return BeforeValidator(check)
 
 
-_STRING = WithJsonSchema({"type": "string"})
 _NAME_OF_REPORT = WithJsonSchema({"type": "string", "minLength": 1, "maxLength": 10_000})
 
 
 class FileHead(Head):
     """Names, source, and folders beside the file."""
 
-    data: Annotated[Path, _folder([*chain(*TABLES.values())]), _STRING] | None = None
+    data: Annotated[Path, _folder([*chain(*TABLES.values())]), TEXT_SCHEMA] | None = None
     """A folder with the published tables that `python -m verification.tables` prints, in the form of
     `models/videoray/tables`."""
-    pictures: Annotated[Path, _folder(PICTURES), _STRING] | None = None
+    pictures: Annotated[Path, _folder(PICTURES), TEXT_SCHEMA] | None = None
     """A folder with the vehicle's own `model.png`, `from_above.svg`, `from_starboard.svg`, for a light background. The
     icon and the thrusters are always drawn from their geometry."""
 
@@ -137,28 +136,26 @@ class IdentifiedRange(Strict):
     unit: Literal["m/s", "rad/s", "rad", "m"]
 
 
-def _with_their_units(ranges: dict[str, IdentifiedRange]) -> dict[str, IdentifiedRange]:
-    """Return the ranges if each belongs to a quantity and has its unit. Raises ValueError."""
-    for name, one in ranges.items():
-        if name not in UNIT_OF_RANGE:
-            raise ValueError(f"must have ranges of {', '.join(UNIT_OF_RANGE)}, and not of {name}")
-        if one.unit != UNIT_OF_RANGE[name]:
-            raise ValueError(f"must have the range of {name} in {UNIT_OF_RANGE[name]}, and not in {one.unit}")
-    return ranges
+def _by_quantity(word: str, units: Mapping[str, str]) -> AfterValidator:
+    """Return a validator of values by the names of quantities, which have these units. A word tells what they are."""
+
+    def check(given: dict[str, Any]) -> dict[str, Any]:
+        for name, one in given.items():
+            if name not in units:
+                raise ValueError(f"must have {word}s of {', '.join(units)}, and not of {name}")
+            if getattr(one, "unit", units[name]) != units[name]:
+                raise ValueError(f"must have the {word} of {name} in {units[name]}, and not in {one.unit}")
+        return given
+
+    return AfterValidator(check)
 
 
-_Any = TypeVar("_Any")
 _BETWEEN_FULL = rule(
     "must be [low, high] with -1 <= low <= 0 <= high <= 1", lambda ends: -1.0 <= ends[0] <= 0.0 <= ends[1] <= 1.0
 )
 
 
-def _of_axes(given: dict[str, _Any], what: str = "commands") -> dict[str, _Any]:
-    """Return the values if each belongs to an axis. Raises ValueError."""
-    for name in given:
-        if name not in AXES:
-            raise ValueError(f"must have {what} of {', '.join(AXES)}, and not of {name}")
-    return given
+_UNITS_OF_AXES = {name: axis.unit for name, axis in AXES.items()}
 
 
 class StatedSpeed(Strict):
@@ -173,14 +170,6 @@ class StatedSpeed(Strict):
     """The velocities between which the coefficients of the axis were measured, where this is known."""
 
 
-def _with_units_of_axes(stated: dict[str, StatedSpeed]) -> dict[str, StatedSpeed]:
-    """Return the speeds if each belongs to an axis and has its unit. Raises ValueError."""
-    for name, one in _of_axes(stated, "speeds").items():
-        if one.unit != AXES[name].unit:
-            raise ValueError(f"must have the speed of {name} in {AXES[name].unit}, and not in {one.unit}")
-    return stated
-
-
 class Validity(Strict):
     """Where the model holds, and what it leaves out."""
 
@@ -188,13 +177,15 @@ class Validity(Strict):
     """The strongest command for which the model was identified."""
     command_min: Annotated[_Command, AfterValidator(_below_maximum)]
     """The weakest such command."""
-    identified: Annotated[dict[str, IdentifiedRange], AfterValidator(_with_their_units)] = Field(default={})
+    identified: Annotated[dict[str, IdentifiedRange], _by_quantity("range", UNIT_OF_RANGE)] = Field(default={})
     """The identified ranges of the velocities u, v, w, p, q, r, of roll phi, pitch theta and depth z, which
     `rov-fmu identify` writes. With them, the FMU has the output `outside`."""
-    tested: Annotated[dict[str, Annotated[Interval, _BETWEEN_FULL]], AfterValidator(_of_axes)] = Field(default={})
+    tested: Annotated[dict[str, Annotated[Interval, _BETWEEN_FULL]], _by_quantity("command", _UNITS_OF_AXES)] = Field(
+        default={}
+    )
     """The commands along each axis between which tests of this axis held it long enough, as in `surge = [-0.52, 0.57]`,
     which `rov-fmu identify` writes. An axis that is not among them was tested up to `command_max`."""
-    stated: Annotated[dict[str, StatedSpeed], AfterValidator(_with_units_of_axes)] = Field(default={})
+    stated: Annotated[dict[str, StatedSpeed], _by_quantity("speed", _UNITS_OF_AXES)] = Field(default={})
     """The top speeds that others state of the real vehicle, by axis, such as `surge = { value = 1.5, unit = "m/s",
     source = "its maker" }`. If the model differs by more than 10 %, `fly`, `sitl` and the model card say so. The key
     `measured`, `[low, high]`, tells between which velocities the coefficients were measured."""

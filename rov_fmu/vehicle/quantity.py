@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, ValidationInfo, WithJsonSchema
 
 from rov_fmu.equation.catalogue import BY_LETTER, BY_VELOCITY, Axis, Declaration, cross_name
-from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, table_of
+from rov_fmu.io.toml_file import AS_TUPLE, SYMBOL, SYMBOL_SCHEMA, Finite, Strict, Text, numbers_schema, table_of
 
 
 def _cross_symbol(text: str) -> str:
@@ -26,7 +26,7 @@ CrossSymbol = Annotated[str, AfterValidator(_cross_symbol), SYMBOL, SYMBOL_SCHEM
 Interval = Annotated[
     tuple[Finite, Finite],
     AS_TUPLE,
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2}),
+    numbers_schema(2),
 ]
 """The ends of an interval, `[low, high]` in a TOML file."""
 

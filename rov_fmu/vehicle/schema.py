@@ -13,7 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
-from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, InstanceOf, ValidationInfo
 from pydantic_core import ErrorDetails
 
 from rov_fmu.equation import parts
@@ -44,6 +44,7 @@ from rov_fmu.io.paths import inside_or_shipped
 from rov_fmu.io.toml_file import (
     DOCUMENTED,
     NOT_BLANK,
+    TEXT_SCHEMA,
     Finite,
     Name,
     Strict,
@@ -51,6 +52,7 @@ from rov_fmu.io.toml_file import (
     Text,
     Toml,
     folder_of,
+    numbers_schema,
     rule,
     table_of,
     validate,
@@ -139,14 +141,7 @@ class CommandsTable(_coefficients("Commands", COMMANDS)):  # type: ignore[misc]
 
     model_config = DOCUMENTED
 
-    pulse: (
-        Annotated[
-            tuple[float, float, float],
-            BeforeValidator(_pulses),
-            WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
-        ]
-        | None
-    ) = None
+    pulse: Annotated[tuple[float, float, float], BeforeValidator(_pulses), numbers_schema(3)] | None = None
     """Pulse widths of full reverse, neutral and full thrust ahead, µs: `[1100, 1500, 1900]`. With this key, the
     commands of the FMU are pulse widths."""
 
@@ -175,9 +170,8 @@ def _file_read_by(read: Callable[[Path], object]) -> BeforeValidator:
     return BeforeValidator(read_file)
 
 
-_TEXT = WithJsonSchema({"type": "string"})
-_Thrust = Annotated[InstanceOf[CommandTable], _file_read_by(read_thrust), _TEXT]
-_Current = Annotated[InstanceOf[CommandTable], _file_read_by(read_current), _TEXT]
+_Thrust = Annotated[InstanceOf[CommandTable], _file_read_by(read_thrust), TEXT_SCHEMA]
+_Current = Annotated[InstanceOf[CommandTable], _file_read_by(read_current), TEXT_SCHEMA]
 
 
 _Volts = Annotated[Finite, Field(ge=0.1, le=1000.0)]
@@ -291,11 +285,7 @@ def _unit_vector(direction: Vector) -> Vector:
 
 
 _NEAR = rule(f"must be within -{_FARTHEST:g} ... {_FARTHEST:g} m", lambda at: max(map(abs, at)) <= _FARTHEST)
-_Vector = Annotated[
-    tuple[Finite, Finite, Finite],
-    BeforeValidator(_vector),
-    WithJsonSchema({"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3}),
-]
+_Vector = Annotated[tuple[Finite, Finite, Finite], BeforeValidator(_vector), numbers_schema(3)]
 
 
 class Direction(Strict):

@@ -135,6 +135,7 @@ def test_level_frames_and_the_picture_with_the_jets(heavy: VehicleModel) -> None
 def test_without_the_library(heavy: VehicleModel, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where foxglove-sdk is missing, a line says how to install it."""
     monkeypatch.setitem(sys.modules, "foxglove", None)
+    monkeypatch.delitem(sys.modules, "rov_fmu.bridges.mcap", raising=False)
     with pytest.raises(InputError, match=r"pip install 'rov-fmu\[ros\]'"):
         heavy.to_mcap(recorded(heavy, 0.1, {}))
 

@@ -11,11 +11,11 @@ import numpy as np
 from mujoco import rollout
 
 from rov_fmu.bridges.gym import RovVectorEnv
-from rov_fmu.bridges.mcap import hull_size
 from rov_fmu.bridges.mujoco import load_mujoco, mujoco_texts
 from rov_fmu.bridges.mujoco.plugin import step
 from rov_fmu.c.simulation import simulate
 from rov_fmu.equation.catalogue import SURGE, YAW
+from rov_fmu.report.plots.geometry import hull_size
 from rov_fmu.vehicle.vehicle import Vehicle
 
 from .page import Section, duration

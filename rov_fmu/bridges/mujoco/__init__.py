@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from rov_fmu.bridges import sdf
-from rov_fmu.bridges.mcap import hull_size
 from rov_fmu.bridges.mujoco.source import memory_size, water_sources
 from rov_fmu.c.compile import (
     HOSTS,
@@ -33,7 +32,7 @@ from rov_fmu.equation.catalogue import AXES, UPWARD
 from rov_fmu.equation.parts import Point, Thruster
 from rov_fmu.equation.python.printed import left_out_of_accelerations
 from rov_fmu.io.messages import listed
-from rov_fmu.report.plots.geometry import thruster_place
+from rov_fmu.report.plots.geometry import hull_size, thruster_place
 from rov_fmu.vehicle.vehicle import Vehicle
 
 if TYPE_CHECKING:

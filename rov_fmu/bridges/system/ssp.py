@@ -17,7 +17,7 @@ from rov_fmu.fmus.unpacking import unpack_fmu
 from rov_fmu.fmus.variable import Value
 from rov_fmu.io.file_kinds import SYSTEM, check_suffix
 from rov_fmu.io.interrupts import temporary_folder
-from rov_fmu.io.messages import FileError, brief, shown
+from rov_fmu.io.messages import FileError, shown
 from rov_fmu.io.paths import inside
 from rov_fmu.io.reading import read_bytes, root_of_xml, too_large
 from rov_fmu.io.templates import render
@@ -188,8 +188,8 @@ def _root(folder: Path, name: str) -> Any:
         raise ValueError(f"{name} {too_large(size, _MOST_BYTES)}")
     try:
         return root_of_xml(path.read_bytes())
-    except etree.XMLSyntaxError as error:
-        raise ValueError(f"{name}: not XML: {brief(error.msg)}") from error
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
 
 
 def _value(parameter: Any) -> Value:

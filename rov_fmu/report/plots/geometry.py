@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 from itertools import product
 from math import atan2, copysign, cos, hypot, sin
 
+import numpy as np
+from numpy.typing import NDArray
+
 from rov_fmu.equation.catalogue import HEAVE, SURGE, SWAY, YAW, Axis
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -21,6 +24,8 @@ VIEWS = {"from above": (SWAY, HEAVE, -1), "from starboard": (HEAVE, SWAY, 1)}
 viewer, else -1."""
 _SMALLEST = 0.05
 """The least size of a vehicle, m."""
+_LEAST_HULL = (0.2, 0.15, 0.1)
+"""The least length, width and height of the hull, m."""
 _HEIGHT = 0.17
 """The height of a line of text, inches."""
 _GAP = 0.045
@@ -61,6 +66,13 @@ class Mark:
     def tip(self, size: float) -> Place:
         """Return the end of the arrow of its force."""
         return self.at[0] + 0.5 * size * self.along[0], self.at[1] + 0.5 * size * self.along[1]
+
+
+def hull_size(vehicle: Vehicle) -> NDArray[np.float64]:
+    """Return the length, width and height of a box that stands for the hull, m: it reaches to the outer thrusters."""
+    corners = np.abs([(0.0, 0.0, 0.0), *(thruster_place(vehicle, thruster) for thruster in vehicle.layout.thrusters)])
+    size: NDArray[np.float64] = np.maximum(2.0 * corners.max(axis=0), _LEAST_HULL)
+    return size
 
 
 def marks_of(vehicle: Vehicle, down: Axis, sight: Axis, toward: int) -> Iterator[Mark]:
