@@ -31,6 +31,7 @@ from rov_fmu.identify.result import (
     Interval,
     Logging,
     Prediction,
+    SensorNoise,
     Structure,
     Tested,
     half_width,
@@ -216,19 +217,16 @@ def result_sentences(some: Iterable[Finding], kind: str = "") -> tuple[str, ...]
     return sentences_by((one for one in some if kind in ("", one.kind)), SENTENCES)
 
 
-def by_heading(findings: Iterable[Finding]) -> dict[Heading, tuple[str, ...]]:
+def by_heading(findings: Sequence[Finding]) -> dict[Heading, tuple[str, ...]]:
     """Return the sentences of findings of all axes by their headings: the warnings of all axes come first."""
-    groups: dict[Heading, list[Finding]] = {name: [] for name in _FORMS}
-    for finding in findings:
-        groups[SEVERITY[finding.kind]].append(finding)
-    return {name: result_sentences(some) for name, some in groups.items()}
+    return {name: result_sentences(one for one in findings if SEVERITY[one.kind] == name) for name in _FORMS}
 
 
 def told(identification: Identification) -> Identification:
     """Return an identification with its findings; its vehicle has them too, with its verdicts and errors."""
     findings = findings_of(identification)
     # other files beside the tests say nothing about the vehicle
-    groups = by_heading(finding for finding in findings if finding.kind != "other files")
+    groups = by_heading([finding for finding in findings if finding.kind != "other files"])
     made = identification.vehicle.provenance
     assert made
     sentences_of = {
@@ -251,43 +249,33 @@ def told(identification: Identification) -> Identification:
 
 def findings_of(identification: Identification) -> tuple[Finding, ...]:
     """Return all findings of an identification with those about reading, the most important kinds first."""
-    findings = [*identification.folder.findings]
+    return tuple(sorted(_every(identification), key=lambda one: _ORDER.index(one.kind)))
+
+
+def _every(identification: Identification) -> Iterator[Finding]:
+    """Yield all findings, those about reading first."""
+    yield from identification.folder.findings
     for result in identification.axes:
-        findings += [*_on_predictions(result), *_on_coefficients(identification, result)]
-        findings += [*_on_points(result)]
-        if result.verdict.word == "do not use":
-            findings.append(Finding("do not use", result.axis.name))
-        if result.structure > ALARM:
-            findings.append(about("", "structure", result.axis.name, ratio=significant(result.structure, 2)))
-        if result.structure > USUAL and result.axis is YAW:
-            findings += _on_unlogged_motion(identification)
-        if may_rock(identification.folder, result.axis):
-            findings.append(Finding("rocking", result.axis.name))
+        yield from _on_axis(identification, result)
     for curve, known in identification.curves.items():
-        findings += _not_identified(known, f"{curve} thrust", curve=curve)
-    findings += [*_on_forces(identification), *_on_scale(identification), *_on_vehicle(identification)]
-    differing = (result.axis.name for result in identification.axes if result.difference > DISAGREEMENT)
-    findings += [Finding("second start", axis) for axis in differing]
-    findings += [
-        _disturbance(d, identification.vehicle) for d in identification.disturbances if d.kept and d.share > _NEGLIGIBLE
-    ]
+        yield from _not_identified(known, f"{curve} thrust", curve=curve)
+    yield from _on_forces(identification)
+    yield from _on_scale(identification)
+    yield from _on_vehicle(identification)
+    for d in identification.disturbances:
+        if d.kept and d.share > _NEGLIGIBLE:
+            yield _disturbance(d, identification.vehicle)
     for log_of in identification.folder.logs:
-        findings += _on_log(identification, log_of)
-    findings += filter(None, map(_logging, identification.logging))
+        yield from _on_log(identification, log_of)
+    yield from filter(None, map(_logging, identification.logging))
     for sensor in identification.sensors:
-        if sensor.outliers > _MOST_OUTLIERS:
-            findings.append(about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers))
-        if sensor.wander > max(sensor.white, _LEAST_WANDER):
-            size = size_in_words(sensor.wander, sensor.unit)
-            findings.append(about("", "estimator", sensor.axis.name, size=size))
-    findings += [Finding("search ended")] * identification.has_ended
-    findings += [about("", "not told apart", of=listed(names)) for names in identification.alike]
-    findings += _times(identification)
-    findings += [one for effect in identification.effects if effect.kept for one in _effect(identification, effect)]
-    findings += filter(None, map(_structure, identification.structures))
+        yield from _on_sensor(sensor)
+    yield from _on_search(identification)
+    for effect in identification.effects:
+        if effect.kept:
+            yield from _effect(identification, effect)
     for slip in identification.slips:
-        findings.append(about(slip.file, "slip", quantity=slip.quantity, words=slip.words))
-    return tuple(sorted(findings, key=lambda one: _ORDER.index(one.kind)))
+        yield about(slip.file, "slip", quantity=slip.quantity, words=slip.words)
 
 
 def prediction_name(p: Prediction) -> str:
@@ -566,6 +554,24 @@ def answer_at(result: AxisResult, command: float) -> Answer | None:
     return next((answer for answer in result.answers if abs(answer.command - command) < 1e-6), None)
 
 
+def _on_axis(identification: Identification, result: AxisResult) -> Iterator[Finding]:
+    """Yield the findings about an axis."""
+    axis = result.axis.name
+    yield from _on_predictions(result)
+    yield from _on_coefficients(identification, result)
+    yield from _on_points(result)
+    if result.verdict.word == "do not use":
+        yield Finding("do not use", axis)
+    if result.structure > ALARM:
+        yield about("", "structure", axis, ratio=significant(result.structure, 2))
+    if result.structure > USUAL and result.axis is YAW:
+        yield from _on_unlogged_motion(identification)
+    if may_rock(identification.folder, result.axis):
+        yield Finding("rocking", axis)
+    if result.difference > DISAGREEMENT:
+        yield Finding("second start", axis)
+
+
 def _on_predictions(result: AxisResult) -> Iterator[Finding]:
     """Yield a finding for each prediction that is worse than one of no change.
 
@@ -742,8 +748,21 @@ def _on_log(identification: Identification, log: Log) -> Iterator[Finding]:
             yield Finding("coupling left out", file=log.file)
 
 
-def _times(identification: Identification) -> Iterator[Finding]:
-    """Yield a finding about the times that the logs do not tell apart, if there are any."""
+def _on_sensor(sensor: SensorNoise) -> Iterator[Finding]:
+    """Yield findings about many outliers, and about an estimator whose velocity wanders."""
+    if sensor.outliers > _MOST_OUTLIERS:
+        yield about("", "outliers", sensor.axis.name, quantity=sensor.quantity, share=sensor.outliers)
+    if sensor.wander > max(sensor.white, _LEAST_WANDER):
+        yield about("", "estimator", sensor.axis.name, size=size_in_words(sensor.wander, sensor.unit))
+
+
+def _on_search(identification: Identification) -> Iterator[Finding]:
+    """Yield the causes that were found, and findings about what the logs do not tell apart."""
+    yield from filter(None, map(_structure, identification.structures))
+    if identification.has_ended:
+        yield Finding("search ended")
+    for names in identification.alike:
+        yield about("", "not told apart", of=listed(names))
     if len(identification.times) > 1:
         first, *others = (f"the {time}" for time in identification.times)
         yield about("", "times", first=first, others=listed(others))

@@ -5,7 +5,7 @@ out by the others only where these inform the axis, and otherwise each half of i
 """
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import inf, log
 
 import numpy as np
@@ -72,10 +72,10 @@ class Knowledge:
         The function returns m x n logarithms for p x n coordinates. The share is 0 where all data tell nothing.
         """
         information = information_of(self.objective, self.best, part)
-        of_part = Posterior.of(self.objective.table, self.best.z, information).covariance
+        of_part = Posterior.of(self.objective.table, self.best.z, information)
         with np.errstate(all="ignore"):
             _, every, prior = self._all.numbers(logarithms)
-            _, some, _ = replace(self._all, covariance=of_part).numbers(logarithms)
+            _, some, _ = of_part.numbers(logarithms)
             nats = [np.nan_to_num(np.log(np.diag(prior) / np.diag(C))) for C in (some, every)]
         return np.asarray(nats[0] / np.maximum(nats[1], 1e-9))
 

@@ -61,9 +61,6 @@ def next_test(
     rest = np.maximum(now**2 - known**2, 0.0)
     beyond = QUANTILE**2 * beyond_tests(_COMMANDS, tested) ** 2
     worst = int(np.argmax(now))
-    scale = np.where(posterior.errors > 0.0, posterior.errors, 1.0)
-    values, vectors = np.linalg.eigh(posterior.covariance / np.outer(scale, scale))
-    root = scale[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
     tests = []
     for strength in _STRENGTHS:
         held = motions(posterior.z, (0.0, strength, -strength)).of.items()
@@ -74,10 +71,9 @@ def next_test(
             more = _information(objective, number, posterior.z, axis, strength, hold)
         except DivergedError:
             continue
-        covariance = root @ np.linalg.solve(np.eye(len(root)) + 0.5 * root.T @ more @ root, root.T)
         words = f"hold {strength:.0%} of {axis.name} for {hold:.0f} s, rest, then -{strength:.0%} for {hold:.0f} s"
         shorter = beyond - QUANTILE**2 * beyond_tests(_COMMANDS, _at_least(tested, strength)) ** 2
-        then = np.sqrt(_widths(slopes, covariance) ** 2 + np.maximum(rest - shorter, 0.0))
+        then = np.sqrt(_widths(slopes, posterior.with_more(more).covariance) ** 2 + np.maximum(rest - shorter, 0.0))
         target = f"the speed at {_COMMANDS[worst]:.0%}"
         tests.append(NextTest(axis, words, target, float(now[worst]), float(then[worst])))
     return min(tests, key=lambda test: test.then, default=None)

@@ -87,10 +87,19 @@ class Posterior:
         if np.all(factors == 1.0):
             return self
         prior = np.diag(1.0 / self.table.each("deviation") ** 2)
-        free = np.ix_(*[np.flatnonzero(np.diag(self.covariance) > 0.0)] * 2)
-        data = np.zeros_like(prior)
-        data[free] = np.linalg.inv(self.covariance[free]) - prior[free]
+        data = self._inverse - prior
         return self.of(self.table, self.z, 2.0 * (prior + data / np.outer(factors, factors)), self.absent)
+
+    def with_more(self, information: Array) -> "Posterior":
+        """Return the posterior that more data lead to, by the second derivatives that they add to J."""
+        return self.of(self.table, self.z, 2.0 * self._inverse + information, self.absent)
+
+    @property
+    def _inverse(self) -> Array:
+        """The inverse of the covariance; 0 for what has no error, because it is fixed or absent."""
+        found, free = np.zeros_like(self.covariance), np.ix_(*[np.flatnonzero(np.diag(self.covariance) > 0.0)] * 2)
+        found[free] = np.linalg.inv(self.covariance[free])
+        return found
 
     @cached_property
     def errors(self) -> Array:
