@@ -12,7 +12,6 @@ from rov_fmu import Results, run_study
 from rov_fmu.cli import main
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
-from rov_fmu.study.plan.estimates import Estimates
 from rov_fmu.study.plan.plan import Plan
 from rov_fmu.study.plan.sampling import Design
 from rov_fmu.vehicle.schema import Estimated
@@ -43,20 +42,19 @@ def _has(vehicle: Vehicle, **other: float) -> dict[str, Variable]:
     }
 
 
-def _estimates(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **keys: Any) -> tuple[Plan, Estimates]:
+def _design(vehicle: Vehicle, has: Mapping[str, Variable] | None = None, **keys: Any) -> Design:
     plan = Plan.model_validate({"stop_time": 1.0, "step": 1.0, "runs": 9, "vary_from": "its.toml", **keys})
-    return plan, Estimates(plan, vehicle, has or _has(vehicle))
+    return Design(plan, has or _has(vehicle), vehicle)
 
 
 # ---- Drawn -----------------------------------------------------------------------------------------------------------
 
 
 def test_random_runs_are_the_draws_of_the_vehicle_with_the_same_seed() -> None:
-    plan, found = _estimates(REFITTED, sampler="random", runs=5, seed=1)
-    rows = Design(plan, _has(REFITTED), found.known).rows(0, 5)
+    found = _design(REFITTED, sampler="random", runs=5, seed=1)
     drawn = REFITTED.draws(5, np.random.default_rng(1), forced=True)
     assert tuple(drawn) == found.names
-    assert np.array_equal(rows, np.column_stack([*drawn.values()]))
+    assert np.array_equal(found.rows(0, 5), np.column_stack([*drawn.values()]))
 
 
 @pytest.mark.parametrize(
@@ -66,16 +64,15 @@ def test_random_runs_are_the_draws_of_the_vehicle_with_the_same_seed() -> None:
 def test_a_study_warns_of_axes_that_are_not_fit_for_use(verdicts: tuple[str, ...], axes: str) -> None:
     assert REFITTED.provenance
     vehicle = replace(REFITTED, provenance=REFITTED.provenance.model_copy(update={"verdicts": verdicts}))
-    _, found = _estimates(vehicle)
-    warnings = [warning for warning in found.warnings() if "may be off" in warning]
+    warnings = [warning for warning in _design(vehicle).warnings() if "may be off" in warning]
     assert warnings == (
         [f"the estimates of its.toml do not show how far these axes may be off: {axes}"] if axes else []
     )
 
 
 def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
-    plan, found = _estimates(MADE, sampler="random", runs=6000)
-    drawn = Design(plan, _has(MADE), found.known).rows(0, 6000)
+    found = _design(MADE, sampler="random", runs=6000)
+    drawn = found.rows(0, 6000)
     assert found.names == (*ROWS,)
     assert drawn.mean(axis=0) == pytest.approx([9.0, 5.0, 18.0], abs=0.04)
     assert drawn.std(axis=0) == pytest.approx([0.5, 0.3, 0.6], rel=0.03)
@@ -88,21 +85,19 @@ def test_what_is_drawn_has_the_errors_and_correlations_of_the_file() -> None:
 
 
 def test_a_reader_is_warned_of_what_he_may_not_expect() -> None:
-    for words, (_, estimates) in {
-        "no row in [estimates] of its.toml: a_d_u, b_d_u and a_d_w vary as if correlated with nothing": _estimates(
+    for words, design in {
+        "no row in [estimates] of its.toml: a_d_u, b_d_u and a_d_w vary as if correlated with nothing": _design(
             with_intervals(MADE, MADE.intervals)
         ),
-        "the plan gives a_d_u: its correlation with b_d_u in its.toml is left out": _estimates(
-            MADE, set={"a_d_u": 9.0}
-        ),
-        "the FMU has other values than its.toml of beta_w (0.5, not 0.620654): the estimates were found": _estimates(
+        "the plan gives a_d_u: its correlation with b_d_u in its.toml is left out": _design(MADE, set={"a_d_u": 9.0}),
+        "the FMU has other values than its.toml of beta_w (0.5, not 0.620654): the estimates were found": _design(
             MADE, _has(MADE, beta_w=0.5, a_d_u=7.0)
         ),
-        "what is correlated has one Sobol index together: a_d_u and b_d_u": _estimates(MADE, sampler="saltelli"),
+        "what is correlated has one Sobol index together: a_d_u and b_d_u": _design(MADE, sampler="saltelli", runs=8),
     }.items():
-        (warning,) = estimates.warnings()
+        (warning,) = design.warnings()
         assert warning.startswith(words)
-    assert not [*_estimates(REFITTED)[1].warnings()]
+    assert not [*_design(REFITTED).warnings()]
 
 
 def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
@@ -111,20 +106,20 @@ def test_an_estimate_that_does_not_fit_the_plan_or_the_fmu_is_a_line() -> None:
     without = {name: variable for name, variable in has.items() if name != "a_d_u"}
     narrow = has | {"b_d_u": replace(has["b_d_u"], minimum=6.0, maximum=7.0)}
     all_set = {"a_d_u": 9.0, "b_d_u": 5.0}
-    for words, (_, estimates) in (
-        ("the FMU has no variable 'a_d_u' that is a number", _estimates(made, without)),
-        ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _estimates(made, narrow)),
-        ("nothing varies, because [set] gives every coefficient that has an interval", _estimates(made, set=all_set)),
-        ("a grid needs values or a range, but estimated", _estimates(made, sampler="grid")),
+    for words, design in (
+        ("the FMU has no variable 'a_d_u' that is a number", _design(made, without)),
+        ("b_d_u of this vehicle does not fit the FMU: it must be within 6 ... 7 N.s/m", _design(made, narrow)),
+        ("nothing varies, because [set] gives every coefficient that has an interval", _design(made, set=all_set)),
+        ("a grid needs values or a range, but estimated", _design(made, sampler="grid")),
     ):
-        (line,) = estimates.check()
+        (line,) = design.check({})
         assert line.startswith(f"vary_from = 'its.toml': {words}")
-    (line,) = _estimates(made, sampler="saltelli")[1].check()
+    (line,) = _design(made, sampler="saltelli").check({})
     assert (
         line
         == "sampler = 'saltelli': Sobol indices need independent variables, but all varied variables are correlated"
     )
-    assert not [*_estimates(MADE, sampler="saltelli")[1].check()]
+    assert not [*_design(MADE, sampler="saltelli").check({})]
 
 
 # ---- Done ------------------------------------------------------------------------------------------------------------
@@ -149,7 +144,7 @@ same = "0*a_d_u"
 
 
 @pytest.mark.long
-def test_the_command_tells_the_warnings_and_the_results_keep_the_estimates(
+def test_the_command_tells_the_warnings_and_the_results_keep_the_design(
     videoray_fmu: Path,
     tmp_path: Path,
     scheduler: str,

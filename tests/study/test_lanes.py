@@ -174,8 +174,11 @@ def test_two_parts_run_beside_each_other_and_what_does_not_belong_together_is_re
     run_study(plan, folder, part=(1, 2), on_progress=beside)
     _same(run_study(plan, folder, merge=True), whole)
     for text, reason in (
-        (PLAN.replace("seed = 5", "seed = 6"), r"results: holds runs of another plan \(seed changed\): choose another"),
-        (PLAN.replace("videoray", "videoray_refit"), "holds runs of another FMU, for the vehicle videoray_refit"),
+        (
+            PLAN.replace("seed = 5", "seed = 6"),
+            r"results: holds runs of another study \(seed changed\): choose another",
+        ),
+        (PLAN.replace("videoray", "videoray_refit"), "runs of another study .*the vehicle, the FMU or rov-fmu changed"),
     ):
         changed = _plan(tmp_path, text)
         for part in (None, (1, 2)):

@@ -27,7 +27,7 @@ from rov_fmu.io.output import WriteError
 from rov_fmu.study.plan.model import read_model
 from rov_fmu.study.plan.plan import load_plan
 from rov_fmu.study.plan.prepared import prepare
-from rov_fmu.study.results.store import Store, parquet
+from rov_fmu.study.results.store import Store, not_done, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import do_study
 from rov_fmu.study.run.work import Progress, Work
@@ -210,8 +210,8 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     assert before.items() <= {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}.items()
     capsys.readouterr()
     others = {
-        "holds runs of another plan (figures changed)": {"fmu": foreign(), "more": 'other = "y[0]"'},
-        "holds runs of another FMU": {"fmu": foreign(1)},
+        "holds runs of another study (figures changed)": {"fmu": foreign(), "more": 'other = "y[0]"'},
+        "holds runs of another study (the vehicle, the FMU or rov-fmu changed)": {"fmu": foreign(1)},
         "has runs up to number 39, but the plan has only 12 runs": {"fmu": foreign(), "runs": 12},
     }
     for reason, changed in others.items():
@@ -246,13 +246,12 @@ def _filled(folder: Path, *spans: tuple[int, int], **change: Any) -> Store:
 def test_runs_of_another_study_are_refused_and_those_that_are_missing_are_told(tmp_path: Path) -> None:
     store = _filled(tmp_path / "results", (2, 4))
     with store.held():
-        store.describe(STUDY, (0, 9))
-        assert (store.missing(0, 9), store.missing(0, 4)) == ([(0, 2), (4, 9)], [(0, 2)])
-        assert (store.missing(1, 3), store.missing(2, 4), store.missing(3, 6)) == ([(1, 2)], [], [(4, 6)])
+        assert (store.describe(STUDY, (0, 9)), not_done([(2, 4)], (0, 4))) == ([(0, 2), (4, 9)], [(0, 2)])
+        assert [not_done([(2, 4)], within) for within in ((1, 3), (2, 4), (3, 6))] == [[(1, 2)], [], [(4, 6)]]
         for change, reason in (
-            ({"fmu": "2"}, "another FMU, for the vehicle rov has changed, or rov-fmu, which builds it:"),
-            ({"engine": "fmu"}, "results: holds runs of --engine lanes: choose another folder"),
-            ({"plan": {"seed": 2}}, r"results: holds runs of another plan \(seed changed\): choose another folder"),
+            ({"fmu": "2"}, r"runs of another study \(the vehicle, the FMU or rov-fmu changed\): choose another folder"),
+            ({"engine": "fmu"}, r"results: holds runs of another study \(--engine changed\): choose another folder"),
+            ({"plan": {"seed": 2}}, r"results: holds runs of another study \(seed changed\): choose another folder"),
         ):
             with pytest.raises(FileError, match=reason):
                 store.describe({**STUDY, **change}, (0, 9))
@@ -297,7 +296,7 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     ),
     "another study": (
         lambda path: path.write_bytes(_rows(4, 9, {**STUDY, "plan": {"seed": 3}})),
-        r"holds runs of another plan \(seed changed\)",
+        r"holds runs of another study \(seed changed\)",
     ),
 }
 """What may have become of the file of the second part, and what is told."""
@@ -540,9 +539,7 @@ def test_a_study_tells_again_and_again_whether_workers_are_there(
 
     counts, nothing = iter([1, 0, 0]), cast("Any", None)
     store = Store(tmp_path / "results")
-    with store.held():
-        work = Work(nothing, nothing, store, (0, 9), tell)
-        work.runs = 4
-        with work.watched(lambda: next(counts)):  # until the client has no answer
-            assert all_told.wait(10.0)
+    work = Work(nothing, nothing, store, [(4, 9)], 9, tell)
+    with work.watched(lambda: next(counts)):  # until the client has no answer
+        assert all_told.wait(10.0)
     assert told == [Progress(4, 9, 0, has_workers=there) for there in (True, True, False, False)]

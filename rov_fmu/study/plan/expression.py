@@ -14,9 +14,8 @@ import ast
 import operator
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial, reduce
-from inspect import Parameter, signature
+from inspect import signature
 from itertools import pairwise
 from math import e, inf, nan, pi
 from types import MappingProxyType
@@ -34,6 +33,7 @@ CONSTANTS: Mapping[str, float] = MappingProxyType({"pi": pi, "e": e, "nan": nan,
 """Numbers by their names in an expression."""
 _DEEPEST = 100
 """The deepest nesting of an expression. Reading and evaluating it use Python's stack."""
+_TOO_DEEP = f"is nested too deeply: at most {_DEEPEST} levels"
 _MOST_DECIMALS = 300
 _ALLOWED = "an expression has numbers, variables, operators, indices and the functions that docs/studies.md lists"
 
@@ -49,13 +49,6 @@ _UnitRule = Callable[..., _Unit] | _Unit
 """The unit of a result, or the function that returns it for the units of the values."""
 
 
-class _Part(NamedTuple):
-    """A part of an expression."""
-
-    compute: _Compute
-    unit: _Unit
-
-
 class ExpressionError(RovError, ValueError):
     """A text is not an expression that a figure may have; the message is the reason."""
 
@@ -68,34 +61,24 @@ class BeyondError(RovError, IndexError):
         self.length = length
 
 
-@dataclass(frozen=True)
-class FigureFunction:
+class FigureFunction(NamedTuple):
     """A function that an expression may call."""
 
     compute: Callable[..., _Value]
+    unit: _UnitRule = None
     least: int = 1
     """The number of values that it needs."""
     most: int = 1
     """The number of values that it takes."""
     parameters: tuple[str, ...] = ()
-    """The names of all parameters, if values may be given by name."""
-    unit: _UnitRule = None
+    """The names of all parameters, if values after the first one may be given by name."""
 
-    @classmethod
-    def by_name(cls, compute: Callable[..., _Value], unit: _UnitRule) -> "FigureFunction":
-        """Return a function whose values may be given by the names of its parameters."""
-        parameters = signature(compute).parameters
-        needed = sum(p.default is Parameter.empty for p in parameters.values())
-        return cls(compute, needed, len(parameters), tuple(parameters), unit)
 
-    def __call__(self, *values: _Value, **by_name: _Value) -> _Value:
-        """Return the result, a number or an array with one dimension. Raises TypeError if it is neither."""
-        result = self.compute(*values, **by_name)
-        if isinstance(result, np.ndarray) and result.ndim == 0:
-            return result[()]
-        if not isinstance(result, float | np.number | np.bool_ | np.ndarray):
-            raise TypeError("a function needs an array, and gets a number")
-        return result
+def by_name(compute: Callable[..., _Value], unit: _UnitRule) -> FigureFunction:
+    """Return a function whose values may be given by the names of its parameters."""
+    parameters = signature(compute).parameters
+    needed = sum(p.default is p.empty for p in parameters.values())
+    return FigureFunction(compute, unit, needed, len(parameters), tuple(parameters))
 
 
 # ---- Units -----------------------------------------------------------------------------------------------------------
@@ -126,7 +109,7 @@ def _quotient(above: _Unit, below: _Unit) -> _Unit:
 
 def _of_all(of_one: Callable[[_Value], _Value], of_two: Callable[[_Value, _Value], _Value]) -> FigureFunction:
     """Return a function that reduces one array as in NumPy, or several values as in Python."""
-    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), 1, 100, unit=_common)
+    return FigureFunction(lambda y, *others: reduce(of_two, others, y) if others else of_one(y), _common, most=100)
 
 
 def _round(y: _Value, decimals: float = 0.0) -> _Value:
@@ -135,60 +118,58 @@ def _round(y: _Value, decimals: float = 0.0) -> _Value:
     return np.round(y, _whole_number(decimals))
 
 
-_OF_ONE_VALUE: Mapping[_UnitRule, Sequence[str]] = {
-    unit_of_first: ("abs", "ceil", "cumsum", "diff", "floor", "mean", "median", "ptp", "std", "sum", "unwrap"),
-    "1": ("all", "any", "argmax", "argmin", "cos", "isfinite", "isnan", "sign", "sin", "tan"),
-    "rad": ("arcsin", "arccos", "arctan", "radians"),
-    "deg": ("degrees",),
-    None: ("cosh", "exp", "log", "log10", "prod", "sinh", "sqrt", "tanh", "var"),
+_OF_NUMPY: Mapping[tuple[int, _UnitRule], Sequence[str]] = {
+    (1, unit_of_first): ("abs", "ceil", "cumsum", "diff", "floor", "mean", "median", "ptp", "std", "sum", "unwrap"),
+    (1, "1"): ("all", "any", "argmax", "argmin", "cos", "isfinite", "isnan", "sign", "sin", "tan"),
+    (1, "rad"): ("arcsin", "arccos", "arctan", "radians"),
+    (1, "deg"): ("degrees",),
+    (1, None): ("cosh", "exp", "log", "log10", "prod", "sinh", "sqrt", "tanh", "var"),
+    (2, _common): ("hypot", "maximum", "minimum"),
+    (2, unit_of_first): ("percentile",),
+    (2, "1"): ("searchsorted",),
+    (2, "rad"): ("arctan2",),
+    (3, _common): ("clip",),
+    (3, lambda *units: units[-1]): ("interp",),
 }
-"""Functions of NumPy with one value, by the unit of their result. Their other parameters are not allowed, because
-`out`, for example, writes into an array."""
-_OF_TWO_VALUES: Mapping[_UnitRule, Sequence[str]] = {
-    _common: ("hypot", "maximum", "minimum"),
-    unit_of_first: ("percentile",),
-    "1": ("searchsorted",),
-    "rad": ("arctan2",),
-}
+"""Functions of NumPy, by the number of their values and the unit of their result. Their other parameters are not
+allowed, because `out`, for example, writes into an array."""
 FUNCTIONS: Mapping[str, FigureFunction] = MappingProxyType(
     {
-        name: FigureFunction(getattr(np, name), count, count, unit=unit)
-        for count, by_unit in enumerate((_OF_ONE_VALUE, _OF_TWO_VALUES), 1)
-        for unit, names in by_unit.items()
+        name: FigureFunction(getattr(np, name), unit, count, count)
+        for (count, unit), names in _OF_NUMPY.items()
         for name in names
     }
     | {
-        "clip": FigureFunction(np.clip, 3, 3, unit=_common),
-        "gradient": FigureFunction(np.gradient, 1, 2),
-        "interp": FigureFunction(np.interp, 3, 3, unit=lambda *units: units[-1]),
-        "len": FigureFunction(lambda y: float(len(y)), unit="1"),
+        "gradient": FigureFunction(lambda y, *t: np.gradient(elements(y), *t), most=2),
+        "len": FigureFunction(lambda y: float(len(y)), "1"),
         "max": _of_all(np.max, np.maximum),  # Python's own may skip NaN
         "min": _of_all(np.min, np.minimum),
-        "round": FigureFunction(_round, 1, 2, unit=unit_of_first),
-        "sorted": FigureFunction(np.sort, unit=unit_of_first),
-        "where": FigureFunction(np.where, 3, 3, unit=lambda _, *either: _common(*either)),
+        "round": FigureFunction(_round, unit_of_first, most=2),
+        "sorted": FigureFunction(np.sort, unit_of_first),
+        "where": FigureFunction(lambda *of: np.where(*of)[()], lambda _, *either: _common(*either), 3, 3),
     }
 )
 """The functions of numbers and arrays. None gives an array that is longer than the longest one it is given."""
 
-_OPERATORS: Mapping[type[ast.AST], Callable[..., _Value]] = {
-    **{ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul, ast.Div: operator.truediv},
-    **{ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod, ast.UAdd: operator.pos, ast.USub: operator.neg},
-    ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
-    **{ast.BitAnd: np.logical_and, ast.BitOr: np.logical_or, ast.BitXor: np.logical_xor, ast.Invert: np.logical_not},
-    ast.Not: lambda value: np.bool_(not _truth(value)),
-    **{ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal},
-    **{ast.Eq: np.equal, ast.NotEq: np.not_equal},
+_OF_OPERATORS: Mapping[_UnitRule, Mapping[type[ast.AST], Callable[..., _Value]]] = {
+    _common: {ast.Add: operator.add, ast.Sub: operator.sub},
+    lambda one, other: _scaled(one, other) or _scaled(other, one): {ast.Mult: operator.mul},
+    _quotient: {ast.Div: operator.truediv},
+    unit_of_first: {ast.UAdd: operator.pos, ast.USub: operator.neg},
+    "1": {
+        **{ast.Not: lambda value: np.bool_(not _truth(value)), ast.Invert: np.logical_not},
+        **{ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal},
+        **{ast.Eq: np.equal, ast.NotEq: np.not_equal},
+    },
+    None: {
+        **{ast.FloorDiv: operator.floordiv, ast.Mod: operator.mod},
+        ast.Pow: np.float_power,  # always gives a float, never a huge integer or a complex number
+        **{ast.BitAnd: np.logical_and, ast.BitOr: np.logical_or, ast.BitXor: np.logical_xor},
+    },
 }
-"""Comparisons are NumPy's, because Python's True + True is an integer, and integers would grow without end."""
-_UNITS: Mapping[type[ast.AST], _UnitRule] = {
-    **dict.fromkeys((ast.Add, ast.Sub), _common),
-    ast.Mult: lambda one, other: _scaled(one, other) or _scaled(other, one),
-    ast.Div: _quotient,
-    **dict.fromkeys((ast.UAdd, ast.USub), unit_of_first),
-    **dict.fromkeys((ast.Not, ast.Invert), "1"),
-}
-"""The units of the results of operators; those of the others do not follow."""
+"""What operators compute, by the unit of their results. Comparisons are NumPy's, because Python's True + True is an
+integer, and integers would grow without end."""
+_OPERATORS = {kind: (compute, unit) for unit, some in _OF_OPERATORS.items() for kind, compute in some.items()}
 
 
 # ---- Reading ---------------------------------------------------------------------------------------------------------
@@ -197,9 +178,7 @@ _UNITS: Mapping[type[ast.AST], _UnitRule] = {
 class FigureExpression:
     """An expression that was read and found to be allowed. Raises ExpressionError with the reason if it is not."""
 
-    def __init__(
-        self, text: str, functions: Mapping[str, FigureFunction], units: Mapping[str, str] = MappingProxyType({})
-    ) -> None:
+    def __init__(self, text: str, functions: Mapping[str, FigureFunction], units: Mapping[str, str]) -> None:
         """`units` has those of the variables."""
         self.names: set[str] = set()
         """The variables and constants that it names."""
@@ -210,7 +189,7 @@ class FigureExpression:
                 warnings.simplefilter("ignore")
                 tree = ast.parse(text.strip(), mode="eval")
         except (RecursionError, MemoryError) as error:
-            raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels") from error
+            raise ExpressionError(_TOO_DEEP) from error
         except (SyntaxError, UnicodeError, ValueError) as error:
             raise ExpressionError(f"is no expression: {getattr(error, 'msg', error)}") from error
         self.value, unit = self._read(tree.body)
@@ -218,22 +197,22 @@ class FigureExpression:
         self.unit = unit or ""
         """The unit of the value, or an empty text where it does not follow."""
 
-    def _read(self, node: ast.expr | None) -> _Part:
-        """Return the part that computes a node; for None, which an end of a slice may be, it returns None."""
+    def _read(self, node: ast.expr | None) -> tuple[_Compute, _Unit]:
+        """Return what computes a node, and its unit. An end of a slice may be None, which gives None."""
         if self._depth == _DEEPEST:
-            raise ExpressionError(f"is nested too deeply: at most {_DEEPEST} levels")
+            raise ExpressionError(_TOO_DEEP)
         self._depth += 1
         found = self._computed(node)
         self._depth -= 1
         return found
 
-    def _computed(self, node: ast.expr | None) -> _Part:  # noqa: C901, PLR0911, PLR0912 (a case for each kind)
+    def _computed(self, node: ast.expr | None) -> tuple[_Compute, _Unit]:  # noqa: C901, PLR0911, PLR0912 (each kind)
         match node:
             case None:
-                return _Part(lambda _: None, None)
+                return lambda _: None, None
             case ast.Constant(value=int() | float() as value):
                 number = _constant(value)
-                return _Part(lambda _: number, _PLAIN)
+                return lambda _: number, _PLAIN
             case ast.Name(id=name):
                 return self._variable(name)
             case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
@@ -249,67 +228,49 @@ class FigureExpression:
             case ast.Subscript(value=value, slice=index):
                 return self._of(_index, unit_of_first, value, index)
             case ast.UnaryOp(op=op, operand=value):
-                return self._of(_OPERATORS[type(op)], _UNITS[type(op)], value)
+                return self._of(*_OPERATORS[type(op)], value)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
-                return self._of(_OPERATORS[type(op)], _UNITS.get(type(op)), left, right)
+                return self._of(*_OPERATORS[type(op)], left, right)
             case ast.Compare(left=left, ops=ops, comparators=others) if {*map(type, ops)} <= _OPERATORS.keys():
-                return self._of(partial(_compare, [_OPERATORS[type(op)] for op in ops]), "1", left, *others)
+                return self._of(partial(_compare, [_OPERATORS[type(op)][0] for op in ops]), "1", left, *others)
             case ast.BoolOp(op=op, values=operands):
                 is_enough = any if isinstance(op, ast.Or) else all
-                computes = [self._read(operand).compute for operand in operands]
-                return _Part(lambda values: np.bool_(is_enough(_truth(one(values)) for one in computes)), "1")
+                computes = [self._read(operand)[0] for operand in operands]
+                return lambda values: np.bool_(is_enough(_truth(one(values)) for one in computes)), "1"
             case ast.IfExp(test=test, body=body, orelse=otherwise):
                 (is_true, _), (one, unit), (other, other_unit) = map(self._read, (test, body, otherwise))
-                either = _common(unit, other_unit)
-                return _Part(lambda values: (one if _truth(is_true(values)) else other)(values), either)
-            case ast.Call(func=ast.Name(id=name)):
-                return self._call(name, node)
-            case ast.Call(func=function):
-                raise self._refused(function)
-        assert node
-        raise self._refused(node)
+                return lambda values: (one if _truth(is_true(values)) else other)(values), _common(unit, other_unit)
+            case ast.Call(func=ast.Name(id=name), args=given, keywords=keywords):
+                return self._call(name, given, keywords)
+            case ast.Call(func=ast.Attribute(attr=name) as own) if name in self._functions:
+                text = brief(ast.unparse(own), 40)
+                raise ExpressionError(f"{text} is an attribute, which is not allowed: write {name}(...)")
+        raise ExpressionError(f"{brief(ast.unparse(node), 40)} is not allowed; {_ALLOWED}")
 
-    def _of(self, function: Callable[..., _Value], unit: _UnitRule, *nodes: ast.expr | None) -> _Part:
-        """Return the part that computes nodes, and a function of their values."""
+    def _of(self, function: Callable[..., _Value], unit: _UnitRule, *nodes: ast.expr | None) -> tuple[_Compute, _Unit]:
+        """Return what computes nodes and a function of their values, and its unit."""
         computes, units = zip(*map(self._read, nodes), strict=True)
         result = unit(*units) if callable(unit) else unit
-        return _Part(lambda values: function(*[compute(values) for compute in computes]), result)
+        return lambda values: function(*[compute(values) for compute in computes]), result
 
-    def _refused(self, node: ast.expr) -> ExpressionError:
-        text = brief(ast.unparse(node), 40)
-        if isinstance(node, ast.Attribute) and node.attr in self._functions:
-            return ExpressionError(f"{text} is an attribute, which is not allowed: write {node.attr}(...)")
-        return ExpressionError(f"{text} is not allowed; {_ALLOWED}")
-
-    def _variable(self, name: str) -> _Part:
+    def _variable(self, name: str) -> tuple[_Compute, _Unit]:
         self.names.add(name)
-        return _Part(operator.itemgetter(name), self._units.get(name))
+        return operator.itemgetter(name), self._units.get(name)
 
-    def _call(self, name: str, node: ast.Call) -> _Part:
-        function = self._functions.get(name)
-        if function is None:
+    def _call(self, name: str, given: Sequence[ast.expr], keywords: Sequence[ast.keyword]) -> tuple[_Compute, _Unit]:
+        if not (function := self._functions.get(name)):
             near = did_you_mean(name, self._functions)
             raise ExpressionError(f"{shown(name)} is neither a function nor a variable of the FMU{near}")
-        if name == "where" and len(node.args) == 1:
-            raise ExpressionError("where with one value gives a tuple of one array: write where(...)[0]")
-        by_name = [k.arg or "**" for k in node.keywords]
-        if strange := [key for key in by_name if key not in function.parameters]:
-            raise ExpressionError(f"{name} has no parameter named {strange[0]}")
-        given = [*function.parameters[: len(node.args)], *by_name]
-        needed = {*function.parameters[: function.least]} - {*given}
-        count = len(node.args) + len(by_name)
-        if needed or len({*given}) < len(given) or not function.least <= count <= function.most:
-            most = f" to {function.most}" if function.most > function.least else ""
-            what = f" ({', '.join(function.parameters)})" if function.parameters else ""
-            raise ExpressionError(f"{name} takes {function.least}{most} values{what}, each once, and not {count}")
-        first, named = len(node.args), {k.arg: k.value for k in node.keywords}
-        ordered = [key for key in function.parameters if key in named]
-        return self._of(
-            lambda *values: function(*values[:first], **dict(zip(ordered, values[first:], strict=True))),
-            function.unit,
-            *node.args,
-            *(named[key] for key in ordered),
-        )
+        compute, unit, least, most, parameters = function
+        named, count = [k.arg or "**" for k in keywords], len(given)
+        used = [*parameters[:count], *named]
+        is_once = {*parameters[:least]} <= {*used} <= {*parameters} and len({*used}) == len(used)
+        if not (given and is_once and least <= count + len(named) <= most):
+            counts = f"{least} to {most}" if most > least else f"{least}"
+            what = f" ({', '.join(parameters)})" if parameters else ""
+            raise ExpressionError(f"{name} takes {counts} values{what}, each once")
+        values = [*given, *(k.value for k in keywords)]
+        return self._of(lambda *of: compute(*of[:count], **dict(zip(named, of[count:], strict=True))), unit, *values)
 
 
 # ---- Computing -------------------------------------------------------------------------------------------------------

@@ -18,12 +18,13 @@ from rov_fmu.study.plan.expression import (
     TIME,
     BeyondError,
     FigureExpression,
-    FigureFunction,
+    by_name,
     elements,
     unit_of_first,
 )
 
 Array = npt.NDArray[np.float64]
+_ANY_TIMES = np.zeros(1)
 _STEADY = 0.1
 """The share of a window, at its end, over which the steady value is the mean."""
 _BAND = 0.05
@@ -41,12 +42,12 @@ class Responses:
         self._times = times
         self._slack = 1e-9 * max(1.0, abs(times[0]), abs(times[-1]))
         self.functions = {
-            "V_ss": FigureFunction.by_name(self.steady, unit_of_first),
-            "Tau": FigureFunction.by_name(self.time_constant, "s"),
-            "overshoot": FigureFunction.by_name(self.overshoot, "1"),
-            "settling_time": FigureFunction.by_name(self.settling_time, "s"),
-            "at": FigureFunction.by_name(self.at, unit_of_first),
-            "final": FigureFunction.by_name(self.final, unit_of_first),
+            "V_ss": by_name(self.steady, unit_of_first),
+            "Tau": by_name(self.time_constant, "s"),
+            "overshoot": by_name(self.overshoot, "1"),
+            "settling_time": by_name(self.settling_time, "s"),
+            "at": by_name(self.at, unit_of_first),
+            "final": by_name(self.final, unit_of_first),
         }
         """The functions by their names in an expression."""
 
@@ -61,11 +62,11 @@ class Responses:
 
     def steady(self, y: Array, start: float | None = None, end: float | None = None) -> float:
         """Return the steady y: its mean over the last tenth of the time from `start` to `end`."""
-        return float(elements(y)[self._window(start, end)[1]].mean())
+        return self._window(y, start, end)[2]
 
     def time_constant(self, y: Array, start: float | None = None, end: float | None = None) -> float:
         """Return the time from `start` until 1 - 1/e of the change to the steady value; NaN without a change."""
-        change, t = self._change(y, start, end)
+        t, change = self._change(y, start, end)
         n = int((change >= RISE).argmax())
         if not change[n] >= RISE:
             return nan
@@ -74,8 +75,7 @@ class Responses:
 
     def overshoot(self, y: Array, start: float | None = None, end: float | None = None) -> float:
         """Return the largest excess of y over its steady value, divided by its change; NaN without a change."""
-        change, _ = self._change(y, start, end)
-        return float(np.maximum(change.max() - 1.0, 0.0))
+        return float(np.maximum(self._change(y, start, end)[1].max() - 1.0, 0.0))
 
     def settling_time(
         self, y: Array, start: float | None = None, end: float | None = None, band: float = _BAND
@@ -84,21 +84,26 @@ class Responses:
 
         A band of 0.05 is 5 % of the change to the steady value.
         """
-        change, t = self._change(y, start, end)
+        t, change = self._change(y, start, end)
         outside = np.flatnonzero(~(np.abs(change - 1.0) <= band))
         n = int(outside[-1]) + 1 if outside.size else 0
         return float(t[n] - t[0]) if n < len(change) else nan
 
-    def _window(self, start: float | None, end: float | None) -> tuple[slice, slice]:
-        """Return the points from one time to another, within rounding, and those of the last tenth of that time."""
+    def _window(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array, float]:
+        """Return the times from one to another, within rounding, y at these, and the mean of its last tenth."""
         t, slack = self._times, self._slack
         begin, finish = t[0] if start is None else start, t[-1] if end is None else end
         self._check_times(begin, finish)
         first, last = np.searchsorted(t, (begin - slack, finish + slack)).tolist()
         if first >= last:
             raise TimeError(f"there is no communication point from {begin:g} to {finish:g}")
-        steady = t[last - 1] - _STEADY * (t[last - 1] - t[first]) - slack
-        return slice(first, last), slice(int(np.searchsorted(t, steady)), last)
+        t, y = t[first:last], elements(y)[first:last]
+        return t, y, float(y[t >= t[-1] - _STEADY * (t[-1] - t[0]) - slack].mean())
+
+    def _change(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
+        """Return the times, and y scaled to 0 at the start and 1 when steady, or NaN if these are the same."""
+        t, y, steady = self._window(y, start, end)
+        return t, (y - y[0]) / (steady - y[0] or nan)
 
     def _check_times(self, *times: float) -> None:
         """Raise TimeError if a time is not in the run, or else ValueError if it is NaN."""
@@ -109,33 +114,23 @@ class Responses:
         if isnan(sum(times)):
             raise ValueError("a time is NaN")
 
-    def _change(self, y: Array, start: float | None, end: float | None) -> tuple[Array, Array]:
-        """Return y scaled to 0 at the start and 1 when steady, or NaN if these are the same, and the times."""
-        window, steady = self._window(start, end)
-        part = elements(y)[window]
-        whole = y[steady].mean() - part[0]
-        return (part - part[0]) / (whole or nan), self._times[window]
 
-
-def _functions(times: Array) -> dict[str, FigureFunction]:
-    """Return all functions that an expression may call."""
-    return {**FUNCTIONS, **Responses(times).functions}
-
-
-def read_expression(text: str, units: Mapping[str, str] = MappingProxyType({})) -> FigureExpression:
-    """Read an expression without a run. Raises ExpressionError with the reason.
+def read_expression(
+    text: str, units: Mapping[str, str] = MappingProxyType({}), times: Array = _ANY_TIMES
+) -> FigureExpression:
+    """Read an expression over the times of a run. Raises ExpressionError with the reason.
 
     `units` has those of the variables.
 
     Examples:
         read_expression("x[-1] - at(x, 10)", {"x": "m"}).unit  # "m"
     """
-    return FigureExpression(text, _functions(np.zeros(1)), units)
+    return FigureExpression(text, {**FUNCTIONS, **Responses(times).functions}, units)
 
 
 def meaning(name: str) -> str:
     """Return a hint about a name that an expression cannot use as a value, or an empty text."""
-    if name in _functions(np.zeros(1)):
+    if name in {**FUNCTIONS, **Responses(_ANY_TIMES).functions}:
         return f"{name} is a function: write {name}(...)"
     if name == BY_NAME:
         return f'{BY_NAME} gives a variable by its name: write {BY_NAME}["der(u)"]'
@@ -146,8 +141,7 @@ class Figures:
     """The figures of a plan, for one thread at a time. Raises ExpressionError."""
 
     def __init__(self, expressions: Mapping[str, str], times: Array) -> None:
-        functions = _functions(times)
-        self._expressions = {name: FigureExpression(text, functions) for name, text in expressions.items()}
+        self._expressions = {name: read_expression(text, times=times) for name, text in expressions.items()}
         self._constants = {**CONSTANTS, TIME: times}
 
     def of(self, run: Mapping[str, Any]) -> tuple[list[float | None], str]:
@@ -161,30 +155,25 @@ class Figures:
             for name, expression in self._expressions.items():
                 try:
                     found.append(_number(expression, values))
-                except _NoNumberError as error:
+                except Exception as error:  # NumPy raises many kinds
                     found.append(None)
-                    reasons.append(f"{name}: {error}")
+                    reasons.append(f"{name}: {_words(error)}")
         return found, "; ".join(reasons)
 
 
-class _NoNumberError(RovError):
-    """The value of an expression is not one finite number; the text is the reason."""
-
-
 def _number(expression: FigureExpression, values: Mapping[str, Any]) -> float:
-    """Return the value of an expression. Raises _NoNumberError."""
-    try:
-        value = expression.value(values)
-    except ZeroDivisionError as error:  # Python's message differs between versions
-        raise _NoNumberError("division by zero") from error
-    except Exception as error:  # NumPy raises many kinds
-        raise _NoNumberError(brief(reason_of(error))) from error
+    """Return the value of an expression. Raises TypeError or ValueError if it is no finite number, and any other."""
+    value = expression.value(values)
     if isinstance(value, np.ndarray):
-        raise _NoNumberError("must be one number, and not an array") from TypeError()
-    number = float(value)
-    if not isfinite(number):
-        raise _NoNumberError(f"is {'NaN' if isnan(number) else 'infinite'}")
-    return number
+        raise TypeError("must be one number, and not an array")
+    if not isfinite(value):
+        raise ValueError(f"is {'NaN' if isnan(value) else 'infinite'}")
+    return float(value)
+
+
+def _words(error: Exception) -> str:
+    """Return why an expression has no value. Python's message about a division differs between versions."""
+    return "division by zero" if isinstance(error, ZeroDivisionError) else brief(reason_of(error))
 
 
 def unusable(text: str, variables: Iterable[str], varied: Collection[str], times: Array) -> str:
@@ -193,19 +182,19 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
 
     All values of the run are NaN here, so that a wrong type or a wrong time is found if it does not depend on them.
     """
-    expression = FigureExpression(text, _functions(times))
+    expression = read_expression(text, times=times)
     none = np.full(len(times), nan)
     values = {**CONSTANTS, TIME: times, **dict.fromkeys(variables, none), **dict.fromkeys(varied, nan)}
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore", RuntimeWarning)  # from NumPy, about values that do not come from the FMU
         try:
             _number(expression, values)
-        except _NoNumberError as error:
-            cause, numbers = error.__cause__, expression.names.intersection(varied)
-            if numbers and isinstance(cause, TypeError):
-                return f"{error}; {min(numbers)} varies, and what varies is a number"
+        except Exception as error:
+            numbers = expression.names.intersection(varied)
+            if numbers and isinstance(error, TypeError):
+                return f"{_words(error)}; {min(numbers)} varies, and what varies is a number"
             # No operation gives an array that is longer than a run.
-            beyond = isinstance(cause, BeyondError) and cause.length == len(times)
-            if beyond or isinstance(cause, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
-                return str(error)
+            beyond = isinstance(error, BeyondError) and error.length == len(times)
+            if beyond or isinstance(error, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
+                return _words(error)
     return ""

@@ -1,6 +1,5 @@
 """The plan of a study: the TOML file that says what is run, what is varied, what is kept and what is computed."""
 
-import os
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from math import prod
@@ -9,12 +8,11 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from pydantic import AfterValidator, BeforeValidator, Field, ValidationInfo, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
 from rov_fmu.io.file_kinds import PLAN, check_suffix
 from rov_fmu.io.messages import FileError
-from rov_fmu.io.paths import inside
 from rov_fmu.io.toml_file import (
     AS_TUPLE,
     NOT_BLANK,
@@ -22,7 +20,6 @@ from rov_fmu.io.toml_file import (
     Finite,
     Name,
     Strict,
-    folder_of,
     key_line,
     read_checked,
     rule,
@@ -112,6 +109,13 @@ class Varied(Strict):
         """The numbers of a list or a range."""
         return self.range.values if self.range else self.values
 
+    @property
+    def extremes(self) -> Sequence[float]:
+        """The values that the variable must be able to have."""
+        if self.normal:
+            return [self.normal.mean]
+        return [self.lognormal.median] if self.lognormal else self.choices or self.uniform or ()
+
 
 def _held(given: Any) -> Any:
     """Turn a number into a signal that holds it from the start to the end; true and false are 1 and 0."""
@@ -161,10 +165,11 @@ class InputSignal(Strict):
         """The points of either kind."""
         return self.steps or self.ramps or ()
 
-    def value_given(self, n: int) -> float | list[float]:
-        """Return what the plan has of a point: its time and value, or only the value of an input that is a number."""
-        time, value = self.points[n]
-        return value if time == _ALWAYS else [time, value]
+    def value_given(self, n: int | None) -> Iterator[float | list[float]]:
+        """Yield what the plan has of a point: its time and value, or only the value of an input that is a number."""
+        if n is not None:
+            time, value = self.points[n]
+            yield value if time == _ALWAYS else [time, value]
 
     def jumps(self, before: float) -> Iterator[int]:
         """Yield the numbers of the points at which the value jumps; `before` is the value before the first point."""
@@ -205,12 +210,6 @@ class Keep(Strict):
         return self
 
 
-def _file(name: str, info: ValidationInfo) -> str:
-    if not os.path.isfile(inside(folder_of(info), name)):  # noqa: PTH113 (Path.is_file raises on names that are too long)
-        raise ValueError("there is no such file beside the plan")
-    return name
-
-
 def _expression(text: str) -> str:
     read_expression(text)
     return text
@@ -221,11 +220,11 @@ class Plan(Strict):
 
     title: Name | None = None
     """The heading of the page."""
-    fmu: Annotated[str, AfterValidator(_file)] | None = None
+    fmu: Beside | None = None
     """An FMU for Co-Simulation in the folder of the plan. A plan has this, `vehicle` or `system`."""
     vehicle: Beside | None = None
     """A vehicle file beside the plan, or the name of a vehicle that ships. It runs without an FMU."""
-    system: Annotated[str, AfterValidator(_file)] | None = None
+    system: Beside | None = None
     """A system (SSP) in the folder of the plan. Its variables are "component.variable"."""
     start_time: Finite = 0.0
     """s."""

@@ -2,67 +2,167 @@
 
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from math import isinf, log
+from dataclasses import replace
+from functools import cached_property
+from math import isclose, isinf, log
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 from scipy.stats import qmc
 
 from rov_fmu.fmus.variable import Variable
+from rov_fmu.io.messages import first_of, listed
+from rov_fmu.io.toml_file import key_line
+from rov_fmu.study.plan.model import unsettable
 from rov_fmu.study.plan.plan import Plan, Varied
-from rov_fmu.vehicle.uncertainty import NOTHING, Array, Uncertainty
+from rov_fmu.vehicle.uncertainty import NOTHING, Array
+from rov_fmu.vehicle.vehicle import Vehicle
 
 _LARGEST = float(np.finfo(float).max)
+_MOST_DRAWN = 50_000_000
+"""The largest number of values in a Latin hypercube, which is drawn as a whole: they take 2 GB for some time."""
+_SHOWN = 5
+_FROM = "vary_from"
 _Draw = Callable[[int, int], Array]
 """A function of the first run and the one after the last; it returns a row of numbers in 0 ... 1 for each run."""
 
 
 class Design:
     """The varied variables and their values: first the estimates, which are drawn jointly, and then the variables of
-    [vary], which are independent."""
+    [vary], which are independent.
 
-    def __init__(self, plan: Plan, variables: Mapping[str, Variable], known: Uncertainty = NOTHING) -> None:
-        self._known, self._varied = known, plan.vary
-        self._variables, self._planned = variables, plan.runs
-        self.names = (*known.names, *plan.vary)
-        self.groups = (*known.groups, *((name,) for name in plan.vary))
+    The estimates are the coefficients that have an interval in the vehicle file `vary_from`, and that the plan itself
+    does not give.
+    """
+
+    def __init__(self, plan: Plan, variables: Mapping[str, Variable], vehicle: Vehicle | None = None) -> None:
+        self._plan, self._has, self._vehicle = plan, variables, vehicle
+        self._given = plan.vary.keys() | plan.set.keys()
+        self._whole = vehicle.uncertainty if vehicle else NOTHING
+        errors = zip(self._whole.names, self._whole.errors.tolist(), strict=True)
+        self._known = self._whole.part([name for name, error in errors if error and name not in self._given])
+        self.names = (*self._known.names, *plan.vary)
+        self.groups = (*self._known.groups, *((name,) for name in plan.vary))
         """The names in groups; variables in different groups are independent."""
-        self.runs = _runs(plan, len(self.groups))
+        blocks = len(self.groups) + 2 if plan.sampler == "saltelli" else 1
+        self.runs = plan.points if plan.sampler == "grid" else -(-(plan.runs or 0) // blocks) * blocks
         """The number of runs."""
-        width, seed = len(self.names), plan.seed
-        indices = [[self.names.index(name) for name in group] for group in self.groups]
-        draws: dict[str, Callable[[], _Draw]] = {
-            "grid": lambda: _grid([len(varied.choices or ()) for varied in plan.vary.values()]),
-            "sobol": lambda: _sobol(width, seed),
-            "saltelli": lambda: _saltelli(indices, seed),
-            "latin-hypercube": lambda: _latin_hypercube(width, seed, self.runs),
-            "random": lambda: _random(width, seed),
-        }
-        self._draw = draws[plan.sampler]()
 
-    def warnings(self) -> Iterator[str]:
-        """Yield a sentence for each property of the results that a reader may not expect."""
-        if self._planned is not None and self.runs > self._planned:
-            block = len(self.groups) + 2
-            yield f"runs = {self._planned} becomes {self.runs}, which are {self.runs // block} whole blocks of {block}"
+    @property
+    def mark(self) -> dict[str, Any]:
+        """The estimates that the results depend on, as JSON values."""
+        known = self._known
+        numbers = zip(known.names, known.values.tolist(), known.errors.tolist(), strict=True)
+        estimates = {name: {"value": value, "error": error} for name, value, error in numbers}
+        return {_FROM: {"estimates": estimates, "correlation": known.correlation.tolist()}} if estimates else {}
 
     def rows(self, first: int, end: int) -> Array:
         """Return the values from run `first` to the one before `end`: a row per run, a column per variable."""
-        drawn, together = self._draw(first, end), len(self._known.names)
+        (known, draw), plan = self._drawn, self._plan
+        drawn, together = draw(first, end), len(known.names)
         found = np.empty_like(drawn)
-        found[:, :together] = self._known.drawn(drawn[:, :together])
-        for n, (name, varied) in enumerate(self._varied.items(), together):
+        found[:, :together] = known.drawn(drawn[:, :together])
+        for n, (name, varied) in enumerate(plan.vary.items(), together):
             with np.errstate(over="ignore"):
-                found[:, n] = _values(varied, self._variables[name], drawn[:, n])
+                found[:, n] = _values(varied, self._has[name], drawn[:, n])
         return np.clip(found, -_LARGEST, _LARGEST)
 
+    @cached_property
+    def _drawn(self) -> tuple[Any, _Draw]:
+        """The distribution of the estimates within the bounds of the FMU's variables, and what draws the numbers."""
+        known, plan, width = self._known, self._plan, len(self.names)
+        own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in known.names]).reshape(-1, 2)
+        bounds = [np.maximum(known.bounds, own)[:, 0], np.minimum(known.bounds, own)[:, 1]]
+        indices = [[self.names.index(name) for name in group] for group in self.groups]
+        draws: dict[str, Callable[[], _Draw]] = {
+            "grid": lambda: _grid([len(varied.choices or ()) for varied in plan.vary.values()]),
+            "sobol": lambda: _sobol(width, plan.seed),
+            "saltelli": lambda: _saltelli(indices, plan.seed),
+            "latin-hypercube": lambda: _latin_hypercube(width, plan.seed, self.runs),
+            "random": lambda: _random(width, plan.seed),
+        }
+        return replace(known, bounds=np.column_stack(bounds)), draws[plan.sampler]()
 
-def _runs(plan: Plan, groups: int) -> int:
-    if plan.sampler == "grid":
-        return plan.points
-    runs = plan.runs or 0
-    block = groups + 2
-    return -(-runs // block) * block if plan.sampler == "saltelli" else runs
+    # ---- What does not fit, and what a reader may not expect ---------------------------------------------------------
+
+    def check(self, inputs: Mapping[str, object]) -> Iterator[str]:
+        """Yield a line for each part that does not fit the FMU, or that is also in [set] or one of the inputs."""
+        plan, known, width = self._plan, self._known, len(self.names)
+        yield from (key_line(_FROM, reason, plan.vary_from) for reason in self._misfits())
+        if plan.sampler == "saltelli" and len(known.names) > len(self.groups) == 1:
+            reason = "Sobol indices need independent variables, but all varied variables are correlated"
+            yield key_line("sampler", reason, plan.sampler)
+        for name, varied in plan.vary.items():
+            key = f"vary.{name}"
+            if reason := unsettable(name, self._has):
+                yield key_line(key, reason)
+            elif name in plan.set or name in inputs:
+                yield key_line(key, "is given in [set] or [inputs] too")
+            elif plan.sampler == "grid" and varied.choices is None:
+                yield key_line(key, "a grid needs values or a range", varied.model_dump(exclude_none=True))
+            else:
+                wrong = ((value, self._has[name].wrong(value)) for value in varied.extremes)
+                yield from [key_line(key, reason, value) for value, reason in wrong if reason][:1]
+        if not (width or plan.vary_from) and plan.sampler != "grid":
+            yield 'vary: nothing varies: write [vary], or sampler = "grid" for the one run'
+        if plan.sampler == "latin-hypercube" and (plan.runs or 0) * width > _MOST_DRAWN:
+            most = f"at most {_MOST_DRAWN // width} runs with {width} variables"
+            yield key_line("runs", f"a Latin hypercube is drawn as a whole, {most}", plan.runs)
+
+    def _misfits(self) -> Iterator[str]:
+        """Yield why the estimates do not fit."""
+        if self._vehicle and not self._vehicle.intervals:
+            yield "no coefficient of this vehicle has an interval"
+        elif self._vehicle and not self.names:
+            yield "nothing varies, because [set] gives every coefficient that has an interval"
+        if self._known.names and self._plan.sampler == "grid":
+            yield "a grid needs values or a range, but estimated coefficients have distributions"
+        for name, value in zip(self._known.names, self._known.values.tolist(), strict=True):
+            if reason := unsettable(name, self._has):
+                yield reason
+            elif reason := self._has[name].wrong(value):
+                yield f"{name} of this vehicle does not fit the FMU: it {reason}"
+
+    def warnings(self) -> Iterator[str]:
+        """Yield a sentence for each property of the results that a reader may not expect."""
+        plan, is_saltelli = self._plan, self._plan.sampler == "saltelli"
+        if self._vehicle:
+            yield from self._warnings_of(self._vehicle)
+        together = [some_of(group) for group in self._known.groups if len(group) > 1]
+        if is_saltelli and together:
+            yield f"what is correlated has one Sobol index together: {'; '.join(together)}"
+        if is_saltelli and self.runs > (plan.runs or 0):
+            block = len(self.groups) + 2
+            yield f"runs = {plan.runs} becomes {self.runs}, which are {self.runs // block} whole blocks of {block}"
+
+    def _warnings_of(self, vehicle: Vehicle) -> Iterator[str]:
+        file, names, has = self._plan.vary_from, self._known.names, self._has
+        if (made := vehicle.provenance) and made.verdicts and (axes := vehicle.unfit_axes):
+            yield f"the estimates of {file} do not show how far these axes may be off: {', '.join(axes)}"
+        alone = [name for name in names if name not in vehicle.estimates]
+        if alone and len(names) > 1:
+            yield (
+                f"no row in [estimates] of {file}: {some_of(alone)} vary as if correlated with nothing, which makes "
+                "what was found together far too uncertain"
+            )
+        for name, row in zip(self._whole.names, self._whole.correlation, strict=True):
+            pairs = zip(self._whole.names, row, strict=True)
+            if name in self._given and (with_it := [other for other, value in pairs if value and other in names]):
+                yield f"the plan gives {name}: its correlation with {some_of(with_it)} in {file} is left out"
+        others = vehicle.coefficients.keys() & has.keys() - {*names} - self._given
+        differ = [
+            f"{name} ({has[name].start:g}, not {value:g})"
+            for name, value in vehicle.coefficients.items()
+            if name in others and not isclose(has[name].start, value, rel_tol=1e-9)
+        ]
+        if differ:
+            yield f"the FMU has other values than {file} of {some_of(differ)}: the estimates were found beside those"
+
+
+def some_of(words: Sequence[str]) -> str:
+    """Return the first words as a list in a sentence."""
+    return listed(first_of(words, _SHOWN))
 
 
 # ---- From 0 ... 1 to values ------------------------------------------------------------------------------------------

@@ -9,8 +9,8 @@ import hashlib
 import json
 import re
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -29,9 +29,9 @@ from rov_fmu.study.plan.plan import RUN, TIME, TRAJECTORY
 PAGE, STUDY, RUNS = "study.html", "study.json", "runs"
 _FORMAT = 2
 _LOCK = ".lock"
-_ABOUT = "rov-fmu"
+_ABOUT = b"rov-fmu"
 """The key of what a file says of itself in its footer."""
-_FILE = re.compile(r"part-(\d{9,})-(\d{9,})\.parquet")
+_DRAFT = re.compile(r"\.part-(\d+)-\d+\.parquet")
 _SHOWN = 10
 """The number of files, or of ranges of runs, that a message names."""
 
@@ -39,15 +39,10 @@ Span = tuple[int, int]
 """The first of consecutive runs, and the one after the last."""
 
 
-def identity(study: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the part of a study's description that its rows depend on."""
-    return {key: study[key] for key in ("plan", "fmu", "engine")}
-
-
 def parquet(table: pa.Table, study: Mapping[str, Any], first: int) -> bytes:
     """Return the file with the rows of runs from a first one on, which belong to a study."""
-    own = identity(study)
-    about = {"digest": _digest(own), "first": first, "end": first + len(table), "study": own}
+    own, span = _identity(study), (first, first + len(table))
+    about = {"digest": _digest(own), "first": span[0], "end": span[1], "study": own}
     sink = pa.BufferOutputStream()
     told = table.replace_schema_metadata({_ABOUT: json.dumps(about)})
     pq.write_table(told, sink, compression="zstd", write_page_checksum=True)
@@ -66,8 +61,14 @@ def old_rows(folder: Path, outputs: Sequence[str]) -> pa.Table:
     return table.append_column(TRAJECTORY, pa.array([by_run.get(run) for run in table[RUN].to_pylist()]))
 
 
-def _digest(study: Mapping[str, Any]) -> str:
-    return hashlib.sha256(json.dumps(study, sort_keys=True).encode()).hexdigest()
+def not_done(done: Iterable[Span], within: Span) -> list[Span]:
+    """Return the ranges of a range of runs that are not done."""
+    found, (begin, last) = [], within
+    for start, end in [*sorted(done), (last, last)]:
+        if min(start, last) > begin:
+            found.append((begin, min(start, last)))
+        begin = max(begin, end)
+    return found
 
 
 def is_description(path: Path) -> bool:
@@ -98,15 +99,14 @@ class Store:
             for each in (self.folder, self.folder / RUNS):
                 each.mkdir(exist_ok=True)
             lock = locket.lock_file(str(self.folder / f"{_LOCK}{part}"), timeout=0)
-            try:
-                lock.acquire()
-            except locket.LockError:
-                raise FileError(f"{self.folder}: another study is writing there") from None
+            lock.acquire()
+        except locket.LockError:
+            raise FileError(f"{self.folder}: another study is writing there") from None
         except OSError as error:
             raise WriteError(error.errno, error.strerror, str(error.filename or self.folder)) from error
 
         def leave() -> None:
-            if is_new and not self.done() and len([*self.folder.glob(f"{_LOCK}*")]) == 1:
+            if is_new and not self._files() and len([*self.folder.glob(f"{_LOCK}*")]) == 1:
                 shutil.rmtree(self.folder, ignore_errors=True)
             lock.release()
 
@@ -119,129 +119,109 @@ class Store:
         Each file is opened; `whole`: every page is read. Raises FileError with a line for each file that cannot count.
         """
         found, wrong = dict[Path, Span](), list[str]()
-        for path in sorted((self.folder / RUNS).glob("part-*.parquet")):
+        for path in self._files():
             try:
                 found[path] = _span(path, study, whole=whole)
-            except _ForeignError as error:
-                raise FileError(f"{self.folder}: {error}: choose another folder") from None
             except FileError as error:
                 wrong.append(str(error))
-        if wrong:
-            raise FileError(*first_of(wrong, _SHOWN))
         for (path, (_, end)), (other, (first, _)) in pairwise(found.items()):
             if first < end:
-                raise FileError(f"{other}: has runs that {path} has, too: remove one of them")
+                wrong.append(f"{other}: has runs that {path} has, too: remove one of them")
+        if wrong:
+            raise FileError(*first_of([*dict.fromkeys(wrong)], _SHOWN))
         return found
 
-    def describe(self, study: Mapping[str, Any], runs: Span) -> None:
-        """Check that existing runs belong to a study, and write its description. Raises FileError, WriteError.
+    def describe(self, study: Mapping[str, Any], runs: Span) -> list[Span]:
+        """Check that existing runs belong to a study, and write its description. Return the missing ones of `runs`.
 
-        Unfinished files of these runs are removed, which a process that was killed has left.
+        Unfinished files of these runs are removed, which a process that was killed has left. Raises FileError,
+        WriteError.
         """
-        if (self.folder / STUDY).exists() and self.done() and self.description()["format"] != _FORMAT:
+        path = self.folder / STUDY
+        if is_description(path) and self.description()["format"] != _FORMAT:
             raise FileError(f"{self.folder}: was written by an earlier version of this tool: choose another folder")
-        if any(end > study["runs"] for _, end in self.checked(study).values()):
-            last = self.done()[-1][1] - 1
+        done = [*self.checked(study).values()]
+        if done and done[-1][1] > study["runs"]:
+            last = done[-1][1] - 1
             raise FileError(f"{self.folder}: has runs up to number {last}, but the plan has only {study['runs']} runs")
-        for path in (self.folder / RUNS).glob(".part-*"):
-            if (name := _FILE.match(path.name[1:])) and runs[0] <= int(name[1]) < runs[1]:
-                path.unlink()
-        about = {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", **study}
-        text = json.dumps(about, indent=2, ensure_ascii=False)
-        output = Output(self.folder / STUDY, f"{text}\n".encode())
-        write_whole(output, force=self._force, is_ours=is_description)
+        for draft in (self.folder / RUNS).glob(".part-*"):
+            if (name := _DRAFT.match(draft.name)) and runs[0] <= int(name[1]) < runs[1]:
+                draft.unlink()
+        text = json.dumps(
+            {"format": _FORMAT, "made_by": f"rov-fmu {__version__}", **study}, indent=2, ensure_ascii=False
+        )
+        write_whole(Output(path, f"{text}\n".encode()), force=self._force, is_ours=is_description)
+        return not_done(done, runs)
 
     def check_complete(self, study: Mapping[str, Any]) -> None:
         """Check every page of every file, and that no run of a study is missing. Raises FileError."""
-        if gaps := _gaps([*self.checked(study, whole=True).values()], 0, study["runs"]):
-            named = listed(first_of([f"{first} to {end - 1}" for first, end in gaps], _SHOWN))
+        if missing := not_done(self.checked(study, whole=True).values(), (0, study["runs"])):
+            named = listed(first_of([f"{first} to {end - 1}" for first, end in missing], _SHOWN))
             advice = f"do them with --part, or copy their files into {RUNS}"
             raise FileError(f"{self.folder}: of {study['runs']} runs, these are missing: {named}: {advice}")
 
     def description(self) -> dict[str, Any]:
         """Return the description of the study. Raises FileError."""
-        path = self.folder / STUDY
+        path, found = self.folder / STUDY, None
         if not self.folder.is_dir():
             raise FileError(f"{self.folder}: there is no such folder")
-        try:
+        with suppress(ValueError, RecursionError):
             found = json.loads(read_text(path))
-            known = isinstance(found, dict) and found.get("format") in (1, _FORMAT)
-        except (ValueError, RecursionError):
-            known = False
-        if not known:
-            raise FileError(
-                f"{path}: is not the description of a study, or was written by another version of this tool"
-            )
-        return dict(found)
-
-    def done(self) -> list[Span]:
-        """Return the ranges of finished runs in order, by the names of their files."""
-        names = (_FILE.fullmatch(path.name) for path in (self.folder / RUNS).iterdir())
-        return sorted((int(name[1]), int(name[2]) + 1) for name in names if name)
-
-    def missing(self, first: int, last: int) -> list[Span]:
-        """Return the ranges of runs from a first one to the one before the last one that are not done."""
-        return _gaps(self.done(), first, last)
+        if not isinstance(found, dict) or found.get("format") not in (1, _FORMAT):
+            words = "is not the description of a study, or was written by another version of this tool"
+            raise FileError(f"{path}: {words}")
+        return found
 
     def write(self, span: Span, rows: bytes) -> None:
         """Write the file with the rows of some runs, whole or not at all. Raises WriteError."""
-        put_whole(Output(self.folder / RUNS / f"part-{span[0]:09d}-{span[1] - 1:09d}.parquet", rows))
+        put_whole(Output(self.folder / RUNS / _name(span), rows))
+
+    def _files(self) -> list[Path]:
+        return sorted((self.folder / RUNS).glob("part-*.parquet"))
 
 
 # ---- One file --------------------------------------------------------------------------------------------------------
 
 
-class _ForeignError(FileError):
-    """A file has runs of another study; the text is the predicate of a sentence."""
+def _name(span: Span) -> str:
+    return f"part-{span[0]:09d}-{span[1] - 1:09d}.parquet"
+
+
+def _identity(study: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the part of a study's description that its rows depend on."""
+    return {key: study[key] for key in ("plan", "fmu", "engine")}
+
+
+def _parts(study: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the rows depend on, by the words with which a message tells that it has changed."""
+    return {**study["plan"], "--engine": study["engine"], "the vehicle, the FMU or rov-fmu": study["fmu"]}
+
+
+def _digest(study: Mapping[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(study, sort_keys=True).encode()).hexdigest()
 
 
 def _span(path: Path, study: Mapping[str, Any], *, whole: bool) -> Span:
     """Return the runs of a file. Raises FileError if it cannot count."""
     try:
         with pq.ParquetFile(path, page_checksum_verification=True) as file:
-            schema, table = file.schema_arrow, file.read(None if whole else [RUN])
-        about, has = json.loads(schema.metadata[_ABOUT.encode()]), schema.empty_table().flatten().column_names
-        first, end, of, digest = (about[key] for key in ("first", "end", "study", "digest"))
-        rows = table[RUN].to_pylist()
-        reason = _reason(of, study, digest)
+            schema, rows = file.schema_arrow, file.read(None if whole else [RUN])[RUN].to_pylist()
+        about, has = json.loads(schema.metadata[_ABOUT]), schema.empty_table().flatten().column_names
+        span = about["first"], about["end"]
+        is_own, old = about["digest"] == _digest(_identity(study)), _parts(about["study"])
+        in_order = rows == [*range(span[0], span[0] + len(rows))] and len(rows) == span[1] - span[0]
     except (pa.ArrowException, OSError, ValueError, LookupError, TypeError, RecursionError) as error:
         told = brief(reason_of(error).partition("\n")[0].partition(". ")[0])
         raise FileError(f"{path}: cannot be read: {told}. Remove it, and its runs are done again") from error
-    if reason:
-        raise _ForeignError(reason)
-    name = _FILE.fullmatch(path.name)
-    if rows != [*range(first, end)] or not name or (int(name[1]), int(name[2]) + 1) != (first, end):
-        raise FileError(f"{path}: has the runs {first} to {end - 1}, and not those of its name")
+    if not is_own:
+        new = _parts(study)
+        changed = ", ".join(sorted(key for key in {*old, *new} if old.get(key) != new.get(key)))
+        raise FileError(f"{path.parents[1]}: holds runs of another study ({changed} changed): choose another folder")
+    if not in_order or path.name != _name(span):
+        raise FileError(f"{path}: has the runs {span[0]} to {span[1] - 1}, and not those of its name")
     columns = study["columns"]
     outputs = [TIME, *columns["outputs"]] if columns["outputs"] else []
     wanted = {*columns["parameters"], *columns["figures"], *(f"{TRAJECTORY}.{name}" for name in outputs)}
     if lacking := sorted(wanted.difference(has)):
         raise FileError(f"{path}: lacks {listed(lacking)}")
-    return first, end
-
-
-def _reason(old: Mapping[str, Any], study: Mapping[str, Any], digest: str) -> str:
-    """Return how the study of a file differs from a study, or an empty text."""
-    new = identity(study)
-    if old == new and digest == _digest(new):
-        return ""
-    if old["engine"] != new["engine"]:
-        return f"holds runs of --engine {old['engine']}"
-    if old["fmu"] != new["fmu"]:
-        vehicle = (
-            f", for the vehicle {name} has changed, or rov-fmu, which builds it" if (name := study["vehicle"]) else ""
-        )
-        return f"holds runs of another FMU{vehicle}"
-    plans = old["plan"], new["plan"]
-    changed = sorted(key for key in {*plans[0], *plans[1]} if plans[0].get(key) != plans[1].get(key))
-    return f"holds runs of another plan ({', '.join(changed)} changed)"
-
-
-def _gaps(done: list[Span], first: int, last: int) -> list[Span]:
-    """Return the ranges from a first number to the one before the last one that are not done."""
-    found, begin = [], first
-    for start, end in [*sorted(done), (last, last)]:
-        if min(start, last) > begin:
-            found.append((begin, min(start, last)))
-        begin = max(begin, end)
-    return found
+    return span

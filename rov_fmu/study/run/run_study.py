@@ -87,10 +87,10 @@ def do_study(
     store, (number, parts) = Store(folder, force=force), part or (1, 1)
     span = (number - 1) * design.runs // parts, number * design.runs // parts
     with store.held(f"-{number}-of-{parts}" if part else ""):
-        store.describe(study.about, span)
+        missing = store.describe(study.about, span)
         if merge:
             store.check_complete(study.about)
-        work = Work(study, design, store, span, on_progress)
+        work = Work(study, design, store, missing, span[1] - span[0], on_progress)
         try:
             if work.missing and model.vehicle:
                 do_in_lanes(work, model.vehicle, workers)

@@ -1,7 +1,7 @@
 """The runs of a study that are missing, and what became of those that were done."""
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from threading import Event, Thread
@@ -43,12 +43,18 @@ class Work:
     """The seconds from then until the last run was done."""
 
     def __init__(
-        self, study: Study, design: Design, store: Store, span: Span, on_progress: Callable[[Progress], None]
+        self,
+        study: Study,
+        design: Design,
+        store: Store,
+        missing: Iterable[Span],
+        total: int,
+        on_progress: Callable[[Progress], None],
     ) -> None:
-        self.study, self.design, self.store, self._on_progress = study, design, store, on_progress
-        self.missing = deque(store.missing(*span))
-        self._total = span[1] - span[0]
-        self._done_before = self._total - self.left
+        """`total` is the number of runs with those that are done."""
+        self.study, self.design, self.store = study, design, store
+        self.missing, self._total, self._on_progress = deque(missing), total, on_progress
+        self._done_before = total - self.left
 
     @property
     def left(self) -> int:
