@@ -107,6 +107,8 @@ TESTS = {
     "rov_fmu/interface/export_command.py": "interface/test_export_command.py bridges",
     "rov_fmu/interface/tune_command.py": "cli/test_messages.py identify/test_tuning.py",
     "rov_fmu/interface/*": "interface cli/test_simulate.py cli/test_messages.py cli",
+    "rov_fmu/autopilot/*": "autopilot bridges/autopilot bridges/test_ardusub_gains.py bridges/test_allocation.py",
+    "rov_fmu/fmus/*": "fmus prove cli/test_prove.py bridges/system study/test_kinds.py study/test_systems.py",
     "rov_fmu/bridges/*": "bridges",
     "rov_fmu/io/columns.py": "io/test_csv_table.py",
     "rov_fmu/io/csv_table.py": "tank/test_logs.py tank/test_catalogue.py tank/test_tank_tests.py "

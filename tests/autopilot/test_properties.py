@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 
 from rov_fmu.autopilot import flights, law
+from rov_fmu.autopilot.allocation import voltages
 from rov_fmu.autopilot.ardusub import RATE, Mixer, loops_of
 from rov_fmu.autopilot.flights import Flights
 from rov_fmu.autopilot.gains import autopilot_of
 from rov_fmu.autopilot.law import AXES, LOOP, PLACE, SHARING, STICK, THRUSTER
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL
+from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
+from tests.vehicles import THRUST_EFFECTS
 from verification.references.autopilot.ardusub import STICK as STICK_TIME
 from verification.references.autopilot.ardusub import VECTORED, VECTORED_6DOF, Hold, Motion
 
@@ -56,6 +58,48 @@ def test_the_law_in_c_is_ardusubs_hold(
         sinking = sinks
         assert outputs == pytest.approx(hold.outputs(motion, sticks[0], sticks[1], 1.0 / RATE), abs=1e-12)
     assert abs(flown.outputs).max() == 1.0
+
+
+# ---- The numbers -----------------------------------------------------------------------------------------------------
+
+
+def test_the_feed_forward_is_the_drag_and_the_inertia_of_the_vehicle_file() -> None:
+    made = autopilot_of(SIX)
+    for axis, v in ((SURGE, "u"), (HEAVE, "w")):
+        inertia = (SIX["m_rov"] + SIX[f"m_a_{v}"]) / SIX[f"beta_{v}"]
+        found = [made.gain(axis, name) for name in ("d_1", "d_2", "inertia")]
+        assert found == pytest.approx([SIX[f"b_d_{v}"], SIX[f"a_d_{v}"], inertia])
+
+
+def test_a_curve_is_known_at_all_voltages_of_its_tables_or_around_that_of_the_battery() -> None:
+    rov = load_vehicle(THRUST_EFFECTS)
+    main, *others = (voltages(rov, curve) for curve in rov.layout.curves)
+    assert (main[0], main[-1]) == (12.0, 16.0)
+    assert all(found[0] < rov.layout.voltage < found[-1] for found in others)
+
+
+def test_each_of_several_vehicles_flies_by_its_own_gains() -> None:
+    made = autopilot_of(SIX)
+    soft = made.loops.copy()
+    soft["k_x"] *= 0.3
+    modes, aims = (np.tile(row, (100, 1)) for row in ([STICK, STICK, PLACE, STICK, STICK, PLACE], [0, 0, 11, 0, 0, 1]))
+    both = Flights(SIX, made.sharing, [{"z": 10.0}] * 2).fly(np.stack([made.loops, soft]), modes, aims, made.step)
+    for loops, seen in zip((made.loops, soft), both.sensors, strict=True):
+        alone = Flights(SIX, made.sharing, [{"z": 10.0}]).fly(loops, modes, aims, made.step).sensors[0]
+        assert seen == pytest.approx(alone, abs=1e-12)
+    assert np.abs(both.sensors[0] - both.sensors[1]).max() > 0.1
+
+
+def test_axes_that_ask_for_too_much_together_are_scaled_and_keep_their_direction() -> None:
+    made = autopilot_of(HEAVY)
+    aims = np.tile([1.0, 0.5, 0.0, 0.0, 0.0, 0.0], (2, 1))
+    flight = Flights(HEAVY, made.sharing, [{"z": 10.0}]).fly(made.loops, np.full((2, 6), STICK), aims, made.step)
+    commands = dict(zip(HEAVY.layout.commands, flight.outputs[0, -1].tolist(), strict=True))
+    forces = HEAVY.commanded(HEAVY.layout.usual_inputs | commands)
+    X, Y = (sum(t.effect(axis) * forces[t.name] for t in HEAVY.layout.thrusters) for axis in (SURGE, SWAY))
+    asked = flight.demands[0, -1]
+    assert pytest.approx(asked[1] / asked[0], rel=1e-3) == Y / X
+    assert 0.0 < X < 0.99 * asked[0]
 
 
 # ---- What it promises ------------------------------------------------------------------------------------------------

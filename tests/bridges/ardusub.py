@@ -9,10 +9,10 @@ import struct
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
-from math import atan, cos, radians, sin
+from math import cos, sin
 from socket import AF_INET, SOCK_DGRAM, socket
 
-from verification.references.autopilot.ardusub import Hold, Motion, Pid
+from verification.references.autopilot.ardusub import Hold, Motion
 
 KEYS = {"gyro": 3, "accel_body": 3, "position": 3, "attitude": 3, "velocity": 3, "timestamp": 1, "rng_1": 1}
 KEYS |= {"voltage": 1, "current": 1}
@@ -67,10 +67,7 @@ def _atof(text: str) -> float:
 
 @dataclass
 class ArduSub:
-    """ArduSub's depth hold, or its position hold if `place` is given, with the default gains unless `hold` has others.
-
-    The pulses of the motors are in `sent`.
-    """
+    """ArduSub's depth hold, with the default gains unless `hold` has others. The pulses of the motors are in `sent`."""
 
     port: int
     rate: int = 400
@@ -78,8 +75,6 @@ class ArduSub:
     """The depth to hold, m."""
     heading: float = 0.0
     """The heading to hold, rad."""
-    place: tuple[float, float] | None = None
-    """The position to hold, north and east, m."""
     sticks: Callable[[float], tuple[float, float]] = lambda _: (0.0, 0.0)
     """Forward and lateral from -1 to 1 over time."""
     timeout: float = 1.0
@@ -101,7 +96,6 @@ class ArduSub:
         self.socket.settimeout(self.timeout)
         self.at: dict[str, list[float]] = {}
         self.hold.depth, self.hold.heading = self.depth, self.heading
-        self.north, self.east = (Pid(1.0, 0.5, 0.0, 10.0, error_filter=5.0) for _ in range(2))  # from m/s to m/s2
 
     def close(self) -> None:
         self.socket.close()
@@ -139,7 +133,7 @@ class ArduSub:
         fall = -sin(theta) * ax + sin(phi) * cos(theta) * ay + cos(phi) * cos(theta) * az + 9.80665
         attitude, gyro = (self._vector(key) for key in ("attitude", "gyro"))
         motion = Motion(attitude, gyro, self.at["position"][2], self.at["velocity"][2], fall)
-        forward, lateral = self.sticks(self.time) if self.place is None else self._to_place(self.place, dt)
+        forward, lateral = self.sticks(self.time)
         outputs = self.hold.outputs(motion, forward, lateral, dt)
         self.sent.append(started(self.time, [int(1500 + 400 * out) for out in outputs], self.channels, self.start))
         return self.sent[-1]
@@ -147,12 +141,3 @@ class ArduSub:
     def _vector(self, key: str) -> tuple[float, float, float]:
         x, y, z = self.at[key]
         return x, y, z
-
-    def _to_place(self, place: tuple[float, float], dt: float) -> tuple[float, float]:
-        """Forward and lateral from -1 to 1, as lean angles of a copter over 45 degrees: PSC_POSXY_P = 1."""
-        psi, (north, east, _), (v_north, v_east, _) = self.at["attitude"][2], self.at["position"], self.at["velocity"]
-        a_north = self.north(place[0] - north, v_north, dt)
-        a_east = self.east(place[1] - east, v_east, dt)
-        ahead, right = cos(psi) * a_north + sin(psi) * a_east, cos(psi) * a_east - sin(psi) * a_north
-        forward, lateral = (max(-1.0, min(1.0, atan(a / 9.80665) / radians(45.0))) for a in (ahead, right))
-        return forward, lateral

@@ -158,20 +158,6 @@ def test_without_any_gains_there_is_nothing_to_load(vehicle: Vehicle, reasons: d
         tuned(vehicle)
 
 
-@pytest.mark.usefixtures("without_flight")
-def test_a_thrust_table_gives_the_gains_of_its_curve(tmp_path: Path) -> None:
-    """The table has the points of the curve every 2 %, and the rule needs the one at 30 %."""
-    curve = SIX.layout.curves[0]
-    rows = [f"{c},{SIX.curve_force(curve, c / 100.0)!r}" for c in range(-100, 101, 2)]
-    (tmp_path / "t.csv").write_text("\n".join(["command [%],thrust [N]", *rows, ""]), encoding="utf-8")
-    text = SHIPPED["bluerov2"].read_text(encoding="utf-8")
-    text = re.sub(r"\n(electric_current|a_t|b_t|a_t_reverse|b_t_reverse|c_0) = .*", "", text)
-    text = re.sub(r"\n(data|pictures) = .*", "", text).replace('"T200 at 16 V"', '"T200"\ntable = "t.csv"')
-    (tmp_path / "rov.toml").write_text(text, encoding="utf-8")
-    found = tuned(load_vehicle(tmp_path / "rov.toml"))
-    assert values_of(found) == pytest.approx(values_of(tuned(SIX)), rel=1e-4)
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
-from math import atan2, nan, pi, remainder
+from math import nan, pi, remainder
 from pathlib import Path
 from shlex import quote, split
 from socket import AF_INET, SOCK_DGRAM, socket
@@ -35,7 +35,6 @@ from tests.bridges.test_mcap import messages
 from tests.commands import ROOT
 from tests.tank.logs import commanded, used
 from tests.vehicles import numbered, pulsed, thruster
-from verification.references.autopilot.ardusub import VECTORED, Hold
 
 HEAVY: Vehicle = load_vehicle(SHIPPED["bluerov2_heavy"])
 HERE, THERE = ("127.0.0.1", 40000), ("127.0.0.1", 40001)
@@ -345,17 +344,6 @@ def test_servos_at_rest_and_short_silences_fit(flight: list[tuple[float, list[in
     assert [hint[: len(words)] for hint, words in zip(hints, said, strict=True)] == said
 
 
-def test_the_frame_of_another_vehicle_is_noticed_in_flight() -> None:
-    hints: list[str] = []
-    with served(setup_of(z=1.0), hints.append) as (_, port):
-        autopilot = ArduSub(port, rate=200, hold=Hold(frame=VECTORED))
-        autopilot.fly(START + 0.9)
-        assert hints == []
-        autopilot.fly(0.2)
-        autopilot.close()
-    assert hints == [NO_PULSES]
-
-
 @pytest.mark.parametrize(
     ("name", "setting", "newtons"),
     [("bluerov2", 0.0, 2.0), ("bluerov2", -5.5, 7.5), ("bluerov2", 5.0, 0.0), ("bluerov2_heavy", -4.0, 3.0)],
@@ -470,21 +458,6 @@ def test_the_distance_to_the_bottom_is_that_of_a_sensor_with_a_range_of_100_m(
     found = parsed(connection.answer(packet(400, 0, NEUTRAL), HERE))
     assert found["rng_1"] == pytest.approx([distance], abs=1e-3)
     assert found["attitude"][2] == pytest.approx(remainder(start.get("psi_0", 0.0), 2.0 * pi), abs=1e-3)
-
-
-@pytest.mark.long
-def test_holds_its_place_in_a_current() -> None:
-    """ArduSub's position hold, which lies across the current: depth to 5 cm, heading to 2 degrees."""
-    heading = atan2(-0.1, -0.2) + 1.05
-    with served(setup_of(V_N=0.2, V_E=0.1, z=0.9, psi_0=heading + 0.05)) as (_, port):
-        autopilot = ArduSub(port, depth=1.0, heading=heading, place=(0.0, 0.0))
-        autopilot.fly(20.0)
-        autopilot.close()
-    held = [at for at in autopilot.history if at["timestamp"][0] > 15.0]
-    assert max(abs(at["position"][2] - 1.0) for at in held) < 0.05
-    turned = [(at["attitude"][2] - heading + pi) % (2.0 * pi) - pi for at in held]
-    assert np.degrees(np.max(np.abs(turned))) < 2.0
-    assert max(np.hypot(at["position"][0], at["position"][1]) for at in held) < 0.3
 
 
 # ---- The command -----------------------------------------------------------------------------------------------------

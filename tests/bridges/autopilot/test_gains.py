@@ -28,7 +28,6 @@ from rov_fmu.fmu.archive import META_DATA, archive
 from rov_fmu.io.messages import InputError
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from rov_fmu.vehicle.writer import vehicle_text
 from tests.often import spread
 from tests.vehicles import FINNED
 
@@ -195,14 +194,6 @@ def test_the_fmu_flies_as_flights_in_c_and_restores_its_state(vehicle: Vehicle, 
     pilot.freeInstance()
 
 
-def _drawn(vehicle: Vehicle, seed: int) -> Vehicle:
-    """Return a vehicle with other masses, inertias, drag, loads and lags; with seed 0 the same one."""
-    random = np.random.default_rng(seed)
-    changed = [name for name in vehicle.coefficients if name.startswith(("m_a_", "I_", "a_d_", "b_d_", "F_0_", "T_"))]
-    return vehicle.with_(**{name: vehicle[name] * random.uniform(0.8, 1.3) for name in changed if seed})
-
-
-FIVE = [("videoray", 0), ("bluerov2", 0), ("bluerov2_heavy", 0), ("bluerov2", 95), ("bluerov2_heavy", 96)]
 PLAN = """
 step = 0.02
 stop_time = 8.0
@@ -211,7 +202,7 @@ connect = [
   ["rov.body_velocity", "autopilot.body_velocity"], ["autopilot.thrusters", "rov.thrusters"],
 ]
 [component.rov]
-vehicle = "own.toml"
+vehicle = "bluerov2"
 start = { z = 10.0 }
 [component.autopilot]
 companion = "autopilot"
@@ -221,39 +212,16 @@ start = { mode_w = 2.0, ref_z = 11.0, mode_r = 2.0, ref_psi = 1.0 }
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("name", "seed"), FIVE)
-def test_five_vehicles_step_alike_by_a_pair_of_fmus_in_a_system_and_in_python(
-    name: str, seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_in_a_system_whose_members_exchange_at_once_commands_arrive_a_step_later(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Steps of depth and heading. In a system, whose members exchange at once, commands arrive a step later."""
-    copy = Path(shutil.copytree(SHIPPED[name].parent, tmp_path / "models"))
-    monkeypatch.chdir(copy)
-    drawn = _drawn(load_vehicle(copy / SHIPPED[name].name), seed)
-    Path("own.toml").write_text(vehicle_text(drawn, copy), encoding="utf-8")
-    vehicle = load_vehicle(Path("own.toml"))
-    made, layout, aims = autopilot_of(vehicle), vehicle.layout, {"depth": 11.0, "heading": 1.0}
-    python = rov_fmu.load("own.toml").hold(STEPS * 0.02, {}, start={"z": 10.0}, step=0.02, **aims)
-    rov_fmu.build_fmu(vehicle, "rov.fmu", platforms="host")
-    Path("autopilot.fmu").write_bytes(autopilot_fmu(made, ["host"]))
+    monkeypatch.chdir(tmp_path)
     Path("plan.toml").write_text(PLAN, encoding="utf-8")
     assert main(["system", "plan.toml", "-o", "my.ssp", "--run"]) == 0
     system = np.genfromtxt("my.csv", delimiter=",", names=True, deletechars="")
-    rov, of_rov = begun(Path("rov.fmu"), 2, {"z": 10.0})
-    pilot, of_pilot = begun(Path("autopilot.fmu"), 2, HOLD)
-    sensors, pair = [*layout.pose, *layout.velocities, *layout.over_ground], []
-    for n in range(STEPS):
-        pair.append(rov.getReal([of_rov["z"], of_rov["psi"]]))
-        pilot.setReal([of_pilot[one] for one in sensors], rov.getReal([of_rov[one] for one in sensors]))
-        pilot.doStep(n * 0.02, 0.02)
-        rov.setReal([of_rov[one] for one in layout.commands], pilot.getReal([of_pilot[one] for one in layout.commands]))
-        rov.doStep(n * 0.02, 0.02)
-    now, later = by_flights(made, 0, **aims), by_flights(made, 1, **aims)
-    for n, variable in enumerate(("z", "psi")):
-        own, delayed = (seen[:, SENSORS.index(variable)] for seen in (now, later))
-        assert python[variable][:STEPS] == pytest.approx(own, abs=1e-9)
-        assert np.array(pair)[:, n] == pytest.approx(own, abs=1e-9)
-        assert system[f"rov.{variable}"][:STEPS] == pytest.approx(delayed, abs=1e-9)
-        assert own[-1] == pytest.approx((11.0, 1.0)[n], abs=0.05)
+    later = by_flights(autopilot_of(SIX), 1, depth=11.0, heading=1.0)
+    for variable in ("z", "psi"):
+        assert system[f"rov.{variable}"][:STEPS] == pytest.approx(later[:, SENSORS.index(variable)], abs=1e-9)
 
 
 def test_prove_finds_the_expected_results_of_the_autopilot_and_a_gain_that_was_changed(

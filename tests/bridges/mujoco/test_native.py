@@ -1,7 +1,4 @@
-"""The step is that in Python (reference.py) up to rounding errors, for every kind of vehicle, in every order of events.
-
-What a vehicle remembers is in MuJoCo's data, and MuJoCo's errors are exceptions.
-"""
+"""What a vehicle remembers is in MuJoCo's data, and MuJoCo's errors are exceptions."""
 
 import gc
 import re
@@ -21,129 +18,61 @@ from numpy.typing import NDArray
 import rov_fmu
 from rov_fmu.bridges.mujoco import mujoco_files
 from rov_fmu.bridges.mujoco.source import water_sources
-from tests.bridges.mujoco.reference import Reference
-from tests.bridges.test_mujoco import EULER, FILES, IMPLICIT, loaded, mujoco, scene
+from tests.bridges.test_mujoco import loaded, mujoco, scene
 from tests.commands import BARE
 
 Array = NDArray[np.float64]
-STEPS = 240
 
 
-def world(package: ModuleType, integrator: int = EULER) -> Any:
-    """Return a model without a sea bed, with a keyframe at a later time."""
-    spec = scene(package, 0.002)
-    spec.option.integrator = integrator
-    spec.add_key(name="later", time=10.0)
-    model = spec.compile()
+def world(package: ModuleType) -> Any:
+    """Return a model without a sea bed."""
+    model = scene(package, 0.002).compile()
     model.geom_contype[:] = 0
     return model
 
 
-def events(rovs: list[Any], vehicles: list[Any]) -> Iterator[None]:
-    """Change everything that may change, with a step after each event.
-
-    Commands reverse every 40 steps, and once for a single step. Coefficients and inputs change twice. MuJoCo is
-    reset to a later, an earlier and the same time.
-    """
-    random, data = np.random.default_rng(5), rovs[0].data
-    data.qvel[:] = random.uniform(-0.3, 0.3, len(data.qvel))
-    signs = random.choice([-1.0, 1.0], len(data.ctrl))
-    for rov in rovs:  # so that commands arrive and rotors reverse between the resets
-        rov.coefficients.update({name: 0.2 * x for name, x in rov.coefficients.items() if name.startswith("T_")})
-    for n in range(STEPS):
-        if n % 40 == 0 or n in (50, 51):
-            signs, shares = -signs, iter(signs * random.uniform(0.1, 0.8, len(signs)))
-            for rov, vehicle in zip(rovs, vehicles, strict=True):
-                for command, actuator in zip(vehicle.layout.commands, rov._actuators, strict=True):
-                    assert rov.model.actuator(actuator).name.endswith(command)
-                    data.ctrl[actuator] = vehicle.layout.command_of(next(shares))
-        if n in (40, 130):
-            for rov in rovs:
-                rov.coefficients.update({name: rov.coefficients[name] * 1.1 for name in [*rov.coefficients][::2]})
-                rov.inputs.update({name: 0.1 + x for name, x in rov.inputs.items()})
-        if n == 70:
-            mujoco.mj_resetDataKeyframe(rovs[0].model, data, 0)
-        if n == 110:
-            mujoco.mj_resetData(rovs[0].model, data)
-        if n == 160:
-            for rov in rovs:
-                rov.reset()
-        data.qfrc_applied[:6] = 2.0 * (n // 5 % 2)  # until each reset
-        yield
+def command(rov: Any, share: float) -> None:
+    rov.data.ctrl[:] = share * rov.model.actuator_ctrlrange[:, 1]
 
 
-def flown(rovs: list[Any], vehicles: list[Any], step: Callable[..., None]) -> Array:
-    """Return positions, velocities and forces after each step."""
-    rows = []
-    for _ in events(rovs, vehicles):
-        step(*rovs)
-        rows.append([*rovs[0].data.qpos, *rovs[0].data.qvel, *(x for rov in rovs for x in rov.forces.values())])
-    return np.array(rows)
-
-
-def assert_same(found: Array, expected: Array) -> None:
-    assert np.isfinite(expected).all()
-    assert np.ptp(expected, axis=0).max() > 0.1, "it moves"
-    assert (np.abs(found - expected) <= 1e-12 * np.maximum(1.0, np.abs(expected).max(axis=0))).all()
-
-
-@pytest.mark.parametrize(
-    ("name", "integrator"),
-    [
-        pytest.param(
-            name, one, marks=() if n % 2 == 0 and n // 2 % 3 == m else pytest.mark.weekly, id=f"{name}-{one.name}"
-        )
-        for n, name in enumerate(FILES)
-        for m, one in enumerate((EULER, *IMPLICIT))
-    ],
-)
-def test_it_moves_as_in_python(name: str, integrator: int) -> None:
-    """Also with dead time, lag, rotors, changed coefficients, and after resets to earlier and to later times."""
-    vehicle, package = loaded(name)
-    model = world(package, integrator)
-    native, reference = package.Rov(model), Reference(vehicle, model)
-    expected = flown([reference], [vehicle], Reference.step)
-    assert_same(flown([native], [vehicle], package.step), expected)
-
-
-@pytest.mark.parametrize("mixed", [False, True], ids=["in C", "one of them in Python"])
-def test_several_kinds_in_one_scene_move_as_in_python(mixed: bool) -> None:
+@pytest.mark.parametrize("older", [False, True], ids=["of one format", "one of an older format"])
+def test_several_kinds_in_one_scene_move_as_each_alone(older: bool) -> None:
     """Each kind has a library of its own. One of them has a current, which another kind does not have at its place."""
-    names = ["every_option", "videoray", "bluerov2", "videoray"]
-    packages = [loaded(name)[1] for name in names]
-    vehicles = [loaded(name)[0] for name in names]
-    spec = scene(packages[0], 0.002)
-    spec.add_key(name="later", time=10.0)
+    packages = [loaded(name)[1] for name in ("every_option", "videoray", "bluerov2", "videoray")]
+    spec, prefixes = scene(packages[0], 0.002), ["", "1_", "2_", "3_"]
     for n, package in enumerate(packages[1:], 1):
         part = mujoco.MjSpec.from_file(str(package.FOLDER / "vehicle.xml"))
         spec.attach(part, prefix=f"{n}_", frame=spec.worldbody.add_frame(pos=[0.0, 9.0 * n, 0.0]))
     model = spec.compile()
     model.geom_contype[:] = 0
-
-    def connected(python: tuple[int, ...]) -> list[Any]:
-        data = mujoco.MjData(model)
-        prefixes = ["", *(f"{n}_" for n in range(1, len(packages)))]
-        return [
-            Reference(vehicle, model, data, prefix) if n in python else package.Rov(model, data, prefix)
-            for n, (vehicle, package, prefix) in enumerate(zip(vehicles, packages, prefixes, strict=True))
-        ]
-
-    expected = flown(connected((0, 1, 2, 3)), vehicles, packages[0].step)
-    assert_same(flown(connected((2,) if mixed else ()), vehicles, packages[1].step), expected)
+    data = mujoco.MjData(model)
+    together = [package.Rov(model, data, prefix) for package, prefix in zip(packages, prefixes, strict=True)]
+    together[2].FORMAT -= older
+    alone = [package.Rov(world(package)) for package in packages]
+    for n in range(120):
+        for rov in (*together, *alone):
+            rov.data.ctrl[rov._actuators] = (0.6, -0.3, 0.2)[n // 50] * rov.model.actuator_ctrlrange[rov._actuators, 1]
+            rov.inputs.update({name: 0.2 for name in rov.inputs if n == 30})
+        packages[1].step(*together)
+        for rov in alone:
+            rov.step()
+    for one, other in zip(together, alone, strict=True):
+        assert one.forces == pytest.approx(other.forces, rel=1e-9, abs=1e-9)
+        start = model.body_dofadr[one.body]
+        assert data.qvel[start : start + 6] == pytest.approx(other.data.qvel, rel=1e-9, abs=1e-9)
+        assert np.abs(other.data.qvel).max() > 0.05, "it moves"
 
 
 def test_many_steps_at_once_are_as_many_steps() -> None:
-    vehicle, package = loaded("every_option")
+    _, package = loaded("every_option")
     model = world(package)
-    rovs = [package.Rov(model), package.Rov(model), Reference(vehicle, model)]
+    rovs = [package.Rov(model), package.Rov(model)]
     for rov in rovs:
-        rov.data.ctrl[:] = 0.7 * model.actuator_ctrlrange[:, 1]
+        command(rov, 0.7)
     rovs[0].step(100)
     for _ in range(100):
         rovs[1].step()
-    rovs[2].step(100)
     assert (rovs[0].data.qpos == rovs[1].data.qpos).all()
-    assert rovs[0].data.qpos == pytest.approx(rovs[2].data.qpos, rel=1e-12, abs=1e-12)
 
 
 # ---- Copies ----------------------------------------------------------------------------------------------------------
@@ -196,13 +125,9 @@ def test_vehicles_that_are_copied_together_stay_together() -> None:
         package.step(both[0], copies[1])
 
 
-def command(rov: Any, share: float) -> None:
-    rov.data.ctrl[:] = share * rov.model.actuator_ctrlrange[:, 1]
-
-
 def test_data_that_are_moved_in_turn_move_as_each_alone() -> None:
     """To the bit, although lag, dead time, rotors, loads and the number of steps differ."""
-    vehicle, package = loaded("every_option")
+    _, package = loaded("every_option")
     model = world(package)
 
     def fly(rovs: list[Any], steps: Callable[[int], int]) -> list[Array]:
@@ -219,14 +144,11 @@ def test_data_that_are_moved_in_turn_move_as_each_alone() -> None:
     together = fly([package.Rov(model)], lambda k: k + 1)
     for k, found in enumerate(together):
         rov = package.Rov(model)
-        reference = Reference(vehicle, model)
-        for one in (rov, reference):
-            for n in range(60):
-                command(one, 0.2 * k * (1 + n // 20))
-                one.data.qfrc_applied[0] = 3.0 * k * (n % 7)
-                one.step(k + 1)
+        for n in range(60):
+            command(rov, 0.2 * k * (1 + n // 20))
+            rov.data.qfrc_applied[0] = 3.0 * k * (n % 7)
+            rov.step(k + 1)
         assert (found == [*rov.data.qpos, *rov.data.qvel, *rov.data.act]).all()
-        assert rov.data.qpos == pytest.approx(reference.data.qpos, rel=1e-12, abs=1e-12)
 
 
 def saved_state(model: Any, data: Any) -> Any:
@@ -235,8 +157,8 @@ def saved_state(model: Any, data: Any) -> Any:
     return state
 
 
-@pytest.mark.parametrize("how", ["copied", "set", "copied to other data"])
-def test_what_mujoco_saves_is_all_that_the_motion_depends_on(how: str) -> None:
+@pytest.mark.parametrize("how", ["copied", "set", "copied to other data", "another vehicle"])
+def test_what_mujoco_saves_and_coefficients_are_all_that_the_motion_depends_on(how: str) -> None:
     _, package = loaded("every_option")
     model = world(package)
     rov, kept = package.Rov(model), mujoco.MjData(model)
@@ -246,6 +168,8 @@ def test_what_mujoco_saves_is_all_that_the_motion_depends_on(how: str) -> None:
     rov.step(3)
     mujoco.mj_copyData(kept, model, rov.data)
     state = saved_state(model, rov.data)
+    rov.coefficients |= {name: 1.1 * x for name, x in rov.coefficients.items()}
+    rov.inputs["V_E"] = 0.2
 
     def rest() -> Array:
         command(rov, 0.5)
@@ -254,26 +178,17 @@ def test_what_mujoco_saves_is_all_that_the_motion_depends_on(how: str) -> None:
 
     expected, forces = rest(), rov.forces
     rov.step(100)
+    assert rov.forces != forces
     if how == "copied":
         mujoco.mj_copyData(rov.data, model, kept)
     elif how == "set":
         mujoco.mj_setState(model, rov.data, state, mujoco.mjtState.mjSTATE_PHYSICS)
-    else:
+    elif how == "copied to other data":
         rov.data = kept
-    assert rov.forces != forces
+    else:
+        rov = package.Rov(model, kept, **rov.coefficients)
+        rov.inputs["V_E"] = 0.2
     assert (rest() == expected).all()
-
-
-def test_a_reset_to_the_same_time_stops_the_thrusters() -> None:
-    _, package = loaded("every_option")
-    rov, fresh = package.Rov(world(package)), package.Rov(world(package))
-    command(rov, 0.6)
-    rov.step(50)
-    mujoco.mj_resetData(rov.model, rov.data)
-    rov.data.time = fresh.data.time = 50 * rov.model.opt.timestep
-    for one in (rov, fresh):
-        one.step(30)
-    assert (rov.data.qpos == fresh.data.qpos).all()
 
 
 def test_data_of_another_model_and_a_model_without_memory_are_one_line() -> None:

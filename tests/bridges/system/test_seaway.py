@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from math import pi, sqrt, tanh
+from math import pi, tanh
 from pathlib import Path
 from typing import Any
 
@@ -89,12 +89,6 @@ def test_a_sea_that_rises_is_calm_at_first_and_then_the_sea_without_a_rise() -> 
         assert water(rising, t, *place)[6] == pytest.approx(t / 4.0 * water(full, t, *place)[6])
     for t in (4.0, 7.0):
         assert (water(rising, t, *place) == water(full, t, *place)).all()
-
-
-def test_the_wave_number_has_its_deep_and_shallow_limits() -> None:
-    omega = 2.0 * pi / 8.0
-    assert sea(components=1, T_p=8.0, seabed=1e4).waves[0][2] == pytest.approx(omega**2 / G, rel=1e-12)
-    assert sea(components=1, T_p=8.0, seabed=0.01).waves[0][2] == pytest.approx(omega / sqrt(G * 0.01), rel=1e-3)
 
 
 def flown(
