@@ -10,9 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from rov_fmu.cli import main
 from rov_fmu.vehicle.shipped import VIDEORAY
-from tests.commands import ALONE, COMMANDS, ROOT, start, without_progress
+from tests.commands import COMMANDS, ROOT, start, without_progress
 from tests.often import spread
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and shells are POSIX")
@@ -160,20 +159,6 @@ def action():
 """
     check_interrupted(action, tmp_path)
     assert sorted(path.name for path in out.iterdir()) == ["report.html", "rov.toml"]
-
-
-def test_a_vehicle_out_of_a_pipe_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    read, write = os.pipe()
-    os.write(write, ALONE.encode())
-    os.close(write)
-    tune = ["tune", f"/dev/fd/{read}", "--axis", "yaw", "--command", "0.3", "--v-ss", "1", "-o", str(tmp_path / "x")]
-    assert main(tune) == 2
-    os.close(read)
-    assert capsys.readouterr() == (
-        "",
-        f"rov-fmu: /dev/fd/{read}: cannot be read: is a device or a pipe, and must be a file\n",
-    )
-    assert not any(tmp_path.iterdir())
 
 
 # ---- What is printed -------------------------------------------------------------------------------------------------

@@ -4,7 +4,7 @@ Each docstring is the sentence, or its sense, and its page.
 """
 
 from dataclasses import replace
-from math import cos, degrees, exp, radians
+from math import degrees, exp, radians
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,6 @@ import rov_fmu
 from rov_fmu.bridges.mujoco import load_mujoco
 from rov_fmu.equation.catalogue import SURGE
 from rov_fmu.interface.model import VehicleModel
-from rov_fmu.io.messages import InputError
 from tests.vehicles import surfaced, with_rotors
 
 G = 9.80665
@@ -47,18 +46,6 @@ def test_the_two_laws_of_lag(rotors: bool) -> None:
     assert thrust[1] == pytest.approx(0.40 if rotors else 0.63, abs=0.005)
 
 
-@pytest.mark.parametrize(
-    ("seconds", "inputs", "start"), [(1e6, {}, {"phi_0": 0.3}), (1.0, {"X_ext": 1e20}, {})], ids=["swings", "pulled"]
-)
-def test_a_step_of_too_many_pieces_is_refused(
-    heavy: VehicleModel, seconds: float, inputs: dict[str, float], start: dict[str, float]
-) -> None:
-    """Such as one of 1,000,000 s of a Heavy that swings, or with a load of 10^20 N."""
-    with pytest.raises(InputError, match="or never settles and needs shorter steps"):
-        heavy.simulate([0.0, seconds], inputs, start=start)
-    assert np.isfinite(heavy.simulate([0.0, 100.0], start=start)["w"]).all()
-
-
 @may_turn_over
 def test_thrust_ahead_turns_a_heavy_over_at_the_surface_as_below(heavy: VehicleModel) -> None:
     floats = surfaced(heavy).with_(B=1.05 * heavy["W"])
@@ -66,16 +53,6 @@ def test_thrust_ahead_turns_a_heavy_over_at_the_surface_as_below(heavy: VehicleM
     for depth in (0.0, 20.0):
         assert tilt(floats.simulate(times, ahead, start={"z": depth})) > 90.0
         assert tilt(floats.simulate(times, start={"z": depth})) < 1.0
-
-
-def test_the_drag_of_what_is_out_of_the_water_acts_in_full(heavy: VehicleModel) -> None:
-    """A vehicle without weight and buoyancy slows down above the water as below it."""
-    floats = surfaced(heavy).with_(W=0.0, B=0.0)
-    above, below = (floats.simulate([0.0, 2.0], start={"u": 1.0, "z": z}) for z in (-5.0, 5.0))
-    a, b, mass = heavy["a_d_u"], heavy["b_d_u"], (heavy["m_rov"] + heavy["m_a_u"]) / heavy["beta_u"]
-    fades = exp(-2.0 * b / mass)
-    assert above["u"][-1] == pytest.approx(below["u"][-1], rel=1e-12)
-    assert above["u"][-1] == pytest.approx(b * fades / (b + a * (1.0 - fades)), rel=1e-9)
 
 
 # ---- variables.md, vehicle-file.md -----------------------------------------------------------------------------------
@@ -86,25 +63,6 @@ def test_psi_jumps_by_half_a_turn_where_the_bow_passes_through_the_vertical(heav
     run = heavy.simulate([0.0, 0.05], start={"theta_0": radians(89.0), "q": 1.0, "psi_0": 0.5})
     assert abs(run["psi"][1] - run["psi"][0]) == pytest.approx(np.pi, abs=1e-6)
     assert run["theta"][1] < radians(90.0)
-
-
-@may_turn_over
-def test_a_vehicle_rights_itself_if_z_b_is_negative_and_is_balanced_without_weight(heavy: VehicleModel) -> None:
-    start, times = {"phi_0": 0.4, "theta_0": -0.3}, np.linspace(0.0, 60.0, 61)
-    for z_B, ends in ((-0.05, 0.01), (0.05, None)):
-        run = heavy.with_(z_B=z_B, B=heavy["W"]).simulate(times, start=start)
-        end = np.arccos(cos(run["phi"][-1]) * cos(run["theta"][-1]))
-        assert end < ends if ends else end > np.pi / 2.0
-    rest = heavy.with_(W=0.0, B=0.0).simulate(times, start=start)
-    assert (rest["phi"][-1], rest["theta"][-1]) == pytest.approx((0.4, -0.3), abs=1e-9)
-    assert not any(rest[name][-1] for name in "uvwpqr")
-
-
-def test_at_beta_0_the_velocity_never_changes() -> None:
-    run = (
-        rov_fmu.load("videoray").with_(beta_u=0.0).simulate([0.0, 5.0], {"surge": 0.5, "X_ext": 9.0}, start={"u": 0.3})
-    )
-    assert run["u"][-1] == 0.3
 
 
 def test_an_input_saturates_and_so_does_the_sum_that_reaches_a_thruster() -> None:

@@ -32,12 +32,7 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
     [
         (["--to", "urdf", "--world"], "--to urdf: leave out --world, because only sdf has it"),
         (["--to", "mujoco", "--added-mass", "link"], "--to mujoco: leave out --added-mass, because only sdf has it"),
-        (["--to", "sdf", "--draws", "3"], "--to sdf: leave out --draws, because only mujoco has it"),
         (["--to", "mujoco", "--seed", "3"], "--to mujoco: leave out --seed, or give --draws as well"),
-        (
-            ["--to", "mujoco", "--gains", "a_file"],
-            "--to mujoco: leave out --gains, because only ardusub-gains has it",
-        ),
         (["--to", "ardusub-gains", "--gains", "none"], "none: there is no such file"),
         (["--to", "ardusub-gains", "--gains", "a_file"], "a_file: has none of the gains, such as ATC_RAT_YAW_P"),
         (
@@ -45,14 +40,12 @@ def refused(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
             "my-rov: programs import this folder, so its name must begin with a letter",
         ),
         (["--to", "mujoco", "-o", "mujoco"], "mujoco: programs import this folder, so its name must"),
-        (["--to", "mujoco", "-o", "class"], "class: programs import this folder, so its name must"),
         (["--to", "mujoco", "-o", "a_file"], "a_file: is a file, and --to mujoco writes a folder"),
         (["--to", "mujoco", "-o", "none/rov"], "none/rov: there is no folder none"),
         (
             ["--to", "mjcf"],
             "Invalid value for '--to': 'mjcf' must be one of mujoco, allocation, autopilot, gains, ardusub-gains, sdf,",
         ),
-        (["--to", "mujoco", "--draws", "0"], "Invalid value for '--draws': '0' must be a whole number from 1 to 1e6"),
         (
             ["--to", "mujoco", "--draws", "9"],
             "videoray: no coefficient has a confidence interval, so nothing can be drawn",

@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from rov_fmu.interface.model import VehicleModel
 from tests.conftest import Made
 from tests.fmi import CO_SIMULATION, DISCARD, ERROR, EVENT, MODEL_EXCHANGE, STEP, WITH_EVENTS, Fmu
 from tests.fmu.calls.conftest import of_both_versions
@@ -67,17 +66,6 @@ def test_a_run_with_changes_from_10_s_on_is_the_rigid_body_restarted_there(
         rov.step(10.0, 10.0)
         state = dict(zip(ROV.layout.state, rov.get([*ROV.layout.state]), strict=True))
         assert rov.log == []
-    assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
-
-
-def test_changes_in_python_are_the_rigid_body_restarted_there(expected: list[float]) -> None:
-    """A second run begins with the states at the end of the first one."""
-    rov = VehicleModel(**vars(ROV))
-    before = rov.simulate([0.0, 10.0], INPUTS)
-    start = {name: before[name][-1] for name in ROV.layout.state}
-    after = rov.with_(**CHANGES).simulate([10.0, 20.0], INPUTS, start=start)
-    assert [after[name][0] for name in ROV.layout.velocities] == [start[name] for name in ROV.layout.velocities]
-    state = {name: float(after[name][-1]) for name in ROV.layout.state}
     assert compared(ROV, places(ROV, state)) == pytest.approx(expected, abs=1e-10)
 
 
