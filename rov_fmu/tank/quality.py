@@ -31,6 +31,8 @@ its median over three samples changes by half of the jump or more."""
 _FASTER_VELOCITY = 2.0
 """How many times as fast as 95 % of the time a velocity changes where it jumps, because thrusters change it quickly.
 Other quantities change _FASTER times as fast."""
+_AROUND = 5
+"""The acceleration around a sample is the median of so many, which follows one that begins at once."""
 
 
 def checked_log(log: Log) -> Log:
@@ -150,17 +152,23 @@ def _jumps(file: str, channel: Channel) -> Finding | None:
 def jumps(time: Array, values: Array, *, is_velocity: bool = False) -> NDArray[np.intp]:
     """Return the indices of the samples after which a quantity jumps, as by a reset of a filter or of a sensor.
 
-    `values` are in m, rad or m/s, without jumps of a full turn.
+    `values` are in m, rad or m/s, without jumps of a full turn. A velocity jumps by what differs from the acceleration
+    around it, which may be as large where a command changes.
     """
     from scipy.ndimage import maximum_filter, median_filter  # imported here because it is slow
 
     steps = np.diff(values)
     if len(values) < LEAST_SAMPLES or not steps.any():
         return np.zeros(0, np.intp)
-    rates = np.abs(steps) / np.diff(time)
-    beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
-    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(rates, 0.95)
+    rates = steps / np.diff(time)
+    usual = (_FASTER_VELOCITY if is_velocity else _FASTER) * np.quantile(np.abs(rates), 0.95)
     least = max(_LEAST_JUMP, _FASTER * float(np.median(np.abs(steps[steps != 0.0]))))
+    if is_velocity:
+        rates = rates - median_filter(rates, _AROUND, mode="nearest")
+        steps = rates * np.diff(time)
+        values = np.append(0.0, np.cumsum(steps))
+    rates = np.abs(rates)
+    beside = _FASTER * maximum_filter(rates, footprint=[1, 0, 1], mode="constant")
     sudden = (np.abs(steps) > least) & (rates > np.maximum(beside, usual))
     around = np.pad(median_filter(values, 3, mode="nearest"), 1, "edge")
     return np.flatnonzero(sudden & (np.abs(around[3:] - around[:-3]) > 0.5 * np.abs(steps)))

@@ -12,7 +12,7 @@ from rov_fmu.io.csv_table import DataFileError
 from rov_fmu.tank.arrays import Array
 from rov_fmu.tank.findings import sentences
 from rov_fmu.tank.inspection.inspection import inspect
-from rov_fmu.tank.quality import checked_log
+from rov_fmu.tank.quality import checked_log, jumps
 from rov_fmu.tank.readers.tables import open_matlab
 from rov_fmu.vehicle.vehicle import VehicleFileError
 from tests.folders import rows_of
@@ -154,6 +154,16 @@ def test_a_jump_of_a_sensor_is_told(values: Array, told: str) -> None:
         log(down, channel(quantity, 100.0 + TIME, values % (2.0 * np.pi) if "heading" in told else values))
     )
     assert sentences(found.findings) == ((f"a.csv: {told}",) if told else ())
+
+
+@pytest.mark.parametrize(("jump", "at"), [(0.8, [160]), (-0.8, [160]), (0.0, [])])
+def test_a_velocity_jumps_by_what_differs_from_its_acceleration(jump: float, at: list[int]) -> None:
+    """The vehicle speeds up at 3 m/s² around the jump, and a jump is faster than twice that. A command is no jump."""
+    time = 0.1 * np.arange(400)
+    pushed = np.clip(time - 15.5, 0.0, 1.0) - 2.0 * np.clip(time - 20.0, 0.0, 1.0) + np.clip(time - 30.0, 0.0, 1.0)
+    noise = 0.005 * np.random.default_rng(0).standard_normal(len(time))
+    values = 3.0 * pushed + noise - jump * (np.arange(len(time)) > 160)
+    assert jumps(time, values, is_velocity=True).tolist() == at
 
 
 TOE = """[vehicle]
