@@ -88,14 +88,15 @@ def held_out(objective: Objective, best: Minimum) -> list[HeldOut]:
     """Return what is held out, with the fits to other data.
 
     An axis of a log is predicted by all other logs if these know enough of it, otherwise each half of the log by the
-    other logs and the other half. Where that does not know enough either, nothing is held out.
+    other logs and the other half. Where that does not know enough either, nothing is held out. Neither is an axis that
+    the log does not drive: its motion says little of the model, and may be slower than the errors of a right one.
     """
     logs, rows = objective.whole.logs, objective.whole.rows
     known, found = Knowledge(objective, best), list[tuple[int, slice, str, tuple[Axis, ...], DataPart]]()
     for n in logs:
         others = [m for m in logs if m != n]
         words = "the other log" if len(others) == 1 else f"the other {len(others)} logs"
-        rest, middle = list({m.axis for m in objective.logs[n].measured}), len(objective.records[n].time) // 2
+        rest, middle = list(objective.logs[n].driven), len(objective.records[n].time) // 2
         halves = slice(middle), slice(middle, None)
         with_others = f" and {words}" if others else ""
         parts = [(slice(None), words if others else "the tables", DataPart(others, rows))]

@@ -74,6 +74,20 @@ def test_a_voltage_that_nothing_measures_is_as_no_column(number: str, tmp_path: 
         assert np.array_equal(log.record.inputs, other.record.inputs)
 
 
+def test_a_log_without_voltage_beside_one_with_it_has_that_of_the_vehicle(tmp_path: Path) -> None:
+    """Such as one along a tape. At 0 V its thrusters would push nothing."""
+    replace(DIVE, fault=Fault(battery=Battery(1.0, sag=0.1))).write(0, tmp_path)
+    first, second = sorted(tmp_path.glob("dive*"))
+    second.write_text(re.sub(r"(?m),[^,\n]*$", "", second.read_text(encoding="utf-8")), encoding="utf-8")
+    rov = tmp_path / ROV_FILE
+    rov.write_text(re.sub(r"(?s)\n\[known\].*", "\n", rov.read_text(encoding="utf-8")), encoding="utf-8")
+    known, logs, _ = begin(load_tests(tmp_path))
+    volts = {one.file: one.record.inputs[:, [*one.layout.inputs].index("voltage")] for one in logs}
+    assert np.ptp(volts[first.name]) > 1.0
+    assert known.layout.voltage == pytest.approx(np.mean(volts[first.name]), rel=0.02)
+    assert set(volts[second.name]) == {known.layout.voltage}
+
+
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(

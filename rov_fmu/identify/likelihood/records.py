@@ -110,6 +110,8 @@ class SampledLog:
     """The same with fewer samples."""
     interval: float
     """The usual time between two rows of commands, s."""
+    driven: Collection[Axis]
+    """The axes that it tests. Of others, it only tells how the vehicle moved."""
     lost: Mapping[str, float] = field(default_factory=dict)
     """The share of the command along each axis that is lost between its rows, by the axis."""
     is_momentary: bool = False
@@ -369,7 +371,7 @@ def recorded(log: Log, layout: Layout) -> SampledLog | None:
     record = Record(sensors, *full, since, told, inputs, start, errors, _tilt(log, layout), _wanders(measured))
     time, value, sensor = thin
     thinned = replace(record, time=time, value=value, sensor=sensor)
-    return SampledLog(log, layout, measured, record, thinned, log.commands.interval, lost)
+    return SampledLog(log, layout, measured, record, thinned, log.commands.interval, axes, lost)
 
 
 def driven_axes(log: Log, layout: Layout) -> tuple[list[Axis], list[Finding]]:
@@ -537,7 +539,10 @@ def _samples(
 
 
 def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
-    """Return the times and the inputs of the rows in which an input changes: m, m, and m x inputs."""
+    """Return the times and the inputs of the rows in which an input changes: m, m, and m x inputs.
+
+    A log without a voltage, such as one along a tape, has that of the layout.
+    """
     commands = log.commands
     assert commands
     told, first = np.unique(commands.time, return_index=True)
@@ -563,8 +568,8 @@ def _rows(log: Log, layout: Layout) -> tuple[Array, Array, Array]:
         for column, thruster in zip(values.T, commands.thrusters, strict=True):
             if f"u_{thruster}" in names:
                 inputs[:, names.index(f"u_{thruster}")] = column
-    if voltage:
-        inputs[:, names.index("voltage")] = np.interp(told, time, value)
+    if layout.voltage is not None:
+        inputs[:, names.index("voltage")] = np.interp(told, time, value) if voltage else layout.voltage
     return since, told, inputs
 
 

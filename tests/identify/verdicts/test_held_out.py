@@ -56,6 +56,9 @@ def test_an_axis_that_one_log_shows_is_predicted_by_halves_of_this_log(fit: Fit)
     assert [(p.axis, p.by) for p in own] == [(axis, one.by) for one in out for axis in one.axes]
     assert all(p.coverage > 0.8 for p in own)
     assert score_of(own) > 0.5
+    heave, yaw = objective.logs
+    still = Objective(objective.table, [replace(heave, driven=()), yaw], objective.rows)
+    assert {one.axes for one in held_out(still, best)} == {(YAW,)}  # what a log does not drive judges no model
 
 
 @pytest.mark.parametrize("count", [2, 99])
