@@ -73,7 +73,8 @@ def load_tests(
     of_logs, useless = list[Finding](), list[str]()
     for log in contents.logs:
         axes, told = driven_axes(log, layout_of(log, description))
-        told = told or ([] if axes else [Finding("nothing measured", file=log.file)])
+        if not (axes or told or any(finding.kind == "leave out" for finding in log.findings)):
+            told = [Finding("nothing measured", file=log.file)]
         logged |= dict.fromkeys(axis.name for axis in axes)
         of_logs += told
         useless.append(_refusal(folder, log, told))
@@ -121,7 +122,7 @@ def _without_force(folder: Folder) -> Iterator[str]:
 
 def _refusal(folder: Path, log: Log, told: Sequence[Finding]) -> str:
     """Return the line that refuses a folder without a better log than one of which this is told."""
-    left_out = [finding for finding in log.findings if finding.kind == "channel left out"]
+    left_out = [finding for finding in log.findings if finding.kind in ("channel left out", "leave out")]
     reasons = [line.removeprefix(f"{log.file}: ") for line in sentences([*left_out, *told])]
     return f"{folder / log.file}: {'; '.join(first_of(reasons, _MOST_REASONS))}: nothing is identifiable"
 

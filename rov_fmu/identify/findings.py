@@ -77,8 +77,6 @@ _ODD = 3.0
 """A log disagrees with the others if its unknown force is so many times the largest one of the others."""
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
-_ON_THE_SPOT = 0.02
-"""A turn is one on the spot if the push ahead and sideways stays below this share of the full one."""
 _SURE = 0.99
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
@@ -649,7 +647,10 @@ def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
             return
         commands = dive.commands.in_rows
         ahead = [np.abs(push_along(layout, axis, commands)).max() for axis in (SURGE, SWAY) if layout.has(axis)]
-        (alone if max(ahead, default=0.0) < _ON_THE_SPOT else others).add(dive.whole_file)
+        if max(ahead, default=0.0) > _ASIDE:
+            others.add(dive.whole_file)
+        elif np.abs(push_along(layout, YAW, commands)).max() > _ASIDE:
+            alone.add(dive.whole_file)
     if others:
         yield about(
             "",

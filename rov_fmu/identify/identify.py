@@ -181,6 +181,7 @@ def _axis(
         slips=[s for s in found.slips if s.file in files],
         misfits=misfits,
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
+        is_alone=all(len(one.driven) == 1 for one in fit.objective.logs if axis in one.driven),
         is_assumed=bool(tests.description.assumed),
         difference=fit.difference if is_other else 0.0,
     )

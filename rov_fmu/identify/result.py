@@ -14,6 +14,7 @@ from rov_fmu.io.messages import listed
 from rov_fmu.tank.arrays import Array, rms
 from rov_fmu.tank.findings import Finding
 from rov_fmu.tank.folder import Folder
+from rov_fmu.tank.quality import rate
 from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
 
@@ -196,6 +197,11 @@ class Prediction:
     def is_judged(self) -> bool:
         """True where the band says something: not of a position over a recording, whose errors add up."""
         return not self.is_position or self.span < inf
+
+    @property
+    def rate(self) -> float:
+        """The usual number of its samples in a second, 1/s."""
+        return rate(self.time)
 
     @property
     def least(self) -> float:
@@ -543,6 +549,8 @@ class AxisResult:
     """The logs whose motors are not the thrusters along the axis."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
+    is_alone: bool = False
+    """True if each log that drives the axis drives no other one."""
     is_assumed: bool = False
     """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
     difference: float = 0.0

@@ -31,6 +31,8 @@ MOST_GAIN = 0.3
 _MOST_ERROR, _MOST_SOON = 1.25, 1.3
 """The largest errors R over 10 s and R₂ over 2 s of a *good* model: 9 of 12 *good* axes with a wrong answer had more,
 and none of 45 right ones."""
+_FAST = 19.0
+"""The rate of a log, 1/s, from which a faster one hardly tells more: 20 Hz, less what clocks differ by."""
 WORDS: tuple[Word, ...] = ("good", "usable", "do not use")
 
 
@@ -56,6 +58,8 @@ class Rule:
     """True if the reason is told even of a good model, as what it rests on."""
     remedy: str = ""
     """The one thing to do about it, as a sentence."""
+    is_done: Callable[[AxisResult], bool] = lambda _: False
+    """True where that was done already."""
 
     def word(self, value: float) -> Word:
         """Return the best verdict that a value allows."""
@@ -178,6 +182,7 @@ RULES = (
         "The model's errors are {size} times what noise explains, so it lacks something.",
         unit="1",
         remedy="Log this axis alone, and leave it out of the other logs by [leave_out] in rov.toml.",
+        is_done=lambda e: e.is_alone,
     ),
     Rule(
         "errors R₂ of the fit over 2 s",
@@ -187,6 +192,7 @@ RULES = (
         "Over 2 s, the model's errors are {size} times the noise, so it lacks something fast.",
         unit="1",
         remedy="Log at 20 Hz or more, with steps of the command from rest.",
+        is_done=lambda e: max((p.rate for p in e.predictions), default=0.0) >= _FAST,
     ),
     Rule(
         "unknown disturbances, relative to thrust or velocity",
@@ -286,10 +292,13 @@ RULES = (
 
 
 def verdict(e: AxisResult) -> Verdict:
-    """Return the worst word of all rules, with a reason for each doubt, the worst first, and the tested commands."""
+    """Return the worst word of all rules, with a reason for each doubt, the worst first, and the tested commands.
+
+    What to do is the remedy of the worst doubt about which it was not done already; of a mere *usable*, none may be
+    left: the intervals allow for its doubts.
+    """
     values = sorted(((rule, rule.value(e)) for rule in RULES), key=lambda pair: -WORDS.index(pair[0].word(pair[1])))
-    worst, value = values[0]
-    word = worst.word(value)
+    word = values[0][0].word(values[0][1])
     reasons = [
         rule.sentence.format(size=significant(value, 2), share=percent(value), **rule.names(e))
         for rule, value in values
@@ -297,7 +306,8 @@ def verdict(e: AxisResult) -> Verdict:
     ]
     if word != WORDS[-1] and not is_whole(e.tested):
         reasons.append(f"It holds for commands {tested_in_words(e.tested)}.")
-    return Verdict(word, tuple(reasons), worst.remedy if word != "good" else "")
+    doubts = (rule for rule, value in values if rule.word(value) != "good")
+    return Verdict(word, tuple(reasons), next((rule.remedy for rule in doubts if not rule.is_done(e)), ""))
 
 
 def most_inertia(vehicle: Vehicle, axis: Axis, beta: IdentifiedCoefficient | None) -> float:

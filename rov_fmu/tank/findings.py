@@ -140,6 +140,7 @@ _FACTS = {
     "rows before commands": "{files}: {count:#row} before the first command left out",
     "torn rows": "{files}: {count:#row} with a wrong number of cells left out",
     "unread cells": "{files}: {count:#cell} of {column} without a number: taken as blank",
+    "leave out": "{files}: {axes} left out, as [leave_out] in rov.toml says",
     "invalid": "{files}: {count:#value} of {columns} left out, because {what} says that they are invalid",
     "no pulse": "{files}: {count:#pulse} of {column} of 0 or 65535 us taken as no command",
     "beyond full thrust": "{files}: {count:#command} of {column} beyond full thrust taken as full thrust",

@@ -16,7 +16,7 @@ from rov_fmu.equation.catalogue import Axis
 from rov_fmu.tank.arrays import Array, Flags, spread
 from rov_fmu.tank.catalogue import MeasuredQuantity
 from rov_fmu.tank.clocks import gaps, held
-from rov_fmu.tank.findings import Finding
+from rov_fmu.tank.findings import Finding, about
 
 LEAST_SAMPLES = 20
 """The smallest number of samples from which something can be identified."""
@@ -206,10 +206,9 @@ class Log:
 
     def without(self, axes: Collection[str]) -> "Log":
         """Return the log without the channels of some axes, which rov.toml leaves out."""
-        unused = "[leave_out] in rov.toml says so"
-        own = (c.quantity.axis is not None and c.quantity.axis.name in axes and not c.unused for c in self.channels)
-        channels = (replace(c, unused=unused) if is_one else c for c, is_one in zip(self.channels, own, strict=True))
-        return replace(self, channels=tuple(channels)) if axes else self
+        kept = (c for c in self.channels if c.quantity.axis is None or c.quantity.axis.name not in axes)
+        findings = (about(self.file, "leave out", axis) for axis in axes)
+        return replace(self, channels=tuple(kept), findings=(*self.findings, *findings))
 
     @cached_property
     def shown(self) -> tuple[Channel, ...]:

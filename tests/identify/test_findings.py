@@ -124,7 +124,8 @@ def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
     assert "turn on the spot in a log of its own, and leave yaw out of dive.csv" in asked
     assert said(turning_alone, "unlogged motion") == []
     spot = replace(turning_alone.folder.logs[0], file="spot.csv (from 41 s)")
-    both = replace(moving, folder=replace(moving.folder, logs=[*moving.folder.logs, spot]))
+    dives = [replace(one, file="heave.csv") for one in turning("heading", along=HEAVE).folder.logs]  # has no turn
+    both = replace(moving, folder=replace(moving.folder, logs=[*moving.folder.logs, spot, *dives]))
     (told,) = said(both, "unlogged motion")
     assert told.endswith("Or leave yaw out of dive.csv by [leave_out] in rov.toml, because it is alone in spot.csv")
 

@@ -218,7 +218,7 @@ def test_rov_toml_leaves_an_axis_out_of_a_log(tmp_path: Path) -> None:
     assert not log.used("depth")
     assert log.used("surge velocity")
     told = [line for line in sentences(tests.folder.findings) if "[leave_out]" in line]
-    assert told == ["dive.csv: depth [m] is left out for depth: [leave_out] in rov.toml says so"]
+    assert told == ["dive.csv: heave left out, as [leave_out] in rov.toml says"]
 
 
 @pytest.mark.parametrize(

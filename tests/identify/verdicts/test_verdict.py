@@ -79,6 +79,15 @@ def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: st
     assert bool(judged.remedy) == (word != "good")
 
 
+def test_what_was_done_already_is_not_asked_for_again() -> None:
+    doubtful = AxisResult(HEAVE, **USUAL, structure=2.0, soon=2.0)
+    frequent = [replace(DEPTH, time=np.arange(len(DEPTH.time)) / 20.0)]
+    asked = verdict(doubtful), verdict(replace(doubtful, is_alone=True))
+    done = verdict(replace(doubtful, is_alone=True, predictions=frequent))
+    assert [one.remedy[:18] for one in asked] == ["Log this axis alon", "Log at 20 Hz or mo"]
+    assert (done.word, done.remedy) == ("usable", "")
+
+
 def test_other_motors_than_the_thrusters_lower_a_verdict_whatever_was_predicted() -> None:
     judged = verdict(AxisResult(HEAVE, **USUAL, misfits=["dive.tlog"]))
     words = "The motors of dive.tlog are not the thrusters of the vehicle."
