@@ -26,7 +26,6 @@ _OF_3 = """<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToke
 _MANY = "".join(f'<ScalarVariable name="v{n}" valueReference="{n}"><Real/></ScalarVariable>' for n in range(100_001))
 WRONG: list[tuple[str, str, str, str]] = [
     (_OF_2, 'nominal="2"', 'nominal="INF"', "line 5: nominal = 'INF': must be a finite number"),
-    (_OF_2, 'nominal="2"', 'nominal="1e999"', "line 5: nominal = '1e999': must be a finite number"),
     (_OF_2, 'ce="2"', 'ce="-1"', "line 6: Element 'ScalarVariable', attribute 'valueReference': '-1' is not a valid"),
     (_OF_2, ' valueReference="2"', "", "line 6: Element 'ScalarVariable': The attribute 'valueReference' is required"),
     (_OF_2, 'derivative="1"', 'derivative="3"', "The derivative attribute of model variable y (line 6) references"),
@@ -35,41 +34,15 @@ WRONG: list[tuple[str, str, str, str]] = [
     (_OF_2, '"-INF"', '"NaN"', "line 5: min = 'NaN': must be a finite number"),
     (
         _OF_2,
-        '"output"',
-        '"outputs"',
-        "line 6: Element 'ScalarVariable', attribute 'causality': [facet 'enumeration']",
-    ),
-    (
-        _OF_2,
         '<Real derivative="1"/>',
         "",
         "line 6: Element 'ScalarVariable': Missing child element(s). Expected is",
-    ),
-    (
-        _OF_2,
-        '"0.1"',
-        '"soon"',
-        "line 2: Element 'DefaultExperiment', attribute 'stepSize': 'soon' is not a valid",
     ),
     (_OF_2, _VARIABLES, f"<ModelVariables>{_MANY}</ModelVariables>", "has more than 100000 variables, the most"),
     (_OF_2, "<fmi", '<!DOCTYPE a [<!ENTITY b "c">]><fmi', "has a document type definition (DTD); no model description"),
     (_OF_2, "fmiModelDescription", "a", "line 1: Element 'a': No matching global declaration available for"),
     (_OF_2, "<CoSimulation", "<CoSimulation <", "not XML: error parsing attribute name, line 2, column 15"),
     (_OF_3, '"1 2"', '"1 b"', "line 4: Element 'Float64', attribute 'start': 'b' is not a valid value"),
-    (
-        _OF_2,
-        '<Real derivative="1"/>',
-        '<Boolean start="yes"/>',
-        "line 6: Element 'Boolean', attribute 'start': 'yes' is not a valid value of the atomic type 'xs:boolean'.",
-    ),
-    (
-        _OF_2,
-        '<Real derivative="1"/>',
-        '<Integer max="-2147483649"/>',
-        "line 6: Element 'Integer', attribute 'max': '-2147483649' is not a valid value of the atomic type 'xs:int'.",
-    ),
-    (_OF_3, 'start="2"', 'start="-1"', "line 3: Element 'UInt64', attribute 'start': '-1' is not a valid value of"),
-    (_OF_3, "<Dimension ", '<Dimension start="-1" ', "line 4: Element 'Dimension', attribute 'start': '-1' is not a"),
     (
         _OF_2,
         "<DefaultExperiment ",
@@ -88,7 +61,6 @@ WRONG: list[tuple[str, str, str, str]] = [
         '<Dimension valueReference="0"/><Alias name="n"/>',
         'The variable name "n" (line 4) is not unique.',
     ),
-    (_OF_3, '"5"', '"128"', "line 5: Element 'Int8', attribute 'start': '128' is not a valid value of the atomic type"),
     (_OF_3, 's="9"', 's="8"', "names a variable or a unit that does not exist: 8"),
     *(
         (of, 'modelIdentifier="a"', f'modelIdentifier="{name}"', f"modelIdentifier = {name!r}: must be a name without")

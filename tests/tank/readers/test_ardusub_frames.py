@@ -11,7 +11,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rov_fmu.equation.catalogue import HEAVE, PITCH, ROLL, SURGE, SWAY, YAW
 from rov_fmu.equation.layout import Layout
 from rov_fmu.equation.parts import Thruster
 from rov_fmu.io.messages import InputError
@@ -141,18 +140,6 @@ def test_a_torque_of_zero_gives_way_to_one_that_the_frame_asks_for() -> None:
     for thrusters in ([*ahead, middle, starboard], [*ahead, starboard, middle]):
         servos = servos_of(with_thrusters(thrusters), None, {})
         assert {name: number for name, (number, _) in servos.items()} == {"u_r": 1, "u_l": 2, "u_s": 3, "u_m": 4}
-
-
-def test_the_motors_of_the_heavy_push_as_ardusub_means_them_to() -> None:
-    servos = servos_of(HEAVY, None, {})
-    thrusters = {f"u_{t.name}": t for t in HEAVY.thrusters}
-    assert {servos[name][0] for name in thrusters} == {*range(1, 9)}
-    for name, own in thrusters.items():
-        servo, sign = servos[name]
-        effects = [sign * own.effect(axis) for axis in (ROLL, PITCH, YAW, HEAVE, SURGE, SWAY)]
-        effects[3] *= -1.0  # the throttle is positive upward
-        for factor, effect in zip(VECTORED_6DOF[servo - 1], effects, strict=True):
-            assert factor == 0 or np.sign(effect) == factor
 
 
 def test_tables_replace_the_frame_or_change_it() -> None:
