@@ -24,8 +24,6 @@ from tests.vehicles import (
 )
 from verification.references.equations import equations, steady_forces
 
-COMMANDS = [-1.0, -0.2, 0.0, 0.27, 1.0]
-
 
 @pytest.fixture(scope="module")
 def k(vehicle: Vehicle) -> Vehicle:
@@ -37,27 +35,7 @@ def held(rov: Vehicle, **values: float) -> State:
     return {**still(rov), **values}
 
 
-def thrust(rov: Vehicle, **commands: float) -> Values:
-    return rov.calculated(held(rov, **commands), at_rest(rov))
-
-
 # ---- Thrust ----
-
-
-@pytest.mark.parametrize("c", COMMANDS)
-def test_thrust_is_that_of_2_9_and_10(k: Vehicle, c: float) -> None:
-    F = thrust(k, u_l=c, u_r=c, u_t=c)
-    assert pytest.approx(42.9 * abs(c) * c + 2.711 * c, rel=1e-15) == F["F_l"] + F["F_r"]
-    assert pytest.approx(6.494 * abs(c) * c + 0.0513 * c, rel=1e-15) == F["F_t"]
-    assert F["F_l"] == F["F_r"]
-    assert F["tau_rear"] == 0.0
-
-
-@pytest.mark.parametrize("beyond", [1.0 + 1e-15, 1e300])
-def test_commands_beyond_full_thrust_saturate(k: Vehicle, beyond: float) -> None:
-    full, more = held(k, u_l=1.0, u_r=-1.0, u_t=1.0), held(k, u_l=beyond, u_r=-beyond, u_t=beyond)
-    assert k.calculated(more, at_rest(k)) == k.calculated(full, at_rest(k))
-    assert k.step(more, at_rest(k), 1.0) == k.step(full, at_rest(k), 1.0)
 
 
 @often("cases", 25, 300)
@@ -95,23 +73,6 @@ def test_the_signs_are_those_of_the_body_and_earth_frames(k: Vehicle, inputs: Va
 
 
 # ---- Rates and steps ----
-
-
-@pytest.mark.parametrize("vehicle", VEHICLES)
-def test_derivatives_are_the_rates_at_which_a_step_begins(vehicle: str) -> None:
-    rng = random.Random(vehicle)
-    for _ in range(3):
-        rov, inputs, before, _ = random_case(rng, VEHICLES[vehicle])
-
-        def rates(h: float, rov: Vehicle = rov, inputs: Values = inputs, before: Values = before) -> list[float]:
-            after = rov.step(inputs, before, h)
-            return [(after[name] - before[name]) / h for name in before]
-
-        # the error of first order in h cancels; the third derivative of yaw is about 1e3
-        found = [2.0 * b - a for a, b in zip(rates(1e-5), rates(0.5e-5), strict=True)]
-        expected = rov.derivatives(inputs, before)
-        assert list(expected) == list(before)
-        assert found == pytest.approx(list(expected.values()), rel=3e-7, abs=3e-7)
 
 
 def test_at_rest_only_a_net_weight_and_the_place_of_the_mass_matter_and_not_the_coupling() -> None:

@@ -5,11 +5,9 @@ from math import cos, isfinite, sin
 import pytest
 
 from rov_fmu.c.simulation import simulate
-from rov_fmu.equation.catalogue import SWAY
 from rov_fmu.equation.python import step as module
-from rov_fmu.vehicle.shipped import SHIPPED
-from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
-from tests.equation.steps import in_engine, in_python, worst
+from rov_fmu.vehicle.vehicle import Vehicle
+from tests.equation.steps import in_engine, worst
 from tests.often import spread
 from tests.vehicles import HEAVY, VEHICLES, VIDEORAY, State, Values, at_rest, still
 
@@ -52,14 +50,6 @@ def test_a_step_in_a_special_case_is_exact(name: str) -> None:
     rov, inputs, state, steps = CASES[name]
     for h in steps:
         assert worst(*case(rov, inputs, state), h) <= 1e-13, h
-
-
-def test_a_velocity_that_is_only_a_rounding_error_does_not_shorten_the_substeps() -> None:
-    """Thrusters that cancel but for rounding turn the BlueROV2 while it sways. The C code is the reference."""
-    rov = load_vehicle(SHIPPED["bluerov2"])
-    inputs = rov.held_inputs(SWAY, 1.0)
-    case = rov, inputs, at_rest(rov), 0.3
-    assert in_python(*case) == pytest.approx(in_engine(*case), rel=1e-13, abs=1e-13)
 
 
 # ---- Reversals ----

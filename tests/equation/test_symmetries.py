@@ -3,24 +3,17 @@
 import random
 from collections.abc import Callable
 from dataclasses import replace
-from math import hypot
-
-import pytest
 
 from rov_fmu.vehicle.vehicle import Vehicle
 from tests.equation.steps import Step
 from tests.often import often
 from tests.vehicles import (
-    HEAVY,
-    VEHICLES,
     VIDEORAY,
     Case,
     State,
     Values,
-    frictionless,
     random_case,
     random_vehicle,
-    still,
 )
 
 
@@ -65,37 +58,3 @@ def test_ahead_and_astern_are_mirror_images_to_the_last_bit(step: Step, case: Ca
     k, i, s, h = case
     inputs = negated({**i, "u_l": -i["u_r"], "u_r": -i["u_l"]}, "X_ext", "V_N", "V_E")
     assert step(mirrored(k), inputs, negated(s, "u", "x", "y"), h) == negated(step(*case), "u", "x", "y")
-
-
-# ---- Without force ----
-
-
-def energy(rov: Vehicle, state: Values) -> float:
-    """Return the kinetic energy with the effective inertias."""
-    return 0.5 * sum(rov.effective_inertia(form) * state[form.axis.velocity] ** 2 for form in rov.layout.axes)
-
-
-@pytest.mark.parametrize("vehicle", [name for name, rov in VEHICLES.items() if rov.layout.coupled])
-def test_without_thrust_and_load_energy_only_falls(vehicle: str) -> None:
-    rov = VEHICLES[vehicle].with_(**{n: 0.0 for n in VEHICLES[vehicle].coefficients if n.startswith("F_0")})
-    rng = random.Random(vehicle)
-    for _ in range(10):
-        _, _, state, h = random_case(rng, rov, -2.0, 0.0)
-        state |= dict.fromkeys(rov.layout.lagging, 0.0)
-        after = rov.step(still(rov), state, h)
-        assert energy(rov, after) <= energy(rov, state) * (1.0 + 1e-15)
-        assert energy(rov, rov.step(still(rov), after, h)) <= energy(rov, after) * (1.0 + 1e-15)
-
-
-def test_coupling_does_no_work() -> None:
-    """Without drag, the energy is constant, and (M_u u)^2 + (M_v v)^2 is an invariant of Kirchhoff's equations."""
-    rov = frictionless(HEAVY)
-    M_u, M_v = (rov.effective_inertia(rov.layout.by_name[name]) for name in ("surge", "sway"))
-    rng = random.Random(12)
-    for _ in range(10):
-        _, _, state, h = random_case(rng, rov, -2.0, 0.5)
-        state |= dict.fromkeys(rov.layout.lagging, 0.0)
-        after = rov.step(still(rov), state, h)
-        assert energy(rov, after) == pytest.approx(energy(rov, state), rel=1e-14)
-        momenta = [hypot(M_u * s["u"], M_v * s["v"]) for s in (state, after)]
-        assert momenta[1] == pytest.approx(momenta[0], rel=1e-14)

@@ -17,9 +17,7 @@ from tests.vehicles import (
     State,
     Values,
     at_rest,
-    extended,
     numbered,
-    random_case,
     random_inputs,
     random_state,
     still,
@@ -93,15 +91,6 @@ def test_a_step_with_reversals_of_rotors_and_velocities_is_exact(name: str, h: f
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", ROTORS)
-def test_random_steps_are_exact(name: str) -> None:
-    rov, rng = ROTORS[name], random.Random(name)
-    for _ in range(6):
-        _, inputs, state, h = random_case(rng, rov, longest=-0.3)
-        assert max(errors(rov, inputs, state, h)) <= TOLERANCE, (inputs, state, h)
-
-
-@pytest.mark.long
 def test_commands_that_arrive_after_the_dead_time_turn_rotors_back_within_steps() -> None:
     commands = 4
     rov = ROTORS["six axes"]
@@ -157,23 +146,6 @@ def test_the_velocity_without_drag_is_the_integral_of_the_thrust(h: float) -> No
         assert found["u"] == pytest.approx(expected, rel=2e-14)
         for name, n_c in (("n_l", 0.6), ("n_r", -0.2)):
             assert found[name] == pytest.approx(n_c + (state[name] - n_c) * np.exp(-h / 0.3), rel=1e-14, abs=1e-15)
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("h", [1e-3, 0.1, 3.0])
-def test_where_the_thrust_is_linear_in_the_speed_both_laws_are_one(h: float) -> None:
-    """T n' = n_c - n is then T F' = F_c - F, also with the dead band, which acts on the command."""
-    force = extended(VEHICLES["drag by direction, coupled, late"], a_t_t200=0.0, a_t_t200_reverse=0.0)
-    force = force.with_(b_t_t200_reverse=force["b_t_t200"])
-    rotor, rng = with_rotors(force), random.Random(h)
-    inputs, state = turning(rng, rotor, max(h, 0.1))
-    speeds = {name: state.pop(name) for name in rotor.layout.lagging}
-    forces = {f"F_{name[2:]}": force["b_t_t200"] * n for name, n in speeds.items()}
-    for step in (Vehicle.step, in_engine):
-        one, other = step(force, inputs, state | forces, h), step(rotor, inputs, state | speeds, h)
-        assert {name: other[name] for name in state} == pytest.approx(
-            {name: one[name] for name in state}, rel=1e-12, abs=1e-13
-        )
 
 
 def test_the_steady_motion_is_that_of_the_law_of_the_force() -> None:

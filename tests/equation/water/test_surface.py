@@ -12,7 +12,6 @@ from scipy.integrate import solve_ivp
 from rov_fmu.c.simulation import simulate
 from rov_fmu.cli import main
 from rov_fmu.equation.words import LEFT_WATER
-from rov_fmu.identify.likelihood.filter import Filter
 from rov_fmu.vehicle.shipped import SHIPPED
 from rov_fmu.vehicle.vehicle import Vehicle, VehicleFileError, load_vehicle, read_vehicle, without_surface
 from rov_fmu.vehicle.writer import vehicle_text
@@ -144,14 +143,6 @@ def test_a_buoyant_vehicle_floats_and_a_neutral_one_stays_at_the_surface() -> No
     np.testing.assert_array_equal(simulate(neutral, [0.0, 10.0], {}, ["z", "w"]).values[:, 0, -1], 0.0)
 
 
-def test_vehicles_at_the_surface_move_in_lanes_as_alone() -> None:
-    rng, times = np.random.default_rng(3), np.linspace(0.0, 4.0, 81)
-    start = {"z": rng.uniform(-0.4, 0.6, (19, 1)), "w": rng.uniform(-1.5, 1.5, (19, 1))}
-    commands = {name: rng.uniform(-0.6, 0.6, (19, 81)) for name in LEVEL.layout.commands}
-    one, other = (simulate(LEVEL, times, start | commands, vehicles=19, lanes=lanes).values for lanes in (True, False))
-    np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-12)
-
-
 def test_it_is_written_and_read_and_what_it_cannot_have_is_one_line() -> None:
     rov = load_vehicle(SHIPPED["bluerov2_heavy"])
     path, text = SHIPPED["bluerov2_heavy"], vehicle_text(rov, SHIPPED["bluerov2_heavy"].parent)
@@ -170,12 +161,6 @@ def test_it_is_written_and_read_and_what_it_cannot_have_is_one_line() -> None:
     with pytest.raises(VehicleFileError, match=r"curves\.t200\.lag = 'speed': must be 'force' with a surface"):
         read_vehicle(path, (text.replace("[curves.t200]\n", '[curves.t200]\nlag = "speed"\n') + height).encode())
     assert not VIDEORAY.layout.surface
-
-
-@pytest.mark.long
-def test_a_base_with_a_surface_can_be_identified() -> None:
-    """The filter has forces along the axes, and none along the depth, which is monitored as they are."""
-    assert Filter(LEVEL).force == Filter(BLUEROV2).force
 
 
 def test_a_vehicle_without_a_surface_is_told_to_leave_the_water(capsys: pytest.CaptureFixture[str]) -> None:
