@@ -198,23 +198,11 @@ _LOG = "time [s],command [%],depth [m]\n" + _ROWS
 _NAMED = "is not an axis of this vehicle"
 # A file of tank tests, and what the one line says of it.
 TABLES: dict[str, tuple[str, str, str]] = {
-    "a log of an axis that no thruster drives": (
-        "log_roll_1.csv",
-        _LOG.replace("depth [m]", "roll [deg]"),
-        "log_roll_1.csv: no thruster of the vehicle drives roll",
-    ),
     "a log of no axis": (
         "log_twist_1.csv",
         _LOG,
         f"log_twist_1.csv, line 1: column 'command [%]' is the command of one axis, but twist {_NAMED}: the "
         "name of the file must be log_surge*.csv or log_heave*.csv or log_yaw*.csv",
-    ),
-    "an empty table": ("steady_surge.csv", "\n \n", "steady_surge.csv: the file is empty"),
-    "a table without a header": (
-        "steady_surge.csv",
-        "20,0.3\n30,0.4\n",
-        "line 1 = '20, 0.3': the first line must be a "
-        "header that names the columns, such as command [%], velocity [m/s]",
     ),
     "semicolons below commas": (
         "steady_surge.csv",
@@ -222,11 +210,6 @@ TABLES: dict[str, tuple[str, str, str]] = {
         "= '20;30': must be a number; what separates the cells must be the same as in the header",
     ),
     "a table of no axis": ("steady_twist.csv", "", f"steady_twist.csv: twist {_NAMED}, only surge, heave and yaw"),
-    "a curve misspelt": (
-        "thrust_raer.csv",
-        "",
-        "raer is not a thrust curve of this vehicle, only rear and top; did you mean rear?",
-    ),
 }
 
 

@@ -11,23 +11,16 @@ EFFECTS = "Effect | Of | Value | 95 % from | to | Unit | Evidence | Result |\n"
 VARIABLES = "Name | Of | Causality | Variability | Start | Unit | Min | Max |\n"
 REPEATED = {
     "J is minimised to 0.3": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | 2.6 | N | {{}} | reported |", "0.1", "−0.2"),
-    "a large evidence": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | 2.6 | N | {{}} | reported |", "370.4", "370.1"),
     "a value beside 0": (f"{EFFECTS}Load | yaw | {{}} | −0.0033 | 0.0033 | N | −9.4 | reported |", "0", "0.000067"),
-    "an end that moves": (f"{EFFECTS}Load | yaw | −2.0 | −2.6 | {{}} | N | −9.4 | reported |", "−1.4", "−1.5"),
     "a value of a file": ('F_0 = {{ value = {}, unit = "N", interval = [-0.302, 0.235] }}', "-0.021", "-0.012"),
-    "a value in a sentence": ("the load is {} N (−0.30 to 0.24), of yaw", "−0.021", "−0.028"),
     "a correlation": ("b = {{ error = 0.3, correlation = {{ a = {} }} }}", "0.000131", "-0.002"),
     "a number without an interval": ("steady at {} m/s", "0.997875", "1.000"),
     "a power of ten": ("a limit of {} N", "1.2·10⁻⁵", "1.3·10⁻⁵"),
-    "a percentage": ("it loses {} % of it", "3", "4"),
 }
 """A line of a fit, and two numbers in it that are the same."""
 CHANGED = {
     "the sign of an evidence": (f"{EFFECTS}Load | heave | 2.0 | 1.4 | 2.6 | N | {{}} | reported |", "0.6", "−0.6"),
-    "a value of a file": ('F_0 = {{ value = {}, unit = "N", interval = [-0.302, 0.235] }}', "-0.021", "0.021"),
     "an exponent": ("a limit of {} N", "4.4·10⁻⁵", "4.4·10⁻⁶"),
-    "an exponent alone": ("a limit of {} N", "10⁶", "10⁵"),
-    "an exponent of a file": ("a limit of {} N", "1e-05", "1e-06"),
     "another table": (
         f"{EFFECTS}\n## Variables\n{VARIABLES}a | b | c | fixed | 1.00 | N | {{}} | 2.00 |",
         "0.50",

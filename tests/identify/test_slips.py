@@ -248,12 +248,6 @@ def test_each_of_several_slips_is_asked_about(tmp_path: Path) -> None:
     assert found == {(log.file, SENSOR[log.axis.name]): QUESTIONS[kind] for log, kind in zip(logs, kinds, strict=True)}
 
 
-@pytest.mark.weekly
-@pytest.mark.parametrize("axis", [HEAVE, SURGE, YAW])
-def test_nothing_is_asked_of_logs_without_slip(axis: Axis, tmp_path: Path) -> None:
-    assert not told(write_folder(tmp_path, recordings(axis)[:2]))
-
-
 def mirrored(folder: Path, *columns: str) -> Path:
     """Write dives in all axes, and return the last one, in which some columns have the other sign."""
     COMPLETE["pilot"].write(0, folder)

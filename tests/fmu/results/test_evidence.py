@@ -114,18 +114,11 @@ thrust_16_v.csv: model text/csv Measured thrust, curve main
 thrust_16_v.csv: model text/csv Measured thrust, curve bow
 videoray_refit.toml: model application/toml The vehicle file
 covariance.csv: result text/csv Standard errors and covariance of the identified coefficients
-videoray.toml: model application/toml The vehicle file
-table6_heave_response.csv: result text/csv Published table: response in heave, printed and measured
-table3_heave_steady.csv: result text/csv Published table: steady velocities in heave, printed and measured
-table7_yaw_response.csv: result text/csv Published table: response in yaw, printed and measured
-table5_yaw_steady.csv: result text/csv Published table: steady velocities in yaw, printed and measured
-table8_surge_response.csv: result text/csv Published table: response in surge, printed and measured
-table4_surge_steady.csv: result text/csv Published table: steady velocities in surge, printed and measured
 """
 
 
 def test_each_file_has_its_role_and_its_description() -> None:
-    vehicles = (SHIPPED["bluerov2_heavy"], THRUST_EFFECTS, _REFIT, SHIPPED["videoray"])
+    vehicles = (SHIPPED["bluerov2_heavy"], THRUST_EFFECTS, _REFIT)
     found = [one for path in vehicles for one in origin(load_vehicle(path))[1]]
     told = [f"{one.source.rpartition('/')[2]}: {one.role} {one.type} {one.description}" for one in found]
     assert told == ROLES.strip().splitlines()

@@ -83,8 +83,6 @@ class Outcome:
     """The axis of each disturbance that is reported (`thrust` for all of them), and its cause: empty if unknown."""
     verdicts: Mapping[str, Word] = field(default_factory=dict)
     """By axis."""
-    structure: Mapping[str, float] = field(default_factory=dict)
-    """The error over 10 s of each axis, relative to the noise."""
     bands: tuple[Band, ...] = ()
     error: str = ""
     """The message of a refusal or of a crash; empty without."""
@@ -159,7 +157,6 @@ def read_result(result: Identification, truths: Truths, predictions: Sequence[Pr
         ),
         tuple((d.axis.name if d.axis else "thrust", d.cause) for d in result.disturbances if d.kept),
         {each.axis.name: each.verdict.word for each in result.axes},
-        {each.axis.name: each.structure for each in result.axes},
         tuple(map(_band, predictions)),
         seconds=seconds,
     )

@@ -32,7 +32,6 @@ def test_nothing_is_answered_beyond_a_limit_of_the_commands(tmp_path: Path) -> N
 @pytest.mark.weekly
 @pytest.mark.parametrize("seed", range(2))
 def test_verdicts_keep_what_they_promise(seed: int) -> None:
-    """The command of `verdicts.py` has the numbers of many seeds."""
     kept = {name: [run(name, seed)] for name in (*RIGHT, *WRONG)}
     assert not [words for words in broken(kept) if "only" not in words]
     right = Line.of([o for name in RIGHT for o in kept[name]])

@@ -12,7 +12,6 @@ import pytest
 from rov_fmu import load
 from rov_fmu.equation.catalogue import AXES, HEAVE, PITCH, ROLL, SURGE, SWAY, YAW, Axis
 from rov_fmu.fmu.card import card_text
-from rov_fmu.identify.assess import COMMANDS
 from rov_fmu.identify.beginning import begin, load_tests
 from rov_fmu.identify.given import thrusters_along_no_other
 from rov_fmu.identify.identify import identify
@@ -29,7 +28,6 @@ from rov_fmu.vehicle.vehicle import load_vehicle
 from rov_fmu.vehicle.writer import vehicle_text
 from tests.folders import HEAD, folder_of, read, responses
 from tests.identify.scenarios.drawn import Drawn
-from tests.identify.scenarios.verdicts import RIGHT
 from tests.often import spread
 from tests.report.pages import text_of
 from tests.report.test_report import leave_plots_out
@@ -141,20 +139,6 @@ def test_an_axis_of_which_nothing_is_known_moves_in_a_dive_that_turns(
     assert {form.axis.name for form in tests.layout.axes} == {*sensors}
     assert known.unseen == unseen
     assert all({form.axis.name for form in one.layout.axes} == {*sensors, *(a.name for a in unseen)} for one in logs)
-
-
-@pytest.mark.long
-def test_a_surge_that_nothing_shows_does_not_bias_the_yaw(tmp_path: Path) -> None:
-    drawn = RIGHT["no velocity sensor"]
-    drawn.write(502, tmp_path / "dives")
-    result, truths = identify(load_tests(tmp_path / "dives")), drawn.truths(502)
-    assert {axis.axis for axis in result.axes} == {HEAVE, YAW}
-    assert not result.vehicle.layout.has(SURGE)
-    speeds = {one.command: one.steady for axis in result.axes if axis.axis is YAW for one in axis.answers}
-    for command in COMMANDS:
-        (value, (low, high)), truth = speeds[command], truths["yaw", f"V_ss {100.0 * command:g} %"]
-        assert abs(value / truth - 1.0) < 0.005
-        assert low < truth < high
 
 
 @pytest.mark.long
