@@ -38,7 +38,6 @@ class RovError(Exception):
     `except rov_fmu.RovError` catches them all:
 
         RovError
-            BeyondError *
             BuildError
                 OptionError
             ChildError *

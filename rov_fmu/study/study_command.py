@@ -5,17 +5,23 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from rov_fmu.io.messages import FileError, StudyError
 from rov_fmu.io.output import Output, check_targets, sealed, write_whole
-from rov_fmu.report.console import console, paragraph, print_end, shell_words
-from rov_fmu.report.progress import StudyParts, parts
-from rov_fmu.study.plan.plan import PlanError, load_plan
+from rov_fmu.report.console import console, paragraph, print_end, print_table, shell_words, table, text
+from rov_fmu.report.progress import StudyParts, parts, per_second
+from rov_fmu.study.plan.plan import REASON, PlanError, load_plan
 from rov_fmu.study.results.store import PAGE, STUDY, is_description
 from rov_fmu.study.run.run_study import do_study
 from rov_fmu.vehicle.shipped import named_in
 
 if TYPE_CHECKING:
     from rov_fmu.study.results.results import Results
+
+_SHOWN = (0.05, 0.5, 0.95)
+_FAILURES = 5
+"""The number of reasons that are shown, the most frequent first."""
 
 
 def study_plan(
@@ -61,7 +67,6 @@ def study_plan(
         return
     from rov_fmu.study.results.page import study_page
     from rov_fmu.study.results.results import Results
-    from rov_fmu.study.results.summary import print_summary
 
     results = Results(output)
     files = write_whole(Output(output / PAGE, sealed(study_page(results), "study").encode()), force=force)
@@ -72,6 +77,34 @@ def study_plan(
     print_end(files, "open it in a browser")
     if len(results.failed) + len(results.incomplete) == len(results.runs):
         raise StudyError(f"{output}: no run is complete with all its figures")
+
+
+def print_summary(results: "Results", now: int, seconds: float) -> None:
+    """Print the number of runs, the speed, the quantiles of the figures, and why runs failed or figures are missing.
+
+    `now` is the number of runs that were done now, in so many seconds.
+    """
+    from rov_fmu.study.results.results import statistics
+
+    out, runs = console(), results.runs
+    counts = f"{len(runs)} runs, {len(results.failed)} failed, {len(results.incomplete)} incomplete"
+    paragraph(out, f"{shell_words(results.folder)}: {counts}")
+    if now:
+        rate = per_second(now / max(seconds, 1e-3))
+        paragraph(out, f"  {now:,} of them now, in {seconds:.1f} s; {rate}")
+    if results.figures:
+        shown = table("", "figure", [*(f"{q:.0%}" for q in _SHOWN), "mean", "runs"])
+        for name in results.figures:
+            values = runs[name].to_numpy(float)
+            there = values[np.isfinite(values)]
+            quantiles, mean, _ = statistics(there, _SHOWN)
+            shown.add_row(name, *(text(number, ".5g") for number in (*quantiles, mean)), str(there.size))
+        print_table(shown)
+    reasons = runs[REASON].value_counts()
+    for reason, count in reasons.head(_FAILURES).items():
+        paragraph(out, f"  {count} runs: {reason}")
+    if len(others := reasons[_FAILURES:]):
+        paragraph(out, f"  {others.sum()} runs: other reasons ({len(others)}), which are on the page")
 
 
 def _motion_of(results: "Results", run: int, vehicle: Path) -> bytes:

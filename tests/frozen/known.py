@@ -178,7 +178,7 @@ def _study(folder: Path) -> str:
     """Return the page and the summary of a saved study."""
     from rov_fmu import Results
     from rov_fmu.study.results.page import study_page
-    from rov_fmu.study.results.summary import print_summary
+    from rov_fmu.study.study_command import print_summary
 
     with TemporaryDirectory() as temporary, _without_plots("study.results.plots"):
         results = Results(shutil.copytree(folder, Path(temporary, folder.name)))

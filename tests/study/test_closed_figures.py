@@ -142,12 +142,16 @@ TEXTS = st.one_of(st.text("abc/._%{}O8", max_size=9), st.binary(max_size=9)).map
 OPERATORS = st.sampled_from([*"+-*/%@&|^<>", "//", "**", "<<", ">>", "<=", ">=", "==", "!=", "is", "in", "and", "or"])
 
 
-def _called(parts: Any, names: Any) -> Any:
-    keywords = st.lists(st.tuples(st.sampled_from(["start", "end", "band", "out", "dtype", "axis", "y"]), parts))
-    arguments = st.tuples(st.lists(parts, max_size=4), keywords.filter(lambda given: len(given) < 3))
-    return st.tuples(names, arguments).map(
-        lambda call: f"{call[0]}({', '.join([*call[1][0], *(f'{name}={part}' for name, part in call[1][1])])})"
-    )
+def _written(form: str, *parts: Any) -> Any:
+    """Texts of a form, with drawn parts in the places of its braces."""
+    return st.tuples(*parts).map(lambda drawn: form.format(*drawn))
+
+
+def _called(names: Any, parts: Any) -> Any:
+    """Calls of a name with some values, of which the last one may have a name."""
+    named = _written("{}={}", st.sampled_from(["start", "end", "band", "out", "dtype", "axis", "y"]), parts)
+    values = st.tuples(st.lists(parts, max_size=4), st.lists(named, max_size=1))
+    return _written("{}({})", names, values.map(lambda some: ", ".join([*some[0], *some[1]])))
 
 
 def _proper_call(parts: Any) -> Any:
@@ -161,32 +165,25 @@ def _proper_call(parts: Any) -> Any:
 
 def _proper(parts: Any) -> Any:
     """Parts of an expression that are allowed."""
-    three = st.tuples(parts, parts, parts)
     return st.one_of(
         _proper_call(parts),
-        st.tuples(parts, OPERATORS, parts).map(lambda of: f"({' '.join(of)})"),
-        st.tuples(parts, parts).map(lambda of: f"{of[0]}[{of[1]}]"),
-        three.map(lambda of: f"{of[0]}[{of[1]}:{of[2]}]"),
-        three.map(lambda of: f"({of[0]} if {of[1]} else {of[2]})"),
-        three.map(lambda of: f"({of[0]} < {of[1]} >= {of[2]})"),
-        parts.map(lambda of: f"where({of})[0]"),
-        st.tuples(st.sampled_from(["-", "~", "not "]), parts).map(lambda of: f"({of[0]}{of[1]})"),
+        _written("({} {} {})", parts, OPERATORS, parts),
+        _written("{}[{}]", parts, parts),
+        *(_written(form, parts, parts, parts) for form in ("{}[{}:{}]", "({} if {} else {})", "({} < {} >= {})")),
+        _written("where({})[0]", parts),
+        _written("({}{})", st.sampled_from(["-", "~", "not "]), parts),
     )
 
 
 def _improper(parts: Any) -> Any:
     """Parts that are allowed, and others that are not."""
+    others = ("[{0}, {0}]", "({0},)", "[x for x in {0}]", "(lambda: {0})", "(x := {0})", "f'{{{0}}}'", "{0}.{0}")
     return st.one_of(
         _proper(parts),
-        _called(parts, ANY_NAME),
+        _called(ANY_NAME, parts),
         _called(parts, parts),
-        st.tuples(parts, ANY_NAME).map(".".join),
-        st.lists(parts, max_size=3).map(lambda of: f"[{', '.join(of)}]"),
-        st.lists(parts, max_size=3).map(lambda of: f"({', '.join(of)},)"),
-        parts.map(lambda of: f"[x for x in {of}]"),
-        parts.map(lambda of: f"(lambda: {of})"),
-        parts.map(lambda of: f"(x := {of})"),
-        parts.map(lambda of: f"f'{{{of}}}'" if "'" not in of else f"*{of}"),
+        _written("{}.{}", parts, ANY_NAME),
+        *(_written(form, parts) for form in others),
     )
 
 

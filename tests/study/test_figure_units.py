@@ -58,4 +58,4 @@ def test_a_figure_scales_with_the_variables_of_its_unit_alone(unit: str) -> None
     for other in {*UNITS.values()} - {"1", "rad"}:
         scaled = {name: (1.5 if UNITS[name] == other else 1.0) * value for name, value in VALUES.items()}
         after, _ = figures.of(scaled)
-        assert after == pytest.approx([(1.5 if other == unit else 1.0) * value for value in before])
+        assert after == pytest.approx((1.5 if other == unit else 1.0) * np.array(before, float))

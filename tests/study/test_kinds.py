@@ -16,12 +16,12 @@ from distributed import LocalCluster
 
 from rov_fmu import Results, run_study
 from rov_fmu.cli import main
-from rov_fmu.study.results.store import Store
 from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.shipped import VIDEORAY
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.folders import beside
+from tests.study.conftest import same
 
 RUNS = 24
 PLAN = """stop_time = 4.0
@@ -58,11 +58,6 @@ def native(tmp_path_factory: pytest.TempPathFactory, videoray_fmu: Path, schedul
     return run_study(_plan(folder, videoray_fmu), folder / "results", scheduler=scheduler)
 
 
-def _close(results: Results, other: Results, rtol: float = 1e-11) -> None:
-    pd.testing.assert_frame_equal(results.runs, other.runs, rtol=rtol, atol=1e-13)
-    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), rtol=rtol, atol=1e-13)
-
-
 def test_the_rows_are_the_steps_of_the_mathematics(native: Results) -> None:
     """Some runs are repeated in Python, which shares no code with the FMU."""
     rov = load_vehicle(VIDEORAY)
@@ -95,7 +90,7 @@ def test_an_fmu_of_fmi_3_gives_the_same_rows_and_leaves_the_workers_as_they_were
 ) -> None:
     progress: list[Progress] = []
     plan, address = _plan(tmp_path, videoray3_fmu), cluster.scheduler_address
-    _close(run_study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native)
+    same(run_study(plan, tmp_path / "results", scheduler=address, on_progress=progress.append), native, 1e-11)
     link = cluster.dashboard_link
     assert [progress[0], progress[-1]] == [Progress(0, RUNS, 0, link), Progress(RUNS, RUNS, 0, link)]
     scheduler: Any = cluster.scheduler
@@ -117,16 +112,16 @@ def test_a_vehicle_in_lanes_and_its_fmu_give_the_same_rows_and_the_lanes_load_ne
     assert "numpy" in loaded
     assert not {"distributed", "dask", "fmpy", "matplotlib", "rov_fmu.build"} & {*loaded}
     lanes = run_study(plan, tmp_path / "lanes", merge=True)
-    _close(lanes, native, 1e-12)
+    same(lanes, native, 1e-12)
     assert (tmp_path / "lanes" / "study.json").exists()
     monkeypatch.setattr("rov_fmu.build.build_fmu", built)
-    _close(run_study(plan, tmp_path / "results", scheduler=scheduler), native)
+    same(run_study(plan, tmp_path / "results", scheduler=scheduler), native, 1e-11)
 
 
 @pytest.mark.weekly
 def test_an_fmu_of_pythonfmu_gives_the_same_rows(tmp_path: Path, native: Results) -> None:
     assert main(["build", "--backend", "pythonfmu", "-o", str(tmp_path / "python.fmu")]) == 0
-    _close(run_study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native)
+    same(run_study(_plan(tmp_path, tmp_path / "python.fmu"), tmp_path / "results", workers=1), native, 1e-11)
 
 
 @pytest.mark.long
@@ -156,7 +151,7 @@ def test_a_full_disk_is_a_line_and_what_is_done_is_kept(
     assert line.endswith("cannot be written: No space left on device\n")
     assert line.count("\n") == 1
     assert 0 < len(Results(folder).runs) < RUNS
-    _close(run_study(plan, folder, scheduler=scheduler), native)
+    same(run_study(plan, folder, scheduler=scheduler), native, 1e-11)
 
 
 def test_without_its_packages_the_command_says_what_to_install(
@@ -172,13 +167,3 @@ def test_without_its_packages_the_command_says_what_to_install(
     monkeypatch.setattr(builtins, "__import__", missing)
     assert main(["study", "plan.toml", "-o", str(tmp_path)]) == 2
     assert capsys.readouterr().err == "rov-fmu: study: needs dask: pip install 'rov-fmu[study]'\n"
-
-
-def test_a_folder_takes_one_study_at_a_time(
-    tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    plan, folder = _plan(tmp_path, videoray_fmu), tmp_path / "results"
-    with Store(folder).held():
-        assert main(["study", str(plan), "-o", str(folder), "--workers", "1"]) == 2
-        assert not list((folder / "runs").iterdir())
-    assert capsys.readouterr().err == f"rov-fmu: {folder}: another study is writing there\n"

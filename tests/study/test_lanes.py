@@ -8,7 +8,6 @@ from typing import Any
 
 import fmpy
 import numpy as np
-import pandas as pd
 import pytest
 
 from rov_fmu import Results, run_study
@@ -27,6 +26,7 @@ from rov_fmu.study.run.work import Progress
 from rov_fmu.vehicle.vehicle import Vehicle, load_vehicle
 from tests.commands import without_progress
 from tests.often import spread
+from tests.study.conftest import same
 from tests.vehicles import EVERYTHING, HEAVY, SIX, THRUST_EFFECTS, VIDEORAY, a_vehicle, passed, with_rotors
 
 KINDS: dict[str, Vehicle] = {
@@ -129,11 +129,6 @@ def _plan(folder: Path, text: str = PLAN) -> Path:
     return path
 
 
-def _same(results: Results, other: Results) -> None:
-    pd.testing.assert_frame_equal(results.runs, other.runs, check_exact=True)
-    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), check_exact=True)
-
-
 @pytest.mark.parametrize("sampler", spread(["sobol", "random", "latin-hypercube", "saltelli"], ["sobol"], ["saltelli"]))
 def test_parts_are_merged_to_the_bits_of_one_run(
     sampler: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
@@ -156,13 +151,13 @@ def test_parts_are_merged_to_the_bits_of_one_run(
     assert len(Results(tmp_path / "elsewhere").runs) in (13, 14)
     shutil.copytree(tmp_path / "elsewhere" / "runs", parted / "runs", dirs_exist_ok=True)
     assert main([*given, "--merge"]) == 0
-    _same(Results(parted), whole)
+    same(Results(parted), whole)
     assert (parted / "study.html").exists()
     assert main([*given, "--part", "1/2"]) == 0, "there is nothing left to do"
     assert main(given) == 0, "it is a study like any other"
 
 
-def test_two_parts_run_beside_each_other_and_what_does_not_belong_together_is_refused(tmp_path: Path) -> None:
+def test_two_parts_run_beside_each_other(tmp_path: Path) -> None:
     plan, folder = _plan(tmp_path), tmp_path / "results"
     whole = run_study(plan, tmp_path / "whole")
 
@@ -172,27 +167,7 @@ def test_two_parts_run_beside_each_other_and_what_does_not_belong_together_is_re
         run_study(plan, folder, part=(2, 2))
 
     run_study(plan, folder, part=(1, 2), on_progress=beside)
-    _same(run_study(plan, folder, merge=True), whole)
-    for text, reason in (
-        (
-            PLAN.replace("seed = 5", "seed = 6"),
-            r"results: holds runs of another study \(seed changed\): choose another",
-        ),
-        (PLAN.replace("videoray", "videoray_refit"), "runs of another study .*the vehicle, the FMU or rov-fmu changed"),
-    ):
-        changed = _plan(tmp_path, text)
-        for part in (None, (1, 2)):
-            with pytest.raises(FileError, match=reason):
-                run_study(changed, folder, merge=part is None, part=part)
-    _plan(tmp_path)
-    run_study(plan, tmp_path / "other", part=(1, 3))
-    (file,) = (tmp_path / "other" / "runs").iterdir()
-    copied = Path(shutil.copy(file, folder / "runs"))
-    with pytest.raises(FileError, match=f"{file.name} has, too: remove one of them"):
-        run_study(plan, folder, merge=True)
-    copied.rename(copied.with_name("part-000000003-000000009.parquet"))
-    with pytest.raises(FileError, match=r"000000009\.parquet: has the runs 0 to 12, and not those of its name"):
-        run_study(plan, folder, merge=True)
+    same(run_study(plan, folder, merge=True), whole)
 
 
 def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
@@ -211,7 +186,7 @@ def test_an_interrupted_study_in_lanes_goes_on_without_a_lost_or_double_row(
         run_study(plan, tmp_path / "results", on_progress=interrupt)
     assert [*Results(tmp_path / "results").runs.index] == [*range(21)]
     monkeypatch.setattr("rov_fmu.study.run.lanes._MOST", 4)
-    _same(run_study(plan, tmp_path / "results", on_progress=progress.append), whole)
+    same(run_study(plan, tmp_path / "results", on_progress=progress.append), whole)
     assert [now.done for now in progress] == [0, 7, 14, 21, 21, 25, 29, 33, 37, 40]
     assert {now.total for now in progress} == {40}
 

@@ -9,8 +9,7 @@ from concurrent.futures import CancelledError
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from threading import Event
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -30,9 +29,10 @@ from rov_fmu.study.plan.prepared import prepare
 from rov_fmu.study.results.store import Store, not_done, parquet
 from rov_fmu.study.run.child import Child
 from rov_fmu.study.run.run_study import do_study
-from rov_fmu.study.run.work import Progress, Work
+from rov_fmu.study.run.work import Progress
 from tests.commands import start, without_progress
 from tests.folders import beside
+from tests.study.conftest import same
 
 Foreign = Callable[..., Path]
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
@@ -68,11 +68,6 @@ def _expected(runs: pd.DataFrame, t: Any) -> Any:
     """Return y of the foreign FMU, whose input is 0 before 1 s and 0.5 after."""
     to = runs.a + 2.0 * runs.b + 3.0 * runs.c
     return to * (1.0 - np.exp(-t / 0.5)) + 0.5 * (1.0 - np.exp(-max(t - 1.0, 0.0) / 0.5))
-
-
-def _same(results: Results, other: Results) -> None:
-    pd.testing.assert_frame_equal(results.runs, other.runs, check_exact=True)
-    pd.testing.assert_frame_equal(results.trajectories(), other.trajectories(), check_exact=True)
 
 
 @pytest.fixture
@@ -127,19 +122,8 @@ def test_an_fmu_that_does_not_reset_gives_the_rows_of_one_that_does(
 ) -> None:
     """A reset that does nothing leaves y as it was."""
     others = _processes("_serve")
-    _same(do(reset), whole)
+    same(do(reset), whole)
     assert _processes("_serve") <= others, "the processes of the FMU have ended"
-
-
-@pytest.mark.long
-def test_workers_that_are_processes_give_the_same_rows(foreign: Foreign, tmp_path: Path, whole: Results) -> None:
-    others, started = _processes("spawn_main"), set[int]()
-
-    def count(_: Progress) -> None:
-        started.add(len(_processes("spawn_main") - others))
-
-    _same(run_study(_plan(tmp_path, foreign()), tmp_path / "results", workers=2, on_progress=count), whole)
-    assert started == {2}
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_the_rest_goes_on(
@@ -203,7 +187,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
     before = {path.name: path.stat().st_mtime_ns for path in (results / "runs").iterdir()}
     draft = results / "runs" / ".part-000000030-000000039.parquet.abc.part"
     draft.write_bytes(b"of a process that was killed")
-    _same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
+    same(do(runs=40, limit=99.0, on_progress=progress.append), whole)
     assert [progress[0].done, progress[-1].done] == [24, 40]
     assert do_study(tmp_path / "plan.toml", results, None, "tcp://nowhere", progress.append).runs == 0
     assert not draft.exists()
@@ -219,7 +203,7 @@ def test_more_runs_of_the_same_plan_go_on_and_another_plan_does_not_mix(
         line = capsys.readouterr().err
         assert line.startswith(f"rov-fmu: {results}: {reason}")
         assert line.count("\n") == 1
-    _same(Results(results), whole)
+    same(Results(results), whole)
 
 
 COLUMNS = {"parameters": ["a"], "figures": ["end"], "outputs": ["y"]}
@@ -265,12 +249,6 @@ def test_runs_of_another_study_are_refused_and_those_that_are_missing_are_told(t
     assert store.description() == {"format": 2}
 
 
-def _flipped(content: bytes, place: int) -> bytes:
-    changed = bytearray(content)
-    changed[place] ^= 4
-    return bytes(changed)
-
-
 DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "rows of another part": (
         lambda path: path.write_bytes(_rows(0, 4)),
@@ -289,7 +267,6 @@ DAMAGE: dict[str, tuple[Callable[[Path], object], str]] = {
     "other numbers": (lambda path: path.write_bytes(_rows(5, 9)), "has the runs 5 to 8, and not those of its name"),
     "cut": (lambda path: path.write_bytes(path.read_bytes()[:300]), "cannot be read: Parquet magic bytes not found"),
     "empty": (lambda path: path.write_bytes(b""), "cannot be read: "),
-    "a flipped bit": (lambda path: path.write_bytes(_flipped(path.read_bytes(), 60)), "cannot be read: "),
     "without a footer of ours": (
         lambda path: pd.DataFrame({"run": range(4, 9)}).to_parquet(path),
         "cannot be read: ",
@@ -319,7 +296,7 @@ def test_a_flipped_bit_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
     content, rows = path.read_bytes(), pq.read_table(path)
     refused = 0
     for place in range(0, len(content), 17):
-        path.write_bytes(_flipped(content, place))
+        path.write_bytes(content[:place] + bytes([content[place] ^ 4]) + content[place + 1 :])
         try:
             store.checked(STUDY, whole=True)
         except FileError:
@@ -399,7 +376,7 @@ def test_an_interrupted_or_killed_study_goes_on_where_it_was(
     assert 0 < len(Results(results).runs) < SLOW["runs"]
     kept = {path: path.read_bytes() for path in _parts(results)}
     (results / "runs" / ".part-000000000-000009999.parquet.abc.part").write_bytes(b"a draft")
-    _same(run_study(plan, results, scheduler=scheduler), slow)
+    same(run_study(plan, results, scheduler=scheduler), slow)
     assert all(path.read_bytes() == content for path, content in kept.items())
     assert not [*results.glob("*/.*")]
 
@@ -417,7 +394,7 @@ def test_a_killed_worker_is_missed_by_no_row(foreign: Foreign, tmp_path: Path, s
     lines = without_progress(process.communicate(timeout=600)[1]).splitlines()
     assert [line for line in lines if "the vehicle turned over" not in line] == []
     assert process.returncode == 0
-    _same(Results(results), slow)
+    same(Results(results), slow)
 
 
 def test_a_scheduler_that_is_not_there_is_a_line(
@@ -522,24 +499,4 @@ def test_a_scheduler_that_goes_takes_nothing_with_it(
         with pytest.raises(StudyError, match=r"the connection to the scheduler is lost\. Finished runs are kept"):
             run_study(plan, results, scheduler=cluster.scheduler_address, on_progress=close)
     assert 0 < len(Results(results).runs) < SLOW["runs"]
-    _same(run_study(plan, results, scheduler=scheduler), slow)
-
-
-def test_a_study_tells_again_and_again_whether_workers_are_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its last rate would stand there otherwise, although nothing is done."""
-    monkeypatch.setattr("rov_fmu.study.run.work._WATCH", 0.001)
-    told, all_told = list[Progress](), Event()
-
-    def tell(now: Progress) -> None:
-        told.append(now)
-        if len(told) == 4:
-            all_told.set()
-
-    counts, nothing = iter([1, 0, 0]), cast("Any", None)
-    store = Store(tmp_path / "results")
-    work = Work(nothing, nothing, store, [(4, 9)], 9, tell)
-    with work.watched(lambda: next(counts)):  # until the client has no answer
-        assert all_told.wait(10.0)
-    assert told == [Progress(4, 9, 0, has_workers=there) for there in (True, True, False, False)]
+    same(run_study(plan, results, scheduler=scheduler), slow)

@@ -53,14 +53,6 @@ class ExpressionError(RovError, ValueError):
     """A text is not an expression that a figure may have; the message is the reason."""
 
 
-class BeyondError(RovError, IndexError):
-    """An array has no such index; `length` is its length."""
-
-    def __init__(self, index: int, length: int) -> None:
-        super().__init__(f"index {index} is out of bounds for axis 0 with size {length}")
-        self.length = length
-
-
 class FigureFunction(NamedTuple):
     """A function that an expression may call."""
 
@@ -210,41 +202,40 @@ class FigureExpression:
         match node:
             case None:
                 return lambda _: None, None
-            case ast.Constant(value=int() | float() as value):
+            case ast.Constant(int() | float() as value):
                 number = _constant(value)
                 return lambda _: number, _PLAIN
-            case ast.Name(id=name):
+            case ast.Name(name):
                 return self._variable(name)
-            case ast.Attribute(value=ast.Name(id=component), attr=name):  # a variable of a component of a system
+            case ast.Attribute(ast.Name(component), name):  # a variable of a component of a system
                 return self._variable(f"{component}.{name}")
-            case ast.Subscript(value=ast.Name(id=name), slice=ast.Constant(value=str(variable))) if name == BY_NAME:
+            case ast.Subscript(ast.Name(name), ast.Constant(str() as variable)) if name == BY_NAME:
                 return self._variable(variable)
-            case ast.Subscript(
-                value=ast.Call(func=ast.Name(id="where"), args=[condition], keywords=[]), slice=ast.Constant(value=0)
-            ):
+            case ast.Subscript(ast.Call(ast.Name("where"), [condition], []), ast.Constant(0)):
                 return self._of(np.flatnonzero, "1", condition)
-            case ast.Subscript(value=value, slice=ast.Slice(lower=lower, upper=upper, step=step)):
-                return self._of(_slice, unit_of_first, value, lower, upper, step)
-            case ast.Subscript(value=value, slice=index):
-                return self._of(_index, unit_of_first, value, index)
-            case ast.UnaryOp(op=op, operand=value):
-                return self._of(*_OPERATORS[type(op)], value)
-            case ast.BinOp(left=left, op=op, right=right) if type(op) in _OPERATORS:
+            case ast.Subscript(array, ast.Slice(lower, upper, step)):
+                return self._of(_slice, unit_of_first, array, lower, upper, step)
+            case ast.Subscript(array, index):
+                return self._of(_index, unit_of_first, array, index)
+            case ast.UnaryOp(op, operand):
+                return self._of(*_OPERATORS[type(op)], operand)
+            case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
                 return self._of(*_OPERATORS[type(op)], left, right)
-            case ast.Compare(left=left, ops=ops, comparators=others) if {*map(type, ops)} <= _OPERATORS.keys():
+            case ast.Compare(left, ops, others) if {*map(type, ops)} <= _OPERATORS.keys():
                 return self._of(partial(_compare, [_OPERATORS[type(op)][0] for op in ops]), "1", left, *others)
-            case ast.BoolOp(op=op, values=operands):
+            case ast.BoolOp(op, operands):
                 is_enough = any if isinstance(op, ast.Or) else all
                 computes = [self._read(operand)[0] for operand in operands]
                 return lambda values: np.bool_(is_enough(_truth(one(values)) for one in computes)), "1"
-            case ast.IfExp(test=test, body=body, orelse=otherwise):
+            case ast.IfExp(test, body, otherwise):
                 (is_true, _), (one, unit), (other, other_unit) = map(self._read, (test, body, otherwise))
                 return lambda values: (one if _truth(is_true(values)) else other)(values), _common(unit, other_unit)
-            case ast.Call(func=ast.Name(id=name), args=given, keywords=keywords):
+            case ast.Call(ast.Name(name), given, keywords):
                 return self._call(name, given, keywords)
-            case ast.Call(func=ast.Attribute(attr=name) as own) if name in self._functions:
+            case ast.Call(ast.Attribute(_, name) as own) if name in self._functions:
                 text = brief(ast.unparse(own), 40)
                 raise ExpressionError(f"{text} is an attribute, which is not allowed: write {name}(...)")
+        assert node
         raise ExpressionError(f"{brief(ast.unparse(node), 40)} is not allowed; {_ALLOWED}")
 
     def _of(self, function: Callable[..., _Value], unit: _UnitRule, *nodes: ast.expr | None) -> tuple[_Compute, _Unit]:
@@ -314,10 +305,6 @@ def _index(array: _Value, index: _Value) -> _Value:
     whole: Any = index.astype(np.intp) if isinstance(index, np.ndarray) else _whole_number(index)
     if not np.all(whole == index):
         raise IndexError("an index must be a whole number")
-    beyond = np.atleast_1d(whole)
-    beyond = beyond[(beyond < -len(array)) | (beyond >= len(array))]
-    if beyond.size:
-        raise BeyondError(beyond[0], len(array))
     return array[whole]
 
 

@@ -16,7 +16,6 @@ from rov_fmu.study.plan.expression import (
     CONSTANTS,
     FUNCTIONS,
     TIME,
-    BeyondError,
     FigureExpression,
     by_name,
     elements,
@@ -193,8 +192,8 @@ def unusable(text: str, variables: Iterable[str], varied: Collection[str], times
             numbers = expression.names.intersection(varied)
             if numbers and isinstance(error, TypeError):
                 return f"{_words(error)}; {min(numbers)} varies, and what varies is a number"
-            # No operation gives an array that is longer than a run.
-            beyond = isinstance(error, BeyondError) and error.length == len(times)
+            # No operation gives an array that is longer than a run; NumPy names the size.
+            beyond = isinstance(error, IndexError) and str(error).endswith(f" with size {len(times)}")
             if beyond or isinstance(error, TypeError | TimeError) or expression.names <= CONSTANTS.keys():
                 return _words(error)
     return ""

@@ -1,7 +1,7 @@
 """The parameters of every run. They depend only on the plan, its seed and the number of the run."""
 
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 from math import isclose, isinf, log
@@ -16,7 +16,7 @@ from rov_fmu.io.messages import first_of, listed
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.model import unsettable
 from rov_fmu.study.plan.plan import Plan, Varied
-from rov_fmu.vehicle.uncertainty import NOTHING, Array
+from rov_fmu.vehicle.uncertainty import NOTHING, Array, Uncertainty
 from rov_fmu.vehicle.vehicle import Vehicle
 
 _LARGEST = float(np.finfo(float).max)
@@ -24,8 +24,6 @@ _MOST_DRAWN = 50_000_000
 """The largest number of values in a Latin hypercube, which is drawn as a whole: they take 2 GB for some time."""
 _SHOWN = 5
 _FROM = "vary_from"
-_Draw = Callable[[int, int], Array]
-"""A function of the first run and the one after the last; it returns a row of numbers in 0 ... 1 for each run."""
 
 
 class Design:
@@ -59,8 +57,8 @@ class Design:
 
     def rows(self, first: int, end: int) -> Array:
         """Return the values from run `first` to the one before `end`: a row per run, a column per variable."""
-        (known, draw), plan = self._drawn, self._plan
-        drawn, together = draw(first, end), len(known.names)
+        (known, numbers), plan = self._drawn, self._plan
+        drawn, together = numbers.draw(first, end), len(known.names)
         found = np.empty_like(drawn)
         found[:, :together] = known.drawn(drawn[:, :together])
         for n, (name, varied) in enumerate(plan.vary.items(), together):
@@ -69,20 +67,13 @@ class Design:
         return np.clip(found, -_LARGEST, _LARGEST)
 
     @cached_property
-    def _drawn(self) -> tuple[Any, _Draw]:
+    def _drawn(self) -> tuple[Uncertainty, "_Numbers"]:
         """The distribution of the estimates within the bounds of the FMU's variables, and what draws the numbers."""
-        known, plan, width = self._known, self._plan, len(self.names)
+        known, plan = self._known, self._plan
         own = np.array([(self._has[name].minimum, self._has[name].maximum) for name in known.names]).reshape(-1, 2)
         bounds = [np.maximum(known.bounds, own)[:, 0], np.minimum(known.bounds, own)[:, 1]]
-        indices = [[self.names.index(name) for name in group] for group in self.groups]
-        draws: dict[str, Callable[[], _Draw]] = {
-            "grid": lambda: _grid([len(varied.choices or ()) for varied in plan.vary.values()]),
-            "sobol": lambda: _sobol(width, plan.seed),
-            "saltelli": lambda: _saltelli(indices, plan.seed),
-            "latin-hypercube": lambda: _latin_hypercube(width, plan.seed, self.runs),
-            "random": lambda: _random(width, plan.seed),
-        }
-        return replace(known, bounds=np.column_stack(bounds)), draws[plan.sampler]()
+        groups = [[self.names.index(name) for name in group] for group in self.groups]
+        return replace(known, bounds=np.column_stack(bounds)), _Numbers(plan, groups, self.runs)
 
     # ---- What does not fit, and what a reader may not expect ---------------------------------------------------------
 
@@ -201,24 +192,38 @@ def _normal(mean: float, sd: float, low: float, high: float, drawn: Array) -> Ar
 # ---- Numbers in 0 ... 1 ----------------------------------------------------------------------------------------------
 
 
-def _grid(counts: Sequence[int]) -> _Draw:
-    """Go through all combinations; the last variable changes fastest."""
+class _Numbers:
+    """Numbers in 0 ... 1 by the sampler of a plan: a row for each run, and a column for each variable."""
 
-    def draw(first: int, end: int) -> Array:
+    def __init__(self, plan: Plan, groups: Sequence[Sequence[int]], runs: int) -> None:
+        """`groups` has the columns of each group of correlated variables."""
+        self._plan, self._groups, self._runs, self._width = plan, groups, runs, sum(map(len, groups))
+        self.draw = {
+            "grid": self._grid,
+            "sobol": self._sobol,
+            "saltelli": self._saltelli,
+            "latin-hypercube": self._latin_hypercube,
+            "random": self._random,
+        }[plan.sampler]
+        """Returns the rows from a first run to the one before another."""
+
+    def _grid(self, first: int, end: int) -> Array:
+        """Go through all combinations; the last variable changes fastest."""
+        counts = [len(varied.choices or ()) for varied in self._plan.vary.values()]
         drawn = np.empty((end - first, len(counts)))
         _, *indices = np.unravel_index(np.arange(first, end), (1, *counts))  # a grid without variables has one point
         for column, index in enumerate(indices):
             drawn[:, column] = (index + 0.5) / counts[column]
         return drawn
 
-    return draw
+    @cached_property
+    def _sequence(self) -> qmc.Sobol:
+        """A Sobol sequence with Owen scrambling."""
+        return qmc.Sobol(self._width * (1 + (self._plan.sampler == "saltelli")), seed=self._plan.seed)
 
-
-def _sobol(width: int, seed: int) -> _Draw:
-    """Draw a Sobol sequence with Owen scrambling, continuing after the last number drawn where possible."""
-    source = qmc.Sobol(width, seed=seed)
-
-    def draw(first: int, end: int) -> Array:
+    def _sobol(self, first: int, end: int) -> Array:
+        """Continue after the last number drawn where possible."""
+        source = self._sequence
         if first < source.num_generated:
             source.reset()
         if first > source.num_generated:
@@ -227,42 +232,31 @@ def _sobol(width: int, seed: int) -> _Draw:
             warnings.simplefilter("ignore", UserWarning)
             return np.asarray(source.random(end - first))
 
-    return draw
+    def _saltelli(self, first: int, end: int) -> Array:
+        """Draw blocks of rows: a row of a matrix A; for each group, this row with the group's columns of B; the row of
+        B.
 
-
-def _saltelli(groups: Sequence[Sequence[int]], seed: int) -> _Draw:
-    """Draw blocks of rows: a row of a matrix A; for each group, this row with the group's columns of B; the row of B.
-
-    The method is that of Saltelli et al. (2010), with groups of correlated variables by Jacques et al. (2006). The
-    order is that of SALib. A and B are the halves of a Sobol sequence.
-    """
-    width, block = sum(map(len, groups)), len(groups) + 2
-    pairs = _sobol(2 * width, seed)
-
-    def draw(first: int, end: int) -> Array:
-        rows = np.arange(first, end)
-        start = first // block
-        both = pairs(start, (end - 1) // block + 1)[rows // block - start]
-        drawn = both[:, :width].copy()
-        indices = rows % block
-        for n, group in enumerate(groups):
-            taken = (indices == n + 1) | (indices == block - 1)
+        The method is that of Saltelli et al. (2010), with groups of correlated variables by Jacques et al. (2006). The
+        order is that of SALib. A and B are the halves of a Sobol sequence.
+        """
+        width, block = self._width, len(self._groups) + 2
+        rows, start = np.arange(first, end), first // block
+        both = self._sobol(start, (end - 1) // block + 1)[rows // block - start]
+        drawn, indices = both[:, :width].copy(), rows % block
+        for n, group in enumerate(self._groups):
+            of_b = (indices == n + 1) | (indices == block - 1)
             for column in group:
-                drawn[taken, column] = both[taken, width + column]
+                drawn[of_b, column] = both[of_b, width + column]
         return drawn
 
-    return draw
+    @cached_property
+    def _hypercube(self) -> Array:
+        return np.asarray(qmc.LatinHypercube(self._width, seed=self._plan.seed).random(self._runs))
 
+    def _latin_hypercube(self, first: int, end: int) -> Array:
+        return self._hypercube[first:end]
 
-def _latin_hypercube(width: int, seed: int, runs: int) -> _Draw:
-    sample = qmc.LatinHypercube(width, seed=seed).random(runs)
-    return lambda first, end: sample[first:end]
-
-
-def _random(width: int, seed: int) -> _Draw:
-    """Draw independent numbers; each run has its own place in the sequence of a generator that can jump."""
-
-    def draw(first: int, end: int) -> Array:
-        return np.random.Generator(np.random.PCG64(seed).advance(first * width)).random((end - first, width))
-
-    return draw
+    def _random(self, first: int, end: int) -> Array:
+        """Draw independent numbers; each run has its own place in the sequence of a generator that can jump."""
+        source = np.random.PCG64(self._plan.seed).advance(first * self._width)
+        return np.random.Generator(source).random((end - first, self._width))

@@ -36,8 +36,7 @@ def study_page(results: Results) -> str:
     reasons = [*_failures(runs)]
     grid = _grid(results)
     figures = [_figure(name, results, grid) for name in results.figures]
-    indices = _sensitivities(results) if plan["sampler"] == "saltelli" else {}
-    tables = {name: found for name, found in indices.items() if not isinstance(found, str)}
+    tables, no_indices = _sensitivities(results)
     rows = [row for found in tables.values() for row in found]
     outputs = results.outputs if len(results.failed) < len(runs) else ()
     return page(
@@ -48,7 +47,7 @@ def study_page(results: Results) -> str:
         grid=grid,
         rows=runs.reset_index(drop=True).head(_ROWS).to_dict("records"),
         more_rows=len(runs[_ROWS:]),
-        no_indices={name: found for name, found in indices.items() if isinstance(found, str)},
+        no_indices=no_indices,
         indices=tables,
         index_plots=[plots.indices(name, rows) for name, rows in tables.items()],
         is_vague=not all(row[f"{key}_tells"] for row in rows for key in ("S1", "ST")),
@@ -79,12 +78,10 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
     expression = results.plan["figures"][name]
     unit = read_expression(expression, results.units).unit
     plot = None
-    if there.size and not is_still:
-        plot = (
-            plots.over_grid(name, unit, expression, results, grid)
-            if grid
-            else plots.distribution(name, there, quantiles, unit, expression)
-        )
+    if there.size and not is_still and grid:
+        plot = plots.over_grid(name, unit, expression, results, grid)
+    elif there.size and not is_still:
+        plot = plots.distribution(name, there, quantiles, unit, expression)
     return {
         "name": name,
         "expression": expression,
@@ -95,7 +92,7 @@ def _figure(name: str, results: Results, grid: Sequence[str]) -> dict[str, Any]:
         "quantiles": quantiles,
         "mean": mean,
         "sd": sd,
-        "ends": (float(there.min()), float(there.max())) if there.size else None,
+        "ends": statistics(there, (0.0, 1.0))[0],
     }
 
 
@@ -105,22 +102,22 @@ def _is_constant(values: Any) -> bool:
         return bool(np.ptp(values) <= _CONSTANT * np.abs(values).max())
 
 
-def _sensitivities(results: Results) -> dict[str, Any]:
-    """Return the rows of Sobol indices by figure, or the reason why there are none."""
-    found: dict[str, Any] = {}
-    for figure in results.figures:
+def _sensitivities(results: Results) -> tuple[dict[str, Any], dict[str, str]]:
+    """Return the rows of Sobol indices by figure, and for the other figures the reason why there are none."""
+    found, reasons = dict[str, Any](), dict[str, str]()
+    for figure in results.figures if results.plan["sampler"] == "saltelli" else ():
         there = results.runs[figure].dropna().to_numpy(float)
         if there.size and _is_constant(there):
-            found[figure] = "does not vary"
+            reasons[figure] = "does not vary"
             continue
         try:
             rows = results.sensitivity(figure).sort_values("ST", ascending=False, kind="stable")
         except FileError as error:
-            found[figure] = str(error).removeprefix(f"{results.folder}: ")
+            reasons[figure] = str(error).removeprefix(f"{results.folder}: ")
         else:
             rows["S1_tells"], rows["ST_tells"] = (_tells(rows[key], rows[f"{key}_95"]) for key in ("S1", "ST"))
             found[figure] = (rows.round(3) + 0.0).reset_index(names="name").to_dict("records")  # without -0
-    return found
+    return found, reasons
 
 
 def _tells(index: "pd.Series[float]", half_width: "pd.Series[float]") -> "pd.Series[bool]":
@@ -139,13 +136,13 @@ def _parameter(name: str, column: "pd.Series[float]", plan: dict[str, Any], resu
     some = [f"{key} {number(value, 4)}".strip() for key, value in pairs]
     if len(some) > _NUMBERS:
         some[_NUMBERS:] = ["…"]
-    values = column.to_numpy(float)
+    least, median, greatest = statistics(column.to_numpy(float), (0.0, 0.5, 1.0))[0]
     return {
         "name": name,
         "planned": f"{kind}: {', '.join(some)}",
-        "least": float(values.min()),
-        "median": statistics(values, [0.5])[0][0],
-        "greatest": float(values.max()),
+        "least": least,
+        "median": median,
+        "greatest": greatest,
         "unit": results.units[name],
         "description": results.descriptions[name],
     }

@@ -79,19 +79,16 @@ def _do_tasks(work: Work, client: Client) -> None:
     seconds = _TASK  # of a run, by the last task; the first tasks have one run each
     spans, coming = dict[Any, Span](), as_completed(loop=client.loop)
 
-    def submit() -> None:
-        """Submit tasks until every thread has enough."""
-        threads = sum(client.nthreads().values()) or 1
-        while work.missing and len(spans) < _AHEAD * threads:
-            size = max(min(ceil(_TASK / seconds), ceil(work.left / threads)), ceil(_LEAST / seconds))
-            span = work.take(size)
-            future = client.submit(do_runs, work.study.key, span[0], work.design.rows(*span), pure=False)
-            spans[future] = span
-            coming.add(future)
-
     try:
-        submit()
-        for future in coming:
+        while work.missing or spans:
+            threads = sum(client.nthreads().values()) or 1
+            while work.missing and len(spans) < _AHEAD * threads:
+                size = max(min(ceil(_TASK / seconds), ceil(work.left / threads)), ceil(_LEAST / seconds))
+                first, end = work.take(size)
+                future = client.submit(do_runs, work.study.key, first, work.design.rows(first, end), pure=False)
+                spans[future] = first, end
+                coming.add(future)
+            future = next(coming)
             first, end = spans.pop(future)
             try:
                 rows: Rows = future.result()
@@ -102,7 +99,6 @@ def _do_tasks(work: Work, client: Client) -> None:
             work.write((first, end), rows)
             seconds = max(rows.seconds / (end - first), 1e-6)
             del future, rows  # otherwise they stay in memory
-            submit()
     finally:
         with suppress(Exception):  # a client that is closed raises
             client.cancel([*spans], force=True)
