@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from rov_fmu import Results, run_study
+from rov_fmu import Results
 from rov_fmu.cli import main
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.messages import FileError
@@ -144,15 +144,19 @@ same = "0*a_d_u"
 
 
 @pytest.mark.long
-def test_the_command_tells_the_warnings_and_the_results_keep_the_design(
+def test_sobol_indices_are_those_of_groups_in_closed_form_and_warnings_are_told(
     videoray_fmu: Path,
     tmp_path: Path,
     scheduler: str,
     monkeypatch: pytest.MonkeyPatch,
     capsys: pytest.CaptureFixture[str],
 ) -> None:
+    """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
+
+    If a_d_u and b_d_u were independent, they would have 0.60 of it.
+    """
     monkeypatch.setattr("rov_fmu.study.results.plots.inline_svg", lambda *_, **__: "")
-    plan = str(planned(tmp_path, videoray_fmu, 10))
+    plan = str(planned(tmp_path, videoray_fmu, 2560))
     assert main(["study", plan, "-o", str(tmp_path / "results"), "--scheduler", scheduler]) == 0
     results = Results(tmp_path / "results")
     assert results.warnings
@@ -161,15 +165,6 @@ def test_the_command_tells_the_warnings_and_the_results_keep_the_design(
     assert results.plan["vary_from"]["estimates"] == {
         name: {"value": value, "error": error} for name, (value, error, _) in ROWS.items()
     }
-
-
-@pytest.mark.long
-def test_sobol_indices_are_those_of_groups_in_closed_form(videoray_fmu: Path, tmp_path: Path, scheduler: str) -> None:
-    """The variance of a sum of normal numbers is the sum of the variances of its independent groups.
-
-    If a_d_u and b_d_u were independent, they would have 0.60 of it.
-    """
-    results = run_study(planned(tmp_path, videoray_fmu, 2560), tmp_path / "results", scheduler=scheduler)
     assert results.groups == (("a_d_u", "b_d_u"), ("a_d_w",), ("m_rov",))
     both = 0.5**2 + (2.0 * 0.3) ** 2 - 2.0 * 0.8 * 0.5 * (2.0 * 0.3)
     shares = np.array([both, 0.6**2, (4.0 * 0.05) ** 2])

@@ -90,7 +90,7 @@ TABLES = {
     '[keep]\noutputs = ["u"]\nevery = 0.1\nat = [0.5]': "keep: must have either every or at",
     '[keep]\noutputs = ["u"]\nat = [0.5, 0.5]': "keep.at = [0.5, 0.5]: must be times in ascending order",
     '[keep]\noutputs = ["u"]\nat = [-0.1]': "keep.at = [-0.1]: must be times from the start to the end",
-    '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must not be longer than a run",
+    '[keep]\noutputs = ["u"]\nevery = 2.0': "keep.every = 2.0: must be a multiple of step = 0.1, and within a run",
     '[keep]\noutputs = ["u"]\nevery = 0.25': "keep.every = 0.25: must be a multiple of step = 0.1",
     '[keep]\noutputs = ["u"]\nat = [0.5, 1.1]': "keep.at = [0.5, 1.1]: must be times from the start to the end",
 }
@@ -215,16 +215,18 @@ def test_angles_of_an_attitude_are_recorded_and_a_plan_is_the_same_whatever_does
     assert five != nine
 
 
-def test_mistakes_of_all_kinds_are_reported_at_once_and_nothing_is_written(
+def test_mistakes_of_a_plan_and_then_with_its_fmu_are_reported_at_once_and_nothing_is_written(
     tmp_path: Path, videoray_fmu: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     shutil.copy(videoray_fmu, tmp_path / "videoray.fmu")
-    (tmp_path / "u.csv").write_text("time,u_r\n0,much\n")
-    head = HEAD.replace("1.0", "0.95").replace("runs = 4\n", 'input_file = { path = "u.csv" }\n')
-    (tmp_path / "plan.toml").write_text(head + VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n')
-    assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
-    keys = [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()]
-    assert keys == ["stop_time", "runs", "inputs.u_l", "figures.end", "must"]
+    tail = VARY + "[inputs]\nu_l = 1.5\n" + '[figures]\nend = "q[-1]"\n'
+    for head, expected in (
+        (HEAD.replace("1.0", "0.95").replace("runs = 4\n", ""), ["stop_time", "runs"]),
+        (HEAD, ["inputs.u_l", "figures.end"]),
+    ):
+        (tmp_path / "plan.toml").write_text(head + tail)
+        assert main(["study", str(tmp_path / "plan.toml"), "-o", str(tmp_path / "results")]) == 2
+        assert [line.split(":")[2].split()[0] for line in capsys.readouterr().err.splitlines()] == expected
     assert not (tmp_path / "results").exists()
 
 

@@ -12,7 +12,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 from typing_extensions import Self
 
 from rov_fmu.io.file_kinds import PLAN, check_suffix
-from rov_fmu.io.messages import FileError
+from rov_fmu.io.messages import FileError, lines_on
 from rov_fmu.io.toml_file import (
     AS_TUPLE,
     NOT_BLANK,
@@ -322,17 +322,17 @@ def _whole(steps: float) -> bool:
 
 
 def load_plan(path: Path) -> Plan:
-    """Read a plan. Contradictions between its keys are left to `prepare`. Raises PlanError."""
+    """Read a plan. Raises PlanError, also with a line for each contradiction between its keys."""
     check_suffix(path, PLAN, PlanError)
     plan = read_checked(path, PLAN, Plan, PlanError)
-    if [plan.fmu, plan.vehicle, plan.system].count(None) != 2:
-        words = "must have one of fmu, vehicle and system"
-        raise PlanError(*(f"{path}: {line}" for line in (words, *check_plan(plan))))
+    if wrong := [*_contradictions(plan)]:
+        raise PlanError(*lines_on(path, wrong))
     return plan
 
 
-def check_plan(plan: Plan) -> Iterator[str]:
-    """Yield a line for each contradiction between keys of the plan."""
+def _contradictions(plan: Plan) -> Iterator[str]:
+    if [plan.fmu, plan.vehicle, plan.system].count(None) != 2:
+        yield "must have one of fmu, vehicle and system"
     if plan.stop_time <= plan.start_time:
         yield key_line("stop_time", f"must be after start_time = {plan.start_time:g}", plan.stop_time)
     elif not _whole((plan.stop_time - plan.start_time) / plan.step):
@@ -341,8 +341,12 @@ def check_plan(plan: Plan) -> Iterator[str]:
         )
     elif plan.steps > _MOST_STEPS:
         yield key_line("step", f"must divide a run into at most {_MOST_STEPS} steps", plan.step)
-    elif plan.keep:
-        yield from _unreachable(plan, plan.keep)
+    elif keep := plan.keep:
+        if keep.every is not None and plan.step_at(plan.start_time + keep.every) is None:
+            yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}, and within a run", keep.every)
+        if None in [plan.step_at(time) for time in keep.at or ()]:
+            rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
+            yield key_line("keep.at", rule, [*(keep.at or ())])
     if plan.sampler == "grid" and plan.runs is not None:
         yield key_line("runs", "a grid has one run for each point: leave this key out", plan.runs)
     if plan.sampler == "grid" and plan.points > _MOST_RUNS:
@@ -351,16 +355,3 @@ def check_plan(plan: Plan) -> Iterator[str]:
         yield "runs: this key is missing"
     if not plan.keep and not plan.figures:
         yield "must have [keep] or [figures]. Otherwise nothing of a run is stored"
-
-
-def _unreachable(plan: Plan, keep: Keep) -> Iterator[str]:
-    """Yield a line if a time to keep is not the end of a step."""
-    if keep.every is not None and not _whole(keep.every / plan.step):
-        yield key_line("keep.every", f"must be a multiple of step = {plan.step:g}", keep.every)
-    elif keep.every is not None and keep.every > plan.stop_time - plan.start_time:
-        yield key_line("keep.every", "must not be longer than a run", keep.every)
-    for time in keep.at or ():
-        if plan.step_at(time) is None:
-            rule = f"must be times from the start to the end, and multiples of step = {plan.step:g} after it"
-            yield key_line("keep.at", rule, list(keep.at or ()))
-            return

@@ -11,7 +11,7 @@ from typing_extensions import Self
 
 from rov_fmu.fmus.variable import Variable
 from rov_fmu.io.csv_table import read_series
-from rov_fmu.io.messages import FileError, lines_on, shown
+from rov_fmu.io.messages import lines_on, shown
 from rov_fmu.io.toml_file import key_line
 from rov_fmu.study.plan.expression import CONSTANTS
 from rov_fmu.study.plan.expression import TIME as TIMES
@@ -26,7 +26,6 @@ from rov_fmu.study.plan.plan import (
     InputSignal,
     Plan,
     PlanError,
-    check_plan,
 )
 from rov_fmu.study.plan.sampling import Design, some_of
 from rov_fmu.vehicle.shipped import named_in
@@ -64,34 +63,25 @@ class Study:
 
 
 def prepare(plan: Plan, path: Path, model: Model) -> tuple[Study, Design]:
-    """Check that a plan, read from `path`, fits an FMU. Raises PlanError with every reason."""
+    """Check that a plan, read from `path`, fits an FMU. Raises FileError with every reason."""
     has = model.variables
     vehicle = load_vehicle(named_in(path, "vary_from", plan.vary_from, PlanError)) if plan.vary_from else None
     design = Design(plan, has, vehicle)
-    own, unread = [*check_plan(plan)], list[str]()
-    from_file, lines = dict[str, InputSignal](), list[int]()
-    try:
-        if plan.input_file:
-            lines = _read_inputs(plan, path, has, from_file)
-    except FileError as error:
-        unread = [str(error)]
-    times = np.zeros(0) if own else plan.times
-    wrong = lines_on(path, [*own, *design.check(plan.inputs | from_file), *_check(plan, has, design.names, times)])
-    if plan.input_file:
-        file = path.parent / plan.input_file.path
-        unread += [f"{file}: {line}" for line in _check_rows(plan, has, from_file, lines)]
-    if wrong or unread:
-        raise PlanError(*wrong, *unread)
-    whole = plan.model_copy(update={"inputs": {**plan.inputs, **from_file}})
-    middles = times[:-1] + 0.5 * plan.step
-    inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in whole.inputs.items()}
+    from_file, lines = _read_inputs(plan, path, has)
+    wrong = lines_on(path, [*design.check(plan.inputs | from_file), *_check(plan, has, design.names)])
+    wrong += _check_rows(plan, path, has, from_file, lines)
+    if wrong:
+        raise PlanError(*wrong)
+    plan = plan.model_copy(update={"inputs": plan.inputs | from_file})
+    middles = plan.times[:-1] + 0.5 * plan.step
+    inputs = {name: _sampled(signal, middles, has[name].start) for name, signal in plan.inputs.items()}
     named = {name for text in plan.figures.values() for name in read_expression(text).names} & has.keys()
     angles = ("phi", "theta") if {"phi", "theta", "psi"} <= has.keys() - {*design.names} else ()
     recorded = [*dict.fromkeys([*plan.kept, *sorted({*named, *angles} - {*design.names})])]
     shown = [has[name] for name in (*design.names, *recorded)]
     about = {
         "runs": design.runs,
-        "plan": whole.mark | design.mark,
+        "plan": plan.mark | design.mark,
         "fmu": model.digest,
         "engine": "lanes" if model.vehicle else "fmu",
         "vehicle": plan.vehicle,
@@ -117,23 +107,25 @@ def _without_inputs(model: Model, given: Collection[str]) -> Iterator[str]:
         yield f"the plan gives no input of the FMU ({some_of(names)}): all keep their start values"
 
 
-def _read_inputs(plan: Plan, path: Path, has: Mapping[str, Variable], found: dict[str, InputSignal]) -> list[int]:
-    """Read the inputs in the CSV file of the plan, and return the line of each row. Raises FileError."""
-    assert plan.input_file
-    table = read_series(path.parent / plan.input_file.path, lambda name: None if name in has else unknown(name, has))
+def _read_inputs(plan: Plan, path: Path, has: Mapping[str, Variable]) -> tuple[dict[str, InputSignal], Sequence[int]]:
+    """Return the inputs in the CSV file of the plan, and the line of each row. Raises FileError."""
+    if not plan.input_file:
+        return {}, ()
+    file, between = path.parent / plan.input_file.path, plan.input_file.between
+    table = read_series(file, lambda name: None if name in has else unknown(name, has))
     (_, times), *columns = table.items()
+    found = {}
     for name, values in columns:
-        points = tuple(zip(times, values, strict=True))
-        held = plan.input_file.between == "steps" or not has[name].is_continuous
-        found[name] = InputSignal(steps=points) if held else InputSignal(ramps=points)
-    return [*table.lines]
+        kind = between if has[name].is_continuous else "steps"
+        found[name] = InputSignal.model_validate({kind: tuple(zip(times, values, strict=True))})
+    return found, table.lines
 
 
 # ---- Checks ----------------------------------------------------------------------------------------------------------
 
 
-def _check(plan: Plan, has: Mapping[str, Variable], varied: Collection[str], times: Array) -> Iterator[str]:
-    """Yield a line for each part of the plan that does not fit, but for what varies; `times` is empty if unknown."""
+def _check(plan: Plan, has: Mapping[str, Variable], varied: Collection[str]) -> Iterator[str]:
+    """Yield a line for each part of the plan that does not fit, but for what varies."""
     for name, value in plan.set.items():
         if reason := unsettable(name, has) or has[name].wrong(value):
             yield key_line(f"set.{name}", reason, value)
@@ -151,14 +143,14 @@ def _check(plan: Plan, has: Mapping[str, Variable], varied: Collection[str], tim
         elif strange:
             reason = f"{shown(strange[0])} is neither a function nor a variable of the FMU that is a number"
             yield key_line(key, meaning(strange[0]) or reason, text)
-        elif times.size and (reason := unusable(text, has, varied, times)):
+        elif reason := unusable(text, has, varied, plan.times):
             yield key_line(key, reason, text)
     if taken := {RUN, TIME} & {*plan.kept}:
         yield key_line("keep.outputs", f"the results have another column {taken.pop()}")
 
 
 def _check_rows(
-    plan: Plan, has: Mapping[str, Variable], from_file: Mapping[str, InputSignal], lines: Sequence[int]
+    plan: Plan, path: Path, has: Mapping[str, Variable], from_file: Mapping[str, InputSignal], lines: Sequence[int]
 ) -> Iterator[str]:
     """Yield a line for each input in a file that does not fit, with its column and the line of its row."""
     for name, signal in from_file.items():
@@ -168,7 +160,7 @@ def _check_rows(
             if n is not None:
                 time, value = signal.points[n]
                 where = f"line {lines[n]}, {where} = {value:g} at {time:g} s"
-            yield f"{where}: {reason}"
+            yield f"{path.parent / str(plan.input_file and plan.input_file.path)}: {where}: {reason}"
 
 
 def _misfits(

@@ -15,12 +15,11 @@ import numpy.typing as npt
 from rov_fmu.bridges.system.connections import Connection
 from rov_fmu.bridges.system.half_step import half_step
 from rov_fmu.bridges.system.master import Master, Name, busy, folders_of
-from rov_fmu.bridges.system.part import Part
 from rov_fmu.bridges.system.ssp import read_ssp
 from rov_fmu.fmus.description import budget
 from rov_fmu.fmus.instance import RunError
 from rov_fmu.fmus.unpacking import unpack_fmu
-from rov_fmu.fmus.variable import Value, Variable
+from rov_fmu.fmus.variable import Value
 from rov_fmu.io.child_process import ChildError, ChildProcess
 from rov_fmu.io.interrupts import temporary_folder
 from rov_fmu.io.reading import read_bytes
@@ -56,17 +55,23 @@ def split(name: str) -> Name:
 
 
 def read_system(path: Path) -> SystemModel:
-    """Read a system. Raises FileError."""
+    """Read a system. Its variables have their start values there; one that is connected cannot be set.
+
+    Raises FileError.
+    """
     system = read_ssp(path)
     connected = {one.end for one in system.connections}
-    variables = {
-        f"{component}.{name}": _variable(
-            component, part, name, system.values[component], (component, name) in connected
-        )
-        for component, part in system.parts.items()
-        for name in part.variables
-        if part.variables[name].kind != "String"
-    }
+    variables = {}
+    for component, part in system.parts.items():
+        for own in (one for one in part.variables.values() if one.kind != "String"):
+            is_connected, name = (component, own.name) in connected, f"{component}.{own.name}"
+            variables[name] = replace(
+                own,
+                name=name,
+                start=float(system.values[component].get(own.name, own.start)),
+                can_be_set=own.can_be_set and not is_connected,
+                causality="connected" if is_connected else own.causality,
+            )
     return SystemModel(
         name=path.name,
         content=read_bytes(path),
@@ -74,18 +79,6 @@ def read_system(path: Path) -> SystemModel:
         sources=system.sources,
         values=system.values,
         connections=system.connections,
-    )
-
-
-def _variable(component: str, part: Part, name: str, values: Mapping[str, Value], connected: bool) -> Variable:
-    """Return a variable of a component with its start value in the system. One that is connected cannot be set."""
-    own = part.variables[name]
-    return replace(
-        own,
-        name=f"{component}.{name}",
-        start=float(values.get(name, own.start)),
-        can_be_set=own.can_be_set and not connected,
-        causality="connected" if connected else own.causality,
     )
 
 
