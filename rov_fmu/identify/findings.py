@@ -78,6 +78,8 @@ _ODD = 3.0
 _COUPLE = "Write coupling = true into [body] of rov.toml, and log the velocity. Or "
 """What to do about a motion that turns the vehicle where the model leaves its moment out."""
 _SURE = 0.99
+_APART = "{spot}leave yaw out of {others} by [leave_out] in rov.toml{alone}"
+"""How to tell yaw from a motion that turns the vehicle."""
 _LATER = 1.0
 """A disturbance that is seen before this time, s, is taken to act from the start."""
 # ---- Kinds and sentences ---------------------------------------------------------------------------------------------
@@ -117,8 +119,7 @@ _OWN: Mapping[Heading, Mapping[str, str]] = {
         ),
         "unlogged motion": (
             "{axes}: no log shows how the vehicle moves ahead and sideways. Such a motion turns a vehicle (the Munk "
-            "moment), and is the likely cause. {coupling}{spot}leave yaw out of {others} by [leave_out] in "
-            "rov.toml{alone}"
+            "moment), and is the likely cause. {coupling}" + _APART
         ),
         **{kind: one.sentence for kind, one in HYPOTHESES.items()},
         "velocity over ground": "{what} in {files}{since}. Check for waves and a changing current",
@@ -380,11 +381,18 @@ def _known_to(width: float) -> str:
 
 
 def repairs(identification: Identification) -> list[str]:
-    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test."""
+    """Return what to do about each log that does not fit the others, in sentences. It comes before any other test.
+
+    A motion that no log shows, and that turns the vehicle, spoils all axes that share thrusters with yaw.
+    """
+    unlogged = ""
+    if any(result.verdict.word == "do not use" for result in identification.axes):
+        for finding in _on_unlogged_motion(identification):
+            unlogged = _APART.format(**finding.words)
     odd = grouped(_disagreements(identification))
     others = len(identification.folder.logs) - len(odd)
     rest = f": it disagrees with the other {f'{others} logs' if others > 1 else 'log'}" if others > 0 else ""
-    return [
+    return [f"{unlogged[:1].upper()}{unlogged[1:]}. Then identify again."] * bool(unlogged) + [
         f"Repair {file} or take it out of the folder{rest}. {' '.join(reasons)} Then identify again."
         for file, reasons in odd.items()
     ]
@@ -394,8 +402,10 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
     """Yield each log that does not fit the others, with the reason as a sentence: a probable slip, motion that the
     others predict worse than no change, or a slow force that is much larger than in the others.
 
-    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one.
+    Where half of the logs are predicted worse than no change, the model is wrong, and no log is the odd one. Nor is one
+    whose unknown torque an unlogged motion explains.
     """
+    explained = {YAW} if any(_on_unlogged_motion(identification)) else {*()}
     slipped = {(slip.file, slip.quantity) for slip in identification.slips}
     for slip in identification.slips:
         yield slip.file, f"Check the {slip.quantity}: {slip.words}?"
@@ -417,6 +427,7 @@ def _disagreements(identification: Identification) -> Iterator[tuple[str, str]]:
         if (
             d.slow.acts_as == "force"
             and d.axis
+            and d.axis not in explained
             and d.kept
             and not d.cause
             and d.share > MOST_UNKNOWN
@@ -562,7 +573,7 @@ def _on_axis(identification: Identification, result: AxisResult) -> Iterator[Fin
         yield Finding("do not use", axis)
     if result.structure > ALARM:
         yield about("", "structure", axis, ratio=significant(result.structure, 2))
-    if result.structure > USUAL and result.axis is YAW:
+    if result.axis is YAW:
         yield from _on_unlogged_motion(identification)
     if may_rock(identification.folder, result.axis):
         yield Finding("rocking", axis)
@@ -637,7 +648,10 @@ def may_rock(folder: Folder, axis: Axis) -> bool:
 
 
 def _on_unlogged_motion(identification: Identification) -> Iterator[Finding]:
-    """Yield a finding if yaw is tested in dives with a push ahead or sideways, and none shows the motion there."""
+    """Yield a finding if the model does not explain yaw in dives with a push ahead or sideways, and none shows the
+    motion there."""
+    if not any(result.axis is YAW and result.structure > USUAL for result in identification.axes):
+        return
     layout, alone, others = identification.vehicle.layout, set[str](), set[str]()
     for dive in identification.folder.logs:
         shown = {channel.quantity.axis for channel in dive.channels if not channel.unused}

@@ -147,6 +147,8 @@ def _axis(
     # The thrust of a wrench is the largest force in the logs, if there is any.
     is_told = not vehicle.layout.has_wrench or is_commanded(axis, vehicle.layout, tests.folder.logs)
     files = [one.file for one in fit.objective.logs if any(m.axis is axis for m in one.measured)]
+    driving = [(one.log.whole_file, len(one.driven)) for one in fit.objective.logs if axis in one.driven]
+    mixed = dict.fromkeys(file for file, count in driving if count > 1)
     slow = [*largest(d for d in found.disturbances if d.concerns(axis) and d.file in files)]
     is_steady = all(d.share <= MOST_GAIN for d in slow if d.changes_thrust and d.kept)
     against, push = found.against, assess.push_of_thrusters(vehicle, found.vehicle, axis)
@@ -181,7 +183,8 @@ def _axis(
         slips=[s for s in found.slips if s.file in files],
         misfits=misfits,
         inertia=most_inertia(vehicle, axis, coefficients.get(axis.coefficient("beta"))),
-        is_alone=all(len(one.driven) == 1 for one in fit.objective.logs if axis in one.driven),
+        alone=[*dict.fromkeys(file for file, _ in driving if file not in mixed)],
+        mixed=[*mixed],
         is_assumed=bool(tests.description.assumed),
         difference=fit.difference if is_other else 0.0,
     )

@@ -549,8 +549,10 @@ class AxisResult:
     """The logs whose motors are not the thrusters along the axis."""
     inertia: float = inf
     """The upper end of the interval of the effective inertia, relative to that of the vehicle in air."""
-    is_alone: bool = False
-    """True if each log that drives the axis drives no other one."""
+    alone: Sequence[str] = ()
+    """The logs that drive no other axis."""
+    mixed: Sequence[str] = ()
+    """The logs that drive other axes, too."""
     is_assumed: bool = False
     """True if nobody described the vehicle, so that its mass and its thrusters are those of a base."""
     difference: float = 0.0

@@ -21,7 +21,7 @@ from rov_fmu.identify.result import (
     relative_error,
     score_of,
 )
-from rov_fmu.io.messages import listed
+from rov_fmu.io.messages import MOST, first_of, listed
 from rov_fmu.io.numbers import percent, significant
 from rov_fmu.vehicle.description import Word
 from rov_fmu.vehicle.vehicle import Vehicle
@@ -56,10 +56,8 @@ class Rule:
     """True if a value below the limit is beyond it."""
     is_told: bool = False
     """True if the reason is told even of a good model, as what it rests on."""
-    remedy: str = ""
-    """The one thing to do about it, as a sentence."""
-    is_done: Callable[[AxisResult], bool] = lambda _: False
-    """True where that was done already."""
+    remedy: str | Callable[[AxisResult], str] = ""
+    """The one thing to do about it, as a sentence; empty where that was done already."""
 
     def word(self, value: float) -> Word:
         """Return the best verdict that a value allows."""
@@ -125,6 +123,20 @@ def _known(e: AxisResult, *of: str) -> dict[str, str]:
     return {"command": f"{answer.command:.0%}", "known": known}
 
 
+def _apart(e: AxisResult) -> str:
+    """Return how to tell an axis from what drives the vehicle at the same time."""
+    if not e.mixed:
+        return ""
+    leave = f"eave it out of {listed(first_of(e.mixed, MOST))} by [leave_out] in rov.toml"
+    return f"L{leave}, because it is alone in {listed(e.alone)}." if e.alone else f"Log this axis alone, and l{leave}."
+
+
+def _faster(e: AxisResult) -> str:
+    """Return how to see what is fast."""
+    rate = max((p.rate for p in e.predictions), default=0.0)
+    return "" if rate >= _FAST else "Log at 20 Hz or more, with steps of the command from rest."
+
+
 RULES = (
     Rule(
         "logs with other motors",
@@ -181,8 +193,7 @@ RULES = (
         WRONG,
         "The model's errors are {size} times what noise explains, so it lacks something.",
         unit="1",
-        remedy="Log this axis alone, and leave it out of the other logs by [leave_out] in rov.toml.",
-        is_done=lambda e: e.is_alone,
+        remedy=_apart,
     ),
     Rule(
         "errors R₂ of the fit over 2 s",
@@ -191,8 +202,7 @@ RULES = (
         None,
         "Over 2 s, the model's errors are {size} times the noise, so it lacks something fast.",
         unit="1",
-        remedy="Log at 20 Hz or more, with steps of the command from rest.",
-        is_done=lambda e: max((p.rate for p in e.predictions), default=0.0) >= _FAST,
+        remedy=_faster,
     ),
     Rule(
         "unknown disturbances, relative to thrust or velocity",
@@ -294,8 +304,8 @@ RULES = (
 def verdict(e: AxisResult) -> Verdict:
     """Return the worst word of all rules, with a reason for each doubt, the worst first, and the tested commands.
 
-    What to do is the remedy of the worst doubt about which it was not done already; of a mere *usable*, none may be
-    left: the intervals allow for its doubts.
+    What to do is the first remedy that was not followed already. None may be left of a mere *usable*: the intervals
+    allow for its doubts.
     """
     values = sorted(((rule, rule.value(e)) for rule in RULES), key=lambda pair: -WORDS.index(pair[0].word(pair[1])))
     word = values[0][0].word(values[0][1])
@@ -306,8 +316,9 @@ def verdict(e: AxisResult) -> Verdict:
     ]
     if word != WORDS[-1] and not is_whole(e.tested):
         reasons.append(f"It holds for commands {tested_in_words(e.tested)}.")
-    doubts = (rule for rule, value in values if rule.word(value) != "good")
-    return Verdict(word, tuple(reasons), next((rule.remedy for rule in doubts if not rule.is_done(e)), ""))
+    remedies = [rule.remedy for rule, value in values if rule.word(value) != "good"]
+    told = (one if isinstance(one, str) else one(e) for one in remedies)
+    return Verdict(word, tuple(reasons), next(filter(None, told), ""))
 
 
 def most_inertia(vehicle: Vehicle, axis: Axis, beta: IdentifiedCoefficient | None) -> float:

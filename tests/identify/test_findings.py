@@ -121,6 +121,10 @@ def turning(*names: str, along: Axis = SURGE) -> Identification:
 def test_a_turn_on_the_spot_that_is_logged_is_not_asked_for_again() -> None:
     moving, turning_alone = turning("heading"), turning("heading", along=YAW)
     (asked,) = said(moving, "unlogged motion")
+    assert not repairs(moving)
+    bad = [replace(moving.axes[0], verdict=Verdict("do not use", ())), *moving.axes[1:]]
+    (first,) = repairs(replace(moving, axes=tuple(bad)))
+    assert first.startswith("Turn on the spot in a log of its own, and leave yaw out of dive.csv by [leave_out]")
     assert "turn on the spot in a log of its own, and leave yaw out of dive.csv" in asked
     assert said(turning_alone, "unlogged motion") == []
     spot = replace(turning_alone.folder.logs[0], file="spot.csv (from 41 s)")

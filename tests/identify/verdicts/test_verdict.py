@@ -80,11 +80,17 @@ def test_a_verdict_has_a_reason_for_each_doubt(changes: dict[str, Any], word: st
 
 
 def test_what_was_done_already_is_not_asked_for_again() -> None:
-    doubtful = AxisResult(HEAVE, **USUAL, structure=2.0, soon=2.0)
+    doubtful = AxisResult(HEAVE, **USUAL, structure=2.0, soon=2.0, mixed=["a.csv", "b.csv"])
+    alone = replace(doubtful, alone=["c.csv"])
+    apart = replace(alone, mixed=())
     frequent = [replace(DEPTH, time=np.arange(len(DEPTH.time)) / 20.0)]
-    asked = verdict(doubtful), verdict(replace(doubtful, is_alone=True))
-    done = verdict(replace(doubtful, is_alone=True, predictions=frequent))
-    assert [one.remedy[:18] for one in asked] == ["Log this axis alon", "Log at 20 Hz or mo"]
+    leave = "eave it out of a.csv and b.csv by [leave_out] in rov.toml"
+    assert [verdict(one).remedy for one in (doubtful, alone, apart)] == [
+        f"Log this axis alone, and l{leave}.",
+        f"L{leave}, because it is alone in c.csv.",
+        "Log at 20 Hz or more, with steps of the command from rest.",
+    ]
+    done = verdict(replace(apart, predictions=frequent))
     assert (done.word, done.remedy) == ("usable", "")
 
 
