@@ -2,10 +2,11 @@
 
 import json
 from bisect import bisect_right
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from pythonfmu import Boolean, Fmi2Causality, Fmi2Variability, Real
+from pythonfmu import Boolean, DefaultExperiment, Fmi2Causality, Fmi2Variability, Real
 
 Variables = dict[str, tuple[str, float | bool, str, str]]
 """Causality, start value, unit and description by name."""
@@ -23,9 +24,10 @@ def shape_of(arguments: dict[str, Any]) -> dict[str, Any]:
     return shape
 
 
-def register(slave: Any, variables: Variables, parameters: str = "tunable") -> None:
-    """Give a slave its variables."""
-    slave.variables = variables
+def register(slave: Any, variables: Variables, parameters: str = "tunable", step: float = 0.02) -> None:
+    """Give a slave its variables, and say of what step (s) its authors think."""
+    slave.author, slave.variables = "rov-fmu", variables
+    slave.default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=step)
     for name, (causality, start, _, text) in variables.items():
         setattr(slave, name, start)
         kind, changes = (Boolean, "discrete") if start is False else (Real, "continuous")
@@ -38,6 +40,20 @@ def check(slave: Any) -> None:
     for name, (low, high) in slave.limits.items():
         if not low <= getattr(slave, name) <= high:
             raise ValueError(f"{name} must be from {low:g} to {high:g}: {getattr(slave, name):g}")
+
+
+def add_places(slave: Any, shape: dict[str, Any], place: Callable[[str], Variables]) -> Variables:
+    """Give a slave a place in the water for each whom it serves, with the terminals `places`; return the variables.
+
+    The names of all but the first place end with the name of whom it serves.
+    """
+    slave.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
+    variables: Variables = {}
+    for suffix in slave.suffixes:
+        variables |= place(suffix)
+        for port, names in slave.places:
+            slave.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
+    return variables
 
 
 def profile(levels: int, causality: str) -> Variables:

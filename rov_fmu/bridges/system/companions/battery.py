@@ -8,7 +8,7 @@ a resistance. By Peukert's law, a current I empties it in the time H (C / (H I))
 from math import sqrt
 from typing import ClassVar
 
-from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from rov_fmu.bridges.system.companions._common import Variables, check, register
@@ -41,9 +41,7 @@ VARIABLES: Variables = {
 class Battery(Fmi2Slave):  # type: ignore[misc]
     """The slave. It starts full, without load."""
 
-    author = "rov-fmu"
     description = "A battery: from electric power or thrusts to the voltage"
-    default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.05)
     terminals = (("electric", ("electric_power",)), ("battery", ("voltage",)))
     limits: ClassVar = {
         "E_full": (0.01, 1e5),
@@ -69,7 +67,7 @@ class Battery(Fmi2Slave):  # type: ignore[misc]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
-        register(self, VARIABLES)
+        register(self, VARIABLES, step=0.05)
 
     def exit_initialization_mode(self) -> None:
         """Begin full. Raises ValueError for a battery that cannot be."""

@@ -12,9 +12,19 @@ from bisect import bisect_right
 from math import cos, sin
 from typing import ClassVar
 
-from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu import Fmi2Slave
 
-from rov_fmu.bridges.system.companions._common import LEVELS, WATER, Variables, at, check, profile, register, shape_of
+from rov_fmu.bridges.system.companions._common import (
+    LEVELS,
+    WATER,
+    Variables,
+    add_places,
+    at,
+    check,
+    profile,
+    register,
+    shape_of,
+)
 
 # name: causality, start, unit, description
 VARIABLES: Variables = {
@@ -38,9 +48,7 @@ Rows = list[list[float]]
 class Current(Fmi2Slave):  # type: ignore[misc]
     """The slave. Its outputs are those of the end of a step, at the depth of the vehicle when the step began."""
 
-    author = "rov-fmu"
     description = "A current that depends on depth and time"
-    default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
     columns = ("time", "z", "V_N", "V_E", "V_D")
     """Those of a file, of which V_D may be left out. Its rows are those of shape.json, by their times."""
     places = (("pose", ("z",)), ("current", ("V_N", "V_E", "V_D")))
@@ -53,21 +61,17 @@ class Current(Fmi2Slave):  # type: ignore[misc]
     exponent: float
     rise: float
     seabed: float
+    suffixes: list[str]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
         shape = shape_of(arguments)
         self.times: list[float] = [time for time, _ in shape.get("rows", ())]
         self.profiles: list[Rows] = [rows for _, rows in shape.get("rows", ())]
-        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
         self.levels = profile(shape.get("levels", 0), "output")
-        variables = place("") | VARIABLES | self.levels
         self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = [("profile", [*self.levels], ())]
-        for suffix in self.suffixes:
-            variables |= place(suffix)
-            for port, names in self.places:
-                self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
-        register(self, variables)
+        places = add_places(self, shape, place)
+        register(self, place("") | VARIABLES | self.levels | places)
 
     def exit_initialization_mode(self) -> None:
         """Begin with the water at the start. Raises ValueError for a current that cannot be."""

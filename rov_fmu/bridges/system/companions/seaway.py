@@ -15,13 +15,14 @@ from math import cos, exp, pi, sin, sqrt, tanh
 from random import Random
 from typing import ClassVar
 
-from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu import Fmi2Slave
 
 from rov_fmu.bridges.system.companions._common import (
     ACCELERATION,
     DIRECTIONS,
     VELOCITY,
     Variables,
+    add_places,
     check,
     register,
     shape_of,
@@ -71,9 +72,7 @@ def place(suffix: str) -> Variables:
 class Seaway(Fmi2Slave):  # type: ignore[misc]
     """The slave."""
 
-    author = "rov-fmu"
     description = "A seaway: linear waves with a JONSWAP spectrum"
-    default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
     places = (("pose", PLACE), ("current", VELOCITY), ("waves", (*ACCELERATION, "elevation")))
     """The terminals that each vehicle has for itself; those of all but the first end with its name."""
     behind = "steady"
@@ -99,20 +98,17 @@ class Seaway(Fmi2Slave):  # type: ignore[misc]
     seabed: float
     rise: float
     step: float
+    suffixes: list[str]
 
     def __init__(self, **arguments: object) -> None:
         super().__init__(**arguments)
         self.before: dict[str, list[float]] = {}
         self.waves: list[tuple[float, ...]] = []
         shape = shape_of(arguments)
-        self.suffixes = ["", *(f"_{name}" for name in shape.get("places", ()))]
         self.lines = {name: [f"_{name}_{n}" for n in range(count)] for name, count in shape.get("lines", {}).items()}
-        variables = place("") | VARIABLES
         self.terminals: list[tuple[str, list[str], tuple[str, ...]]] = []
+        variables = place("") | VARIABLES | add_places(self, shape, place)
         for suffix in self.suffixes:
-            variables |= place(suffix)
-            for port, names in self.places:
-                self.terminals.append((f"{port}{suffix}", [f"{name}{suffix}" for name in names], names))
             self.terminals.append((f"steady{suffix}", [f"{name}{suffix}" for name in STEADY], VELOCITY))
         for line, suffixes in self.lines.items():
             for port, some in (("pose", PLACE), ("waves", (*VELOCITY, *ACCELERATION))):

@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import ClassVar
 
-from pythonfmu import DefaultExperiment, Fmi2Slave
+from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
 from rov_fmu.bridges.system.companions._common import (
@@ -106,9 +106,7 @@ Line LineType NodeA NodeB UnstrLen NumSegs Outputs
 class Tether(Fmi2Slave):  # type: ignore[misc]
     """The slave."""
 
-    author = "rov-fmu"
     description = "A tether between two points in flowing water (MoorDyn)"
-    default_experiment = DefaultExperiment(start_time=0.0, stop_time=60.0, step_size=0.02)
     needs = "moordyn"
     points = tuple(ENDS)
     nodes = NODES
@@ -149,7 +147,7 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
                 self._begin(places, levels, h)
             own, moordyn = self.__dict__, self.moordyn
             nodes = moordyn.ExternalWaveKinGetCoordinates(self.system)  # those of the line, then of the ends
-            water, acceleration = [current(levels, -z) for _, _, z in nodes], [[0.0, 0.0, 0.0] for _ in nodes]
+            water, acceleration = [turned(at(levels, -z)) for _, _, z in nodes], [[0.0, 0.0, 0.0] for _ in nodes]
             for n in self.told:
                 waves = self._of_water(VELOCITY, n)
                 water[n] = [steady + wave for steady, wave in zip(water[n], waves, strict=True)]
@@ -160,13 +158,13 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
             self.log(f"MoorDyn: {error}", Fmi2Status.error)
             return False
         for n, end in enumerate(ENDS):
-            x, y, z = forces[3 * n : 3 * n + 3]
-            own |= {f"F_N_{end}": x, f"F_E_{end}": -y, f"F_D_{end}": -z, f"tension_{end}": hypot(x, y, z)}
+            F = turned(forces[3 * n : 3 * n + 3])
+            own |= {f"F_{d}_{end}": x for (d, _, _), x in zip(AXES, F, strict=True)} | {f"tension_{end}": hypot(*F)}
         line = moordyn.GetLine(self.system, 1)
         for numbers, apart, mark in ((range(SHOWN), SEGMENTS // (SHOWN - 1), ""), (self.told, 1, "p")):
             for n in numbers:
-                x, y, z = moordyn.GetLineNodePos(line, n * apart)
-                own |= {f"x_{mark}{n}": x, f"y_{mark}{n}": -y, f"z_{mark}{n}": -z}
+                at_node = turned(moordyn.GetLineNodePos(line, n * apart))
+                own |= {f"{x}_{mark}{n}": value for (_, x, _), value in zip(AXES, at_node, strict=True)}
         return True
 
     def terminate(self) -> None:
@@ -228,16 +226,14 @@ class Tether(Fmi2Slave):  # type: ignore[misc]
 
     def _of_water(self, names: Sequence[str], n: int) -> list[float]:
         """Return a vector of the water in waves at a node in the frame of MoorDyn."""
-        north, east, down = (getattr(self, f"{name}_p{n}") for name in names)
-        return [north, -east, -down]
+        return turned([getattr(self, f"{name}_p{n}") for name in names])
 
     def _of_ends(self, axes: str, name: str) -> list[float]:
         """Return a vector of both ends in the frame of MoorDyn."""
-        signs = (1.0, -1.0, -1.0)
-        return [sign * getattr(self, name.format(d, end)) for end in ENDS for d, sign in zip(axes, signs, strict=True)]
+        return [x for end in ENDS for x in turned([getattr(self, name.format(d, end)) for d in axes])]
 
 
-def current(levels: list[list[float]], depth: float) -> list[float]:
-    """Return the velocity of the water at a depth in the frame of MoorDyn, on straight lines between the levels."""
-    V_N, V_E, V_D = at(levels, depth)
-    return [V_N, -V_E, -V_D]
+def turned(vector: Sequence[float]) -> list[float]:
+    """Return a vector north, east, down in the frame of MoorDyn, or one in this frame north, east, down."""
+    x, y, z = vector
+    return [x, -y, -z]
