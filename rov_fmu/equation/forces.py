@@ -18,9 +18,11 @@ from .catalogue import (
     HEADING,
     HEAVE,
     OUT_OF_WATER,
+    PITCH,
     POINT,
     POSITION,
     REVERSE,
+    ROLL,
     YAW,
     Axis,
     cross_name,
@@ -59,6 +61,7 @@ STEERING = Effect("steering", "the fins")
 POINTS = Effect("points", "the forces at points")
 WAVES = Effect("waves", "the acceleration of the water")
 AT_SURFACE = Effect("surface", "the surface, above which buoyancy and thrust fade out")
+KINEMATICS = Effect("kinematics", "the kinematics, which are no force")
 EXPECTED = (LAG, DEAD_BAND, DEAD_TIME, ADVANCE)
 """The effects that a reader expects of thrusters, and is told about where a model lacks them."""
 
@@ -260,13 +263,17 @@ def _load_along(
 
     `arm` has the coordinates of the force times its lever, N.m.
     """
-    x, y, z = k
     yield from ((v, force * along) for v, along in zip("uvw", k, strict=True))
-    arms = {"p": (("y", z), ("z", y)), "q": (("z", x), ("x", z)), "r": (("x", y), ("y", x))}
-    for v, pairs in arms.items():
-        for sign, (coordinate, direction) in zip((1, -1), pairs, strict=True):
-            if coordinate in arm:
-                yield v, sign * (arm[coordinate] * direction)
+    for axis in (ROLL, PITCH, YAW):
+        for sign, coordinate, direction in _levers(axis):
+            if "xyz"[coordinate] in arm:
+                yield axis.velocity, sign * (arm["xyz"[coordinate]] * k[direction])
+
+
+def _levers(axis: Axis) -> tuple[tuple[int, int, int], ...]:
+    """Return the parts of the moment r x F about an axis: a sign, the index of a coordinate, and that of a force."""
+    second, third = (axis.place + 1) % 3, (axis.place + 2) % 3
+    return (1, second, third), (-1, third, second)
 
 
 def _waves(layout: Layout, names: Names) -> Iterator[Force]:
@@ -367,8 +374,7 @@ def _at_points(layout: Layout) -> Iterator[Force]:
         for axis in layout.bare_axes:
             arms: list[tuple[Expression, int]] = [(ONE, axis.place)]
             if axis.is_rotation:
-                second, third = (axis.place + 1) % 3, (axis.place + 2) % 3
-                arms = [(r[second], third), (-r[third], second)]
+                arms = [(sign * r[coordinate], direction) for sign, coordinate, direction in _levers(axis)]
             for arm, column in arms:
                 for force, row in zip(F, R, strict=True):  # R^T F
                     if row[column] != ZERO:

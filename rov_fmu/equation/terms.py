@@ -40,6 +40,8 @@ from .attitude import (
 )
 from .catalogue import (
     BELOW_SURFACE,
+    CURRENT,
+    CURRENT_DOWN,
     EARTH,
     GRAVITY,
     HEAVE,
@@ -52,7 +54,20 @@ from .catalogue import (
     over_ground_name,
 )
 from .expression import ONE, ZERO, Expression, Formulas, Name, Names, Operation, call, of, product, total, where
-from .forces import AT_SURFACE, COUPLING, POINTS, WAVES, Effect, Force, above, advance, forces_of, rotation, thrusts
+from .forces import (
+    AT_SURFACE,
+    COUPLING,
+    KINEMATICS,
+    POINTS,
+    WAVES,
+    Effect,
+    Force,
+    above,
+    advance,
+    forces_of,
+    rotation,
+    thrusts,
+)
 from .layout import Layout
 from .mass import MassMatrix
 from .parts import EVERY_COMMAND, CommandTable, Curve, Range
@@ -77,7 +92,12 @@ class Term:
 
 @dataclass(frozen=True)
 class Equation:
-    """The equation of motion of a vehicle. Formulas are evaluated in their order, and each may use those before it."""
+    """The equation of motion of a vehicle. Formulas are evaluated in their order, and each may use those before it.
+
+    From the table follow, in this order: its states, and which of them the formulas of the orientation and the depth
+    set; which states depend on which, and so the components that are solved one after the other; what ends a piece of a
+    step, and what lags; all formulas as one program, and the rates of the vehicle's own states; the functions of tables.
+    """
 
     parameters: Mapping[str, Expression]
     """Formulas for the numbers that follow from the coefficients alone."""
@@ -103,6 +123,8 @@ class Equation:
     """The tables that the formulas call, by their names."""
     names: Names = field(default_factory=Names)
     """The names of the quantities of the equation."""
+
+    # ---- The states of the table ----
 
     @cached_property
     def states(self) -> tuple[str, ...]:
@@ -138,6 +160,8 @@ class Equation:
         In `rows`, the used states come first, so that C needs one number, N_USED, to tell states from integrals.
         """
         return frozenset(self.orientation.keys() & self.rows.keys()).union(*self.states_in_rate.values())
+
+    # ---- Which states depend on which ----
 
     @cached_property
     def _reach(self) -> dict[str, set[str]]:
@@ -179,6 +203,8 @@ class Equation:
         last = max(n for n, group in enumerate(self.components) if not self._settling.isdisjoint(group))
         return self.components[: last + 1]
 
+    # ---- What ends a piece of a step, and what lags ----
+
     @cached_property
     def monitored(self) -> tuple[str, ...]:
         """The velocities whose reversals end a piece of a step."""
@@ -205,6 +231,8 @@ class Equation:
         """Return True for a term with the arrived fraction of a lag. Such a term is 0 at the start of a piece."""
         return any(lag.arrived in term.factors for lag in self.lags)
 
+    # ---- The formulas as a whole ----
+
     @cached_property
     def program(self) -> dict[str, Expression]:
         """All formulas from the inputs, states and coefficients of a vehicle to the numbers in its thrust and rates."""
@@ -230,6 +258,8 @@ class Equation:
         earth = POINTS, WAVES
         rows = {name: tuple(term for term in terms if term.effect not in earth) for name, terms in self.rows.items()}
         return replace(self, rows=rows)
+
+    # ---- Tables ----
 
     @cached_property
     def measured(self) -> dict[str, Callable[[float], float]]:
@@ -272,7 +302,7 @@ def equation_of(layout: Layout) -> Equation:
     starts: dict[str, Expression] = {name: Name(name) for name in layout.state if name in used}
     if TURN[0] in rows:
         starts |= {"cos_psi": call("cos", Name("psi")), "sin_psi": call("sin", Name("psi"))}
-    starts |= rotation | _after_current(layout, rows)
+    starts |= rotation | _after_current(layout)
     if layout.surface:
         depth: Expression = Name("z")
         if layout.waves:
@@ -312,7 +342,11 @@ def _tables(layout: Layout) -> dict[str, CommandTable]:
 
 
 class _Table:
-    """The rows of the table of terms, and the formulas of their coefficients, which each row adds."""
+    """The rows of the table of terms, and the formulas of their coefficients, which each row adds.
+
+    `motion` makes the rows of the velocities from `_term` and `_arriving`, in which a formula becomes a `_named`
+    number, and `pose` those of the position and the heading.
+    """
 
     def __init__(self, layout: Layout, names: Names) -> None:
         self.layout, self.names = layout, names
@@ -439,19 +473,14 @@ class _Table:
         """
         layout = self.layout
         rows: dict[str, tuple[Term, ...]] = {}
-        turned: dict[str, list[Term]]
-        if layout.has_attitude:
-            turned = {x: [Term(ONE, (v, entry(i, n))) for n, v in enumerate("uvw", 1)] for i, x in enumerate("xyz", 1)}
-        else:
-            turned = {x: [Term(ONE, (v,))] for x, v in zip("xyz", "uvw", strict=True)}
-            if layout.turns:
-                rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
-                turned["x"] = [Term(ONE, ("u", "cos_psi")), Term(-ONE, ("v", "sin_psi"))]
-                turned["y"] = [Term(ONE, ("u", "sin_psi")), Term(ONE, ("v", "cos_psi"))]
-        for x, current in (("x", "V_N"), ("y", "V_E"), ("z", "V_D")):
+        if layout.turns:
+            rows = {"cos_psi": (Term(-ONE, ("r", "sin_psi")),), "sin_psi": (Term(ONE, ("r", "cos_psi")),)}
+        for x, current, row in zip("xyz", CURRENT | CURRENT_DOWN, rotation(layout), strict=True):
             if x in layout.pose:
                 steady = [Term(self._named(Name(current), "constant", x))] if current in layout.inputs else []
-                rows[x] = (*steady, *(term for term in turned[x] if term.factors[0] in layout.velocities))
+                turned = [(v, part) for v, part in zip("uvw", row, strict=True) if v in layout.velocities]
+                moving = (Force(KINEMATICS, x, Name(v) * part) for v, part in turned if part != ZERO)
+                rows[x] = (*steady, *(Term(one.along(), one.factors) for one in moving))
         if "psi" in layout.pose:
             rows["psi"] = (Term(ONE, ("r",)),)
         return rows
@@ -524,24 +553,17 @@ def _parameters(layout: Layout, mass: MassMatrix, lags: Iterable[Lag]) -> Formul
     return formulas
 
 
-def _after_current(layout: Layout, rows: Rows) -> dict[str, Expression]:
+def _after_current(layout: Layout) -> dict[str, Expression]:
     """Return formulas for the velocities through the water after a change of the current that passes the vehicle.
 
     The velocity over ground stays, so that nu changes by -R^T times the change of the current.
     """
     change = [Name(name) - Name(before) for name, before in layout.before.items()]
-    turned: dict[str, list[Expression]]
-    if layout.has_attitude:
-        turned = {v: [Name(entry(i, n)) for i in (1, 2, 3)] for n, v in enumerate("uvw", 1)}
-    elif TURN[0] in rows:
-        cosine, sine = Name(TURN[0]), Name(TURN[1])
-        turned = {"u": [cosine, sine], "v": [-sine, cosine]}
-    else:
-        turned = {"u": [ONE], "v": [ZERO, ONE]}
+    changed = zip("uvw"[: len(change)], zip(*rotation(layout), strict=True), strict=False)
     return {
-        v: Name(v) - total(x * part for x, part in zip(parts, change, strict=False))
-        for v, parts in turned.items()
-        if change and v in layout.velocities
+        v: Name(v) - total(x * part for x, part in zip(column, change, strict=False))
+        for v, column in changed
+        if v in layout.velocities
     }
 
 

@@ -156,7 +156,7 @@ def test_a_tether_feels_a_jet_where_it_is(tmp_path: Path, monkeypatch: pytest.Mo
     found = tether(60.0, **ends, **profile)
     depths, speeds = np.loadtxt(StringIO(JET), delimiter=",", skiprows=1).T[[1, 3]]
     module = sys.modules[type(found).__module__]
-    monkeypatch.setattr(module, "current", lambda _, depth: [0.0, -np.interp(depth, depths, speeds), 0.0])
+    monkeypatch.setattr(module, "at", lambda _, depth: [0.0, np.interp(depth, depths, speeds), 0.0])
     expected = tether(60.0, **ends)
     assert found.tension_bottom == pytest.approx(expected.tension_bottom, rel=1e-3)
     assert (found.F_E_bottom, found.tension_bottom) == pytest.approx((1.741, 2.906), rel=0.01)
